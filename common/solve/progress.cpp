@@ -1,0 +1,71 @@
+#include "common/solve/progress.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace tubule {
+namespace {
+
+constexpr double bar_interval = 0.1, line_interval = 10;  // seconds
+constexpr int bar_width = 24;
+
+}  // namespace
+
+bool ProgressStyle::is_terminal(std::FILE* file) {
+    return isatty(fileno(file)) == 1;
+}
+
+double ProgressStyle::wall() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string duration(double seconds) {
+    if (!(seconds < 1e9)) return "?";  // also not a number
+    const long s = std::lround(seconds);
+    if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+    return s >= 60 ? fmt::format("{}:{:02}", s / 60, s % 60) : fmt::format("{} s", s);
+}
+
+Progress::Progress(double begin, double end, ProgressStyle style)
+    : begin_(begin), end_(end), style_(std::move(style)), last_time_(begin), last_wall_(style_.clock()) {
+    next_ = last_wall_ + (style_.terminal ? bar_interval : line_interval);
+}
+
+Progress::~Progress() {
+    if (!drawn_ || !style_.terminal) return;
+    std::fputs("\r\x1b[K", style_.out);
+    std::fflush(style_.out);
+}
+
+void Progress::operator()(double time, double energy, double step) {
+    if (style_.quiet) return;
+    const double now = style_.clock();
+    if (now >= next_) show(time, energy, step, now);
+}
+
+void Progress::show(double time, double energy, double step, double now) {
+    // Steps grow by orders of magnitude during a run: only its recent speed says what is left.
+    const double recent = (time - last_time_) / (now - last_wall_);
+    speed_ = speed_ > 0 ? 0.7 * speed_ + 0.3 * recent : recent;
+    last_time_ = time;
+    last_wall_ = now;
+    next_ = now + (style_.terminal ? bar_interval : line_interval);
+
+    const double fraction = std::clamp((time - begin_) / (end_ - begin_), 0.0, 1.0);
+    const auto words = fmt::format("{:3.0f}%  time {:.4g} of {:.4g}  energy {:.6g}  step {:.2g}  left {}",
+                                   100 * fraction, time, end_, energy, step, duration((end_ - time) / speed_));
+    if (style_.terminal) {
+        const auto full = static_cast<std::size_t>(fraction * bar_width);
+        fmt::print(style_.out, "\r[{}{}] {}\x1b[K", std::string(full, '#'), std::string(bar_width - full, '.'), words);
+    } else {
+        fmt::print(style_.out, "{}\n", words);
+    }
+    std::fflush(style_.out);
+    drawn_ = true;
+}
+
+}  // namespace tubule

@@ -1,0 +1,46 @@
+// Shows how far a run has come: a bar on a terminal, a line now and then elsewhere.
+#pragma once
+
+#include <cstdio>
+#include <functional>
+#include <string>
+
+namespace tubule {
+
+struct ProgressStyle {
+    bool quiet = false;                    // nothing at all
+    std::FILE* out = stderr;               // results go to stdout
+    bool terminal = is_terminal(stderr);   // bar, redrawn at most 10 times a second; else a line every 10 s,
+                                           // the first after 10 s, so that short runs are silent
+    std::function<double()> clock = wall;  // seconds
+
+    static bool is_terminal(std::FILE* file);
+    static double wall();
+};
+
+// One object a run; the bar is wiped when it goes out of scope.
+class Progress {
+public:
+    Progress(double begin, double end, ProgressStyle style = {});
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+    ~Progress();
+
+    // Call after every step with the time reached, the energy and the step size; costs one reading of the clock.
+    void operator()(double time, double energy, double step);
+
+private:
+    void show(double time, double energy, double step, double now);
+
+    double begin_, end_;
+    ProgressStyle style_;
+    double next_;  // when to show something again
+    double last_time_, last_wall_;
+    double speed_ = 0;  // simulated time per second, smoothed over the last lines shown
+    bool drawn_ = false;
+};
+
+// "1:02:03", "4:05", "12 s"; "?" when not finite.
+std::string duration(double seconds);
+
+}  // namespace tubule
