@@ -1,0 +1,70 @@
+// A case as plain, validated data. See docs/case_files.md for the keys.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/energy/bending.hpp"
+#include "common/shapes/tube.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule {
+
+enum class Tier { axisym };
+enum class ModelKind { gradient_flow };
+
+using Shape = std::variant<Tube>;
+
+struct Accuracy {
+    double energy = 1e-4;  // asked error of the energy at all times, relative to E_ref
+    double r_min = 1e-3;   // floor of the neck radius: below it the run stops with pinch-off
+};
+
+// Explicit choices; where absent, the asked accuracy decides.
+struct Discretisation {
+    std::optional<int> elements;           // over one period of the tube; switches adaptive refinement off
+    int order = 5;                         // polynomial degree of the spline: 3, 5, 7
+    std::optional<int> smoothness;         // continuous derivatives at knots, 1 ... order-1; default order-1
+    std::optional<double> time_tolerance;  // relative tolerance of the time integrator
+    int time_order = 5;                    // largest order of the backward differences, 1 ... 5
+    bool symmetry = true;                  // solve one cell of a start that repeats or mirrors itself
+};
+
+struct TimeSpan {
+    double end = 1;
+    std::vector<double> output;        // times of frames; 0 and end are always written
+    std::optional<double> stationary;  // stop when the energy could change by less than this * E_ref until end
+    std::optional<double> limit;       // wall clock seconds
+};
+
+// What a run of the case must give: checked by `tubule run --expect`.
+struct Expectation {
+    std::string series;          // e.g. "energy", "r_min"
+    std::optional<double> time;  // absent: at the end
+    double value = 0;
+    std::optional<double> rel, abs;
+};
+struct Expect {
+    std::optional<Stop> stop;
+    std::vector<Expectation> values;
+};
+
+struct Case {
+    std::string path;               // where it was read from, for messages
+    std::string text;               // the file, verbatim
+    std::vector<std::string> sets;  // --set key=value overrides, in order
+
+    Tier tier = Tier::axisym;
+    std::string title, source;
+    Bending energy;
+    ModelKind model = ModelKind::gradient_flow;
+    Shape shape;
+    Accuracy accuracy;
+    Discretisation discretisation;
+    TimeSpan time;
+    Expect expect;
+};
+
+}  // namespace tubule

@@ -1,0 +1,222 @@
+// What a case file may say. Every table describes its keys once, as a template over a visitor `Keys`:
+// Reader (reader.hpp) reads and checks a file with it, Writer (write.cpp) writes one. The verbs:
+//   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
+//   choice, kind (which shape)                                             names and what they stand for
+//   table, tables (a list of tables), entries (tables under open names)    key, target, description
+//   check      a condition beyond a single key: gives "" or what is wrong, worded to follow the key
+// A target that is a std::optional stays empty where the key is absent.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/case/case.hpp"
+
+namespace tubule {
+
+// Which numbers are allowed; `step` > 0 leaves from, from + step, ... to. `note` says where a bound comes from.
+struct Range {
+    double above = -std::numeric_limits<double>::infinity();
+    double from = -std::numeric_limits<double>::infinity();
+    double to = std::numeric_limits<double>::infinity();
+    int step = 0;
+    std::string note = {};
+};
+
+template <class T>
+struct without_optional {
+    using type = T;
+};
+template <class T>
+struct without_optional<std::optional<T>> {
+    using type = T;
+};
+template <class T>
+using Choices = std::vector<std::pair<std::string, typename without_optional<T>::type>>;
+
+// Names of entries that are not fixed keys: those listed (for messages), told by `accepts`.
+struct OpenNames {
+    std::vector<std::string> listed;
+    bool (*accepts)(std::string_view name);
+};
+
+// The series a run writes, as far as [expect] knows them; mode_<n> stands for every wave number.
+inline std::vector<std::string> known_series() {
+    std::vector<std::string> names{"time", "energy"};
+    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
+    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "energy_error"})
+        names.push_back(name);
+    names.push_back("mode_<n>");
+    return names;
+}
+
+inline bool is_series(std::string_view name) {
+    if (name.starts_with("mode_")) {
+        const std::string_view digits = name.substr(5);
+        int n = 0;
+        const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
+        return error == std::errc{} && n >= 0 && digits == std::to_string(n);
+    }
+    const std::vector<std::string> names = known_series();
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+template <class Keys>
+void keys(Keys& k, Bending& energy) {
+    std::string moduli;
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        k.number(term.key, energy.k[i]);
+        moduli += (moduli.empty() ? "" : ", ") + std::string(term.key);
+    });
+    k.number("H0", energy.H0);
+    k.check("", [&]() -> std::string {
+        for (const double modulus : energy.k)
+            if (modulus != 0) return {};
+        return "needs a modulus other than zero: " + moduli;
+    });
+}
+
+template <class Keys>
+void keys(Keys& k, Shape& shape) {
+    k.kind(shape);
+    std::visit([&](auto& which) { keys(k, which); }, shape);
+}
+
+template <class Keys>
+void keys(Keys& k, Accuracy& accuracy) {
+    k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
+    k.number("r_min", accuracy.r_min, {.above = 0});
+}
+
+template <class Keys>
+void keys(Keys& k, Discretisation& d) {
+    k.integer("elements", d.elements, {.from = 4, .to = 100000});
+    k.integer("order", d.order, {.from = 3, .to = 7, .step = 2});
+    k.integer("smoothness", d.smoothness, {.from = 1, .to = d.order - 1.0, .note = "order - 1"});
+    k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
+    k.integer("time_order", d.time_order, {.from = 1, .to = 5});
+    k.flag("symmetry", d.symmetry);
+}
+
+template <class Keys>
+void keys(Keys& k, TimeSpan& time) {
+    k.number("end", time.end, {.above = 0}, k.required);
+    k.increasing("output", time.output, {.from = 0, .to = time.end, .note = "time.end"});
+    k.number("stationary", time.stationary, {.above = 0});
+    k.number("limit", time.limit, {.above = 0});
+}
+
+template <class Keys>
+void keys(Keys& k, Expectation& expected, double end) {
+    Range values;
+    if (expected.series == "time") values = {.from = 0, .to = end, .note = "time.end"};
+    k.number("value", expected.value, values, k.required);
+    k.number("rel", expected.rel, {.above = 0});
+    k.number("abs", expected.abs, {.above = 0});
+    k.check("", [&]() -> std::string {
+        if (!expected.rel && !expected.abs) return "needs a tolerance: rel, abs or both";
+        if (!expected.abs && expected.value == 0)
+            return "needs abs: a relative tolerance of the value 0 allows nothing";
+        return {};
+    });
+}
+
+// A file groups the expectations by time; the case keeps them in one list.
+template <class Keys>
+void keys(Keys& k, Expect& expect, double end) {
+    struct Moment {
+        double time = 0;
+        std::vector<Expectation> values;
+    };
+    std::vector<Expectation> at_end;
+    std::vector<Moment> moments;
+    for (const Expectation& value : expect.values) {
+        if (!value.time) {
+            at_end.push_back(value);
+            continue;
+        }
+        if (moments.empty() || moments.back().time != *value.time) moments.push_back({*value.time, {}});
+        moments.back().values.push_back(value);
+    }
+
+    Choices<Stop> stops;
+    for (int i = 0; i <= static_cast<int>(Stop::interrupted); ++i)
+        stops.emplace_back(name(static_cast<Stop>(i)), static_cast<Stop>(i));
+    k.choice("stop", expect.stop, stops);
+
+    // Of series "time", the end has the time of stopping, also called so; at a moment, `time` is that moment.
+    OpenNames in_end{known_series(), [](std::string_view n) { return n == "stop_time" || is_series(n); }};
+    OpenNames in_moment{known_series(), [](std::string_view n) { return n != "time" && is_series(n); }};
+    in_end.listed.push_back("stop_time");
+    in_moment.listed.erase(in_moment.listed.begin());
+    for (Expectation& value : at_end)
+        if (value.series == "time") value.series = "stop_time";
+    k.entries(in_end, at_end, &Expectation::series, [&](auto& k, Expectation& value) {
+        if (value.series == "stop_time") value.series = "time";
+        keys(k, value, end);
+    });
+    k.tables("at", moments, [&](auto& k, Moment& moment) {
+        k.number("time", moment.time, {.from = 0, .to = end, .note = "time.end"}, k.required);
+        k.entries(in_moment, moment.values, &Expectation::series,
+                  [&](auto& k, Expectation& value) { keys(k, value, end); });
+        k.check("", [&] { return moment.values.empty() ? "expects nothing: add a series" : ""; });
+    });
+
+    expect.values = at_end;
+    for (const Moment& moment : moments)
+        for (Expectation value : moment.values) {
+            value.time = moment.time;
+            expect.values.push_back(value);
+        }
+}
+
+// What no table can tell alone.
+template <class Keys>
+void check_together(Keys& k, const Case& c) {
+    const Tube* tube = std::get_if<Tube>(&c.shape);
+    for (std::size_t i = 0; tube && i < tube->modes.size(); ++i)
+        k.check(fmt::format("shape.mode.{}.m", i), [&, m = tube->modes[i].m]() -> std::string {
+            if (m == 0) return {};
+            return fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no waves around the axis",
+                               m);
+        });
+    k.check("accuracy.r_min", [&]() -> std::string {
+        const Neck neck = std::visit([](const auto& shape) { return narrowest(shape); }, c.shape);
+        if (c.accuracy.r_min < neck.radius) return {};
+        return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}", neck.radius,
+                           neck.z, c.accuracy.r_min);
+    });
+}
+
+template <class Keys>
+void keys(Keys& k, Case& c) {
+    k.choice("tier", c.tier, {{"axisym", Tier::axisym}}, k.required);
+    k.table("about", [&](auto& k) {
+        k.text("title", c.title);
+        k.text("source", c.source);
+    });
+    k.table("energy", [&](auto& k) { keys(k, c.energy); });
+    k.table("model", [&](auto& k) {
+        k.choice("kind", c.model, {{"gradient-flow", ModelKind::gradient_flow}});
+        bool volume_is_free = true;  // the only choice yet, so the case need not remember it
+        k.choice("volume", volume_is_free, {{"free", true}});
+    });
+    k.table("shape", [&](auto& k) { keys(k, c.shape); });
+    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy); });
+    k.table("discretisation", [&](auto& k) { keys(k, c.discretisation); });
+    k.table("time", [&](auto& k) { keys(k, c.time); });
+    k.table("expect", [&](auto& k) { keys(k, c.expect, c.time.end); });
+    check_together(k, c);
+}
+
+}  // namespace tubule

@@ -1,0 +1,28 @@
+// Case files: TOML text to validated data and back. The keys are described in keys.hpp and docs/case_files.md.
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+
+namespace tubule {
+
+// Bad input. The message starts with "file:line:column: " (or "--set key=value: " where an override is to
+// blame), and says what is wrong, what is allowed and, for a near miss, what was probably meant.
+struct CaseError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Reads and validates a case; `sets` are overrides "a.b=value" applied to it first. Throws CaseError.
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets = {});
+
+// The same for a text in memory; `path` names it in messages.
+Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path);
+
+// The case as TOML text that stands alone: overrides applied, defaults written out. Comments are not kept.
+std::string effective_toml(const Case& c);
+
+}  // namespace tubule

@@ -1,0 +1,145 @@
+// The visitor that reads a parsed TOML table by the descriptions of keys.hpp, and refuses what they do not allow.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/case/keys.hpp"
+
+namespace tubule {
+
+// Reads one table. Every description is run twice: first to learn the names of the keys, so that a misspelt
+// one is reported as such and not as another one missing, then to take the values, in order.
+class Reader {
+public:
+    static constexpr bool required = true;
+
+    // `path` is the table as in --set ("" for the whole file); `where` the place that stands for it in messages.
+    template <class Describe>
+    static void read(const toml::table& table, const std::string& path, const std::string& where,
+                     const Describe& describe) {
+        Reader names(table, path, where, Pass::names);
+        describe(names);
+        names.refuse_unknown();
+        Reader values(table, path, where, Pass::values);
+        describe(values);
+    }
+
+    template <class T>
+    void number(const std::string& key, T& target, const Range& range = {}, bool needed = false) {
+        if (const toml::node* node = find(key, expected("a number", range), needed))
+            target = number_in(*node, path_of(key), range);
+    }
+
+    template <class T>
+    void integer(const std::string& key, T& target, const Range& range, bool needed = false) {
+        if (const toml::node* node = find(key, expected("an integer", range), needed))
+            target = integer_in(*node, path_of(key), range);
+    }
+
+    template <class T>
+    void choice(const std::string& key, T& target, const Choices<T>& choices, bool needed = false) {
+        std::vector<std::string> names;
+        for (const auto& [name, value] : choices) names.push_back(name);
+        if (const toml::node* node = find(key, expected(names), needed))
+            target = choices[one_of(*node, path_of(key), names)].second;
+    }
+
+    void flag(const std::string& key, bool& target);
+    void text(const std::string& key, std::string& target);
+    void increasing(const std::string& key, std::vector<double>& target, const Range& range);
+
+    // Key "kind": makes the alternative of that name, whose keys belong to the same table.
+    template <class... Kinds>
+    void kind(std::variant<Kinds...>& target) {
+        const std::vector<std::string> names{Kinds::kind...};
+        find("kind", expected(names), required);
+        const toml::node* node = table_.get("kind");
+        if (!node) return;
+        const std::string& name = names[one_of(*node, path_of("kind"), names)];
+        ((name == Kinds::kind ? void(target = Kinds{}) : void()), ...);
+    }
+
+    // An absent table is read like an empty one: what it lacks is missing, the rest has its defaults.
+    template <class Describe>
+    void table(const std::string& key, const Describe& describe) {
+        const toml::node* node = find(key, "a table", false);
+        if (pass_ == Pass::names) return;
+        const toml::table absent;
+        read(node ? as_table(*node, path_of(key)) : absent, path_of(key), node ? where(*node) : where_, describe);
+    }
+
+    template <class T, class Describe>
+    void tables(const std::string& key, std::vector<T>& target, const Describe& describe) {
+        const toml::node* node = find(key, "a list of tables", false);
+        if (!node) return;
+        const toml::array& list = as_list(*node, path_of(key), "a list of tables, [[" + path_of(key) + "]]");
+        target.assign(list.size(), T{});
+        for (std::size_t i = 0; i < list.size(); ++i) {
+            const std::string path = path_of(key) + "." + std::to_string(i);
+            read(as_table(list[i], path), path, where(list[i]), [&](Reader& k) { describe(k, target[i]); });
+        }
+    }
+
+    template <class T, class Describe>
+    void entries(const OpenNames& names, std::vector<T>& target, std::string T::*name, const Describe& describe) {
+        if (pass_ == Pass::names) {
+            names_.insert(names_.end(), names.listed.begin(), names.listed.end());
+            accepts_ = names.accepts;
+            return;
+        }
+        for (const auto& [key, node] : table_) {
+            if (!names.accepts(key.str())) continue;
+            T entry;
+            entry.*name = key.str();
+            table(entry.*name, [&](Reader& k) { describe(k, entry); });
+            target.push_back(std::move(entry));
+        }
+    }
+
+    // `key` is relative to this table, "" the table itself; where it is absent, what holds it is to blame.
+    template <class Complain>
+    void check(const std::string& key, const Complain& complain) {
+        if (pass_ == Pass::names) return;
+        const std::string complaint = complain();
+        if (!complaint.empty()) refuse(key, complaint);
+    }
+
+private:
+    enum class Pass { names, values };
+
+    Reader(const toml::table& table, const std::string& path, const std::string& where, Pass pass)
+        : table_(table), path_(path), where_(where), pass_(pass) {}
+
+    const toml::node* find(const std::string& key, const std::string& what, bool needed);
+    void refuse_unknown() const;
+    [[noreturn]] void refuse(const std::string& key, const std::string& complaint) const;
+
+    std::string path_of(const std::string& key) const;
+    std::string where(const toml::node& node) const;
+
+    double number_in(const toml::node& node, const std::string& path, const Range& range) const;
+    int integer_in(const toml::node& node, const std::string& path, const Range& range) const;
+    std::size_t one_of(const toml::node& node, const std::string& path, const std::vector<std::string>& names) const;
+    const toml::table& as_table(const toml::node& node, const std::string& path) const;
+    const toml::array& as_list(const toml::node& node, const std::string& path, const std::string& what) const;
+
+    static std::string expected(const std::string& noun, const Range& range);
+    static std::string expected(const std::vector<std::string>& names);
+
+    const toml::table& table_;
+    std::string path_, where_;
+    Pass pass_;
+    std::vector<std::string> names_;
+    bool (*accepts_)(std::string_view) = nullptr;
+};
+
+// "file:line:column", or "--set key=value" for what an override brought.
+std::string place(const toml::source_region& source);
+
+}  // namespace tubule

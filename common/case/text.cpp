@@ -1,0 +1,77 @@
+#include "common/case/text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+namespace tubule {
+
+namespace {
+
+// What it takes to turn a into b: 1 for swapping neighbours, the likeliest slip, and 2 for inserting, deleting
+// or replacing a letter. Letter case does not matter.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+    const auto same = [&](std::size_t i, std::size_t j) {
+        return std::tolower(static_cast<unsigned char>(a[i])) == std::tolower(static_cast<unsigned char>(b[j]));
+    };
+    for (std::size_t i = 0; i <= a.size(); ++i) {
+        for (std::size_t j = 0; j <= b.size(); ++j) {
+            if (i == 0 || j == 0) {
+                d[i][j] = 2 * (i + j);
+                continue;
+            }
+            d[i][j] = std::min({d[i - 1][j] + 2, d[i][j - 1] + 2, d[i - 1][j - 1] + (same(i - 1, j - 1) ? 0 : 2)});
+            if (i > 1 && j > 1 && same(i - 1, j - 2) && same(i - 2, j - 1))
+                d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+        }
+    }
+    return d[a.size()][b.size()];
+}
+
+}  // namespace
+
+std::string toml_string(std::string_view text) {
+    std::string result = "\"";
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (c == '"' || c == '\\')
+            result += {'\\', c};
+        else if (byte < 0x20 || byte == 0x7f)
+            result += fmt::format("\\u{:04x}", byte);
+        else
+            result += c;
+    }
+    return result + '"';
+}
+
+std::vector<std::string> split(std::string_view text, char separator) {
+    std::vector<std::string> parts(1);
+    for (const char c : text) {
+        if (c == separator)
+            parts.emplace_back();
+        else
+            parts.back() += c;
+    }
+    return parts;
+}
+
+std::optional<std::size_t> list_index(std::string_view text) {
+    const bool digits = std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+    if (text.empty() || text.size() > 6 || !digits) return {};
+    return std::stoul(std::string(text));
+}
+
+std::optional<std::string> near_miss(std::string_view word, const std::vector<std::string>& names) {
+    std::optional<std::string> nearest;
+    std::size_t smallest = 0;
+    for (const std::string& name : names) {
+        const std::size_t distance = edit_distance(word, name);
+        if (distance > 2 * std::max<std::size_t>(1, std::max(word.size(), name.size()) / 3)) continue;
+        if (!nearest || distance < smallest) nearest = name, smallest = distance;
+    }
+    return nearest;
+}
+
+}  // namespace tubule

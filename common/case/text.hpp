@@ -1,0 +1,24 @@
+// Small helpers for the words of case files.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tubule {
+
+// A TOML basic string, quotes included, that reads back as `text`.
+std::string toml_string(std::string_view text);
+
+// "a.b" gives {"a", "b"}; "" gives {""}.
+std::vector<std::string> split(std::string_view text, char separator);
+
+// The position in a list that `text` stands for ("0", "1", ...), if it does.
+std::optional<std::size_t> list_index(std::string_view text);
+
+// The name that `word` most likely meant: letter case aside, a letter missing, extra, wrong or swapped
+// with its neighbour, up to one in every three. Empty when none is near.
+std::optional<std::string> near_miss(std::string_view word, const std::vector<std::string>& names);
+
+}  // namespace tubule

@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "common/case/keys.hpp"
+#include "common/case/read.hpp"
+#include "common/case/text.hpp"
+
+namespace tubule {
+
+namespace {
+
+// The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML wants, then its
+// tables. Numbers are written with the digits that read back exactly.
+class Writer {
+public:
+    static constexpr bool required = true;
+
+    explicit Writer(const std::string& path) : path_(path) {}
+
+    template <class T>
+    void number(const std::string& key, const T& value, const Range& = {}, bool = false) {
+        if constexpr (std::is_same_v<T, typename without_optional<T>::type>)
+            line(key, fmt::format("{}", value));
+        else if (value)
+            line(key, fmt::format("{}", *value));
+    }
+
+    template <class T>
+    void integer(const std::string& key, const T& value, const Range&, bool = false) {
+        number(key, value);
+    }
+
+    template <class T>
+    void choice(const std::string& key, const T& value, const Choices<T>& choices, bool = false) {
+        for (const auto& [name, meaning] : choices)
+            if (value == meaning) line(key, toml_string(name));
+    }
+
+    void flag(const std::string& key, bool value) { line(key, value ? "true" : "false"); }
+    void text(const std::string& key, const std::string& value) {
+        if (!value.empty()) line(key, toml_string(value));
+    }
+    void increasing(const std::string& key, const std::vector<double>& values, const Range&) {
+        if (!values.empty()) line(key, fmt::format("[{}]", fmt::join(values, ", ")));
+    }
+
+    template <class... Kinds>
+    void kind(const std::variant<Kinds...>& value) {
+        std::visit([&](const auto& which) { line("kind", toml_string(which.kind)); }, value);
+    }
+
+    template <class Describe>
+    void table(const std::string& key, const Describe& describe) {
+        Writer inner(path_of(key));
+        describe(inner);
+        if (!inner.empty()) sections_ += fmt::format("\n[{}]\n{}", inner.path_, inner.document());
+    }
+
+    template <class T, class Describe>
+    void tables(const std::string& key, std::vector<T>& values, const Describe& describe) {
+        for (T& value : values) {
+            Writer inner(path_of(key));
+            describe(inner, value);
+            sections_ += fmt::format("\n[[{}]]\n{}", inner.path_, inner.document());
+        }
+    }
+
+    template <class T, class Describe>
+    void entries(const OpenNames&, std::vector<T>& values, std::string T::*name, const Describe& describe) {
+        for (T& value : values) {
+            const std::string key = value.*name;
+            Writer inner(path_of(key));
+            describe(inner, value);
+            line(key, fmt::format("{{{}}}", fmt::join(inner.lines_, ", ")));
+        }
+    }
+
+    template <class Complain>
+    void check(const std::string&, const Complain&) {}
+
+    bool empty() const { return lines_.empty() && sections_.empty(); }
+    std::string document() const {
+        return fmt::format("{}{}{}", fmt::join(lines_, "\n"), lines_.empty() ? "" : "\n", sections_);
+    }
+
+private:
+    std::string path_of(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+    void line(const std::string& key, const std::string& value) { lines_.push_back(key + " = " + value); }
+
+    std::string path_;
+    std::vector<std::string> lines_;
+    std::string sections_;
+};
+
+}  // namespace
+
+std::string effective_toml(const Case& c) {
+    Writer writer("");
+    Case copy = c;  // a description takes its targets by reference; the writer leaves them as they are
+    keys(writer, copy);
+    return writer.document();
+}
+
+}  // namespace tubule

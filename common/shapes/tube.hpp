@@ -1,0 +1,64 @@
+// Shape "tube": r0(z, theta) = radius + SUM amplitude cos(2 pi n z/length + m theta + phase), periodic in z.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+namespace tubule {
+
+struct TubeMode {
+    double amplitude = 0;
+    int n = 1;         // waves per length
+    int m = 0;         // waves around the axis; tier axisym takes m = 0 only
+    double phase = 0;  // radians
+};
+
+struct Tube {
+    static constexpr const char* kind = "tube";
+    double radius = 1;
+    double length = 2;
+    std::vector<TubeMode> modes;
+};
+
+// r0 at z on the meridian theta = 0 (any meridian, as long as all modes have m = 0). T is double or any
+// differentiable scalar that is constructible from double and has +, * and cos.
+template <class T>
+T radius_at(const Tube& tube, const T& z) {
+    using std::cos;
+    T r(tube.radius);
+    for (const TubeMode& mode : tube.modes) {
+        const double wave_number = 2 * std::numbers::pi * mode.n / tube.length;
+        r = r + mode.amplitude * cos(wave_number * z + mode.phase);
+    }
+    return r;
+}
+
+// The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.
+struct Neck {
+    double z = 0, radius = 0;
+};
+Neck narrowest(const Tube& tube);
+
+// Why this is no surface, worded to follow "shape"; empty when r0 > 0 everywhere.
+std::string complaint(const Tube& tube);
+
+// Volume over one period, exact for modes with m = 0: pi INT r0^2 dz. (The area has no closed form.)
+double volume(const Tube& tube);
+
+// The keys of [shape]; see common/case/keys.hpp.
+template <class Keys>
+void keys(Keys& k, Tube& tube) {
+    k.number("radius", tube.radius, {.above = 0}, k.required);
+    k.number("length", tube.length, {.above = 0}, k.required);
+    k.tables("mode", tube.modes, [](auto& k, TubeMode& mode) {
+        k.number("amplitude", mode.amplitude, {}, k.required);
+        k.integer("n", mode.n, {.from = 0, .to = 10000}, k.required);
+        k.integer("m", mode.m, {.from = -10000, .to = 10000});
+        k.number("phase", mode.phase);
+    });
+    k.check("", [&] { return complaint(tube); });
+}
+
+}  // namespace tubule
