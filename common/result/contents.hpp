@@ -1,0 +1,33 @@
+// All that a result file holds, in memory, and where in the stream of calls it stands.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+struct Contents {
+    std::uint64_t id = 0;           // of this result: a journal with another id belongs to a file that is gone
+    std::uint64_t sequence = 0;     // number of journal records these contents include
+    std::uint64_t about_begun = 0;  // how many of `about` were there when the run began; the rest came at its end
+    CaseText case_text;
+    About about;
+    std::vector<std::string> series;  // names
+    std::vector<double> rows;         // row-major, series.size() numbers a row
+    std::vector<Record> frames;
+    std::optional<Record> checkpoint;
+
+    void add_row(std::span<const double> values) { rows.insert(rows.end(), values.begin(), values.end()); }
+    void forget() {
+        rows.clear();
+        frames.clear();
+        checkpoint.reset();
+    }
+};
+
+}  // namespace tubule

@@ -1,0 +1,68 @@
+// NAME.hdf.journal: what was handed to the writer since NAME.hdf was last written.
+//
+//   header   8 bytes "TUBULEJ1", 8 bytes id of the result
+//   record   8 bytes length of the payload, 8 bytes sequence number, 4 bytes kind, 4 bytes CRC-32, payload
+//
+// in the byte order of the machine. The CRC runs over the id, the record's first 20 bytes and its payload, so that a
+// record of another result never passes. Sequence numbers go up by one; NAME.hdf tells the last one it includes.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "common/result/contents.hpp"
+#include "common/result/durable_io.hpp"
+
+namespace tubule {
+
+// The journal may grow by this many bytes beyond the size of the file before it is merged; the tests lower it.
+inline std::size_t journal_slack = std::size_t{4} << 20;
+
+enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard };
+
+// Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
+std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
+
+std::filesystem::path journal_path(const std::filesystem::path& result);
+
+class Journal {
+public:
+    // Opens or creates the journal beside a result, and locks it for as long as this lives: throws
+    // std::runtime_error if another writer has it. Earlier records stay until restart().
+    explicit Journal(const std::filesystem::path& result);
+    Journal(const Journal&) = delete;
+    Journal& operator=(const Journal&) = delete;
+    ~Journal();  // takes the file away if nothing was ever written to it
+
+    void restart(std::uint64_t id);  // drops all records: call it when the result file includes them
+    void remove();
+
+    // Each appends one record, with a single write(2). If that fails the journal is cut back to what it was.
+    void row(std::uint64_t sequence, std::span<const double> values);
+    void record(Entry kind, std::uint64_t sequence, const Record& record);
+    void discard(std::uint64_t sequence);
+
+    std::size_t size() const { return size_; }  // bytes
+
+private:
+    void begin(Entry kind);
+    void commit(std::uint64_t sequence);
+
+    durable::File file_;
+    std::size_t size_ = 0;
+    std::uint32_t seed_ = 0;         // CRC of the id
+    bool sound_ = false;             // what is appended now can be read back
+    std::vector<std::byte> buffer_;  // one record, kept to save allocations
+};
+
+// The bytes of the journal beside a result; empty if there is none.
+std::vector<std::byte> read_journal(const std::filesystem::path& result);
+
+// Applies to `contents` the records that follow on them, up to the first one that is torn; nothing if the journal is of
+// another result. While a run goes on, read the journal first and the contents then: there is never a gap in this
+// order. Throws std::runtime_error on a gap.
+void replay(std::span<const std::byte> journal, Contents& contents);
+
+}  // namespace tubule

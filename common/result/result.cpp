@@ -1,0 +1,303 @@
+#include "common/result/result.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "common/result/contents.hpp"
+#include "common/result/durable_io.hpp"
+#include "common/result/hdf5_file.hpp"
+#include "common/result/journal.hpp"
+
+namespace tubule {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+namespace fs = std::filesystem;
+
+// ---- refusals
+
+void check_finite(double value, const std::string& where, const std::string& name) {
+    if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{} {} is {}", where, name, value));
+}
+
+// Names become HDF5 names, of which '/' and '.' are syntax. `taken` holds those seen so far.
+void check_name(const std::string& name, const std::string& where, std::set<std::string>& taken) {
+    if (name.empty() || name == "." || name.find('/') != std::string::npos || name.find('\0') != std::string::npos)
+        throw std::invalid_argument(fmt::format("{}: \"{}\" cannot be a name", where, name));
+    if (!taken.insert(name).second) throw std::invalid_argument(fmt::format("{}: {} comes twice", where, name));
+}
+
+// HDF5 ends its strings with a zero byte.
+void check_text(const std::string& text, const std::string& where) {
+    if (text.find('\0') != std::string::npos)
+        throw std::invalid_argument(fmt::format("{} contains a zero byte", where));
+}
+
+void check_about(const About& about) {
+    std::set<std::string> taken;
+    for (const auto& [name, value] : about) {
+        check_name(name, "about", taken);
+        if (const auto* number = std::get_if<double>(&value)) check_finite(*number, "about", name);
+        if (const auto* text = std::get_if<std::string>(&value)) check_text(*text, "about " + name);
+    }
+}
+
+void check_series(const std::vector<std::string>& series) {
+    std::set<std::string> taken;
+    for (const std::string& name : series) check_name(name, "series", taken);
+    if (!taken.contains("time")) throw std::invalid_argument("series: there must be one of the name time");
+}
+
+void check_record(const Record& record, const std::string& where) {
+    check_finite(record.time, where, "time");
+    std::set<std::string> numbers{"time"};
+    for (const auto& [name, value] : record.numbers) {
+        check_name(name, where, numbers);
+        check_finite(value, where, name);
+    }
+    std::set<std::string> arrays;
+    for (const Array& array : record.arrays) {
+        check_name(array.name, where, arrays);
+        std::size_t size = 1;
+        for (const std::size_t extent : array.shape) size *= extent;
+        if (size != array.data.size())
+            throw std::invalid_argument(fmt::format("{} {}: its shape asks for {} numbers, it has {}", where,
+                                                    array.name, size, array.data.size()));
+        const auto bad =
+            std::find_if_not(array.data.begin(), array.data.end(), [](double x) { return std::isfinite(x); });
+        if (bad != array.data.end())
+            check_finite(*bad, where, fmt::format("{}[{}]", array.name, bad - array.data.begin()));
+    }
+}
+
+// The result behind a name, whatever the process's directory becomes later; through a symbolic link if it is one.
+fs::path resolved(const fs::path& file) {
+    return fs::weakly_canonical(file);
+}
+
+// A slip of the keyboard after -o must not cost a case file or somebody's data.
+void refuse_to_replace_others(const fs::path& file) {
+    if (!fs::exists(file)) return;
+    try {
+        require_result(file);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(
+            fmt::format("{}\nnot replaced, as it may be needed: remove it first, or write elsewhere", e.what()));
+    }
+}
+
+// ---- contents
+
+Contents load(const fs::path& file) {
+    const auto journal = read_journal(file);  // before the file: see replay
+    Contents contents = read_hdf5(file);
+    try {
+        replay(journal, contents);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+    }
+    return contents;
+}
+
+// Makes the newest restart record the last thing that happened, and returns it.
+Record rewind(Contents& contents) {
+    const Record* newest = contents.frames.empty() ? nullptr : &contents.frames.back();
+    if (contents.checkpoint && (!newest || contents.checkpoint->time >= newest->time)) newest = &*contents.checkpoint;
+    if (!newest) throw std::runtime_error("it holds neither frame nor checkpoint to go on from");
+    Record record = *newest;
+
+    const std::size_t width = contents.series.size();
+    const auto time = static_cast<std::size_t>(std::find(contents.series.begin(), contents.series.end(), "time") -
+                                               contents.series.begin());
+    if (time == width) throw std::runtime_error("it lacks /series/time");
+    std::size_t kept = 0;  // values
+    for (std::size_t i = 0; i < contents.rows.size(); i += width) {
+        if (contents.rows[i + time] > record.time) continue;
+        std::copy_n(contents.rows.begin() + static_cast<std::ptrdiff_t>(i), width,
+                    contents.rows.begin() + static_cast<std::ptrdiff_t>(kept));
+        kept += width;
+    }
+    contents.rows.resize(kept);
+    std::erase_if(contents.frames, [&](const Record& frame) { return frame.time > record.time; });
+    contents.about.resize(std::min<std::size_t>(contents.about.size(), contents.about_begun));
+    return record;
+}
+
+}  // namespace
+
+struct ResultWriter::Impl {
+    // The writer that already holds the name, or the lack of rights to it, shows here.
+    explicit Impl(const fs::path& f) : file(f), journal(f) {}
+
+    fs::path file;
+    Journal journal;
+    Contents contents;
+    Record restart;
+    bool finished = false;
+
+    std::size_t image_size = 0;
+    Clock::time_point consolidated_at;
+    Clock::duration cost{};
+
+    void consolidate() {
+        const auto start = Clock::now();
+        const auto image = hdf5_image(contents);
+        durable::replace(file, image);
+        journal.restart(contents.id);
+        image_size = image.size();
+        consolidated_at = Clock::now();
+        cost = consolidated_at - start;
+    }
+
+    // What was journalled is safe; it goes into the file when there is as much of it as the file has already (so that
+    // all consolidations together write only a small multiple of the final size), and for those who look in meanwhile
+    // as often as takes less than 2 % of the time.
+    void consolidate_if_due() {
+        const bool outgrown = journal.size() > image_size + journal_slack;
+        const Clock::duration pause = std::max<Clock::duration>(std::chrono::seconds(2), 50 * cost);
+        if (outgrown || Clock::now() - consolidated_at > pause) consolidate();
+    }
+
+    // The sequence number for the next journal record.
+    std::uint64_t next() const {
+        if (finished) throw std::logic_error(fmt::format("{}: nothing can follow finish()", file.string()));
+        return contents.sequence + 1;
+    }
+};
+
+ResultWriter::ResultWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ResultWriter::ResultWriter(ResultWriter&&) noexcept = default;
+ResultWriter& ResultWriter::operator=(ResultWriter&&) noexcept = default;
+ResultWriter::~ResultWriter() = default;
+
+ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const About& about,
+                                  const std::vector<std::string>& series) {
+    check_text(c.text, "the case");
+    for (const std::string& set : c.sets) check_text(set, "--set");
+    check_about(about);
+    check_series(series);
+    const auto path = resolved(file);
+    refuse_to_replace_others(path);
+
+    auto impl = std::make_unique<Impl>(path);
+    std::random_device random;
+    impl->contents.id = (std::uint64_t{random()} << 32) | random();
+    impl->contents.about_begun = about.size();
+    impl->contents.case_text = c;
+    impl->contents.about = about;
+    impl->contents.series = series;
+    // The old result ends here: its journal, should one lie about, has another id.
+    impl->consolidate();
+    return ResultWriter(std::move(impl));
+}
+
+ResultWriter ResultWriter::resume(const fs::path& file) {
+    const auto path = resolved(file);
+    require_result(path);  // refuse what is no result before touching anything
+    auto impl = std::make_unique<Impl>(path);
+    impl->contents = load(path);
+    try {
+        impl->restart = rewind(impl->contents);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
+    }
+    impl->consolidate();
+    return ResultWriter(std::move(impl));
+}
+
+const Record& ResultWriter::restart_record() const {
+    return impl_->restart;
+}
+
+void ResultWriter::row(std::span<const double> values) {
+    Contents& contents = impl_->contents;
+    if (values.size() != contents.series.size())
+        throw std::invalid_argument(
+            fmt::format("a row of {} values for {} series", values.size(), contents.series.size()));
+    for (std::size_t j = 0; j < values.size(); ++j)
+        if (!std::isfinite(values[j])) check_finite(values[j], "series", contents.series[j]);
+
+    const auto sequence = impl_->next();
+    impl_->journal.row(sequence, values);
+    contents.add_row(values);
+    contents.sequence = sequence;
+    impl_->consolidate_if_due();
+}
+
+void ResultWriter::frame(const Record& frame) {
+    check_record(frame, "frame");
+    const auto sequence = impl_->next();
+    impl_->journal.record(Entry::frame, sequence, frame);
+    impl_->contents.frames.push_back(frame);
+    impl_->contents.sequence = sequence;
+    impl_->consolidate_if_due();
+}
+
+void ResultWriter::checkpoint(const Record& state) {
+    check_record(state, "checkpoint");
+    const auto sequence = impl_->next();
+    impl_->journal.record(Entry::checkpoint, sequence, state);
+    impl_->contents.checkpoint = state;
+    impl_->contents.sequence = sequence;
+    impl_->consolidate_if_due();
+}
+
+void ResultWriter::discard() {
+    const auto sequence = impl_->next();
+    impl_->journal.discard(sequence);
+    impl_->contents.forget();
+    impl_->contents.sequence = sequence;
+    impl_->consolidate_if_due();
+}
+
+void ResultWriter::finish(const About& more) {
+    check_about(more);
+    impl_->next();  // refuses a second time
+    About& about = impl_->contents.about;
+    for (const auto& [name, value] : more) {
+        const auto same = std::find_if(about.begin(), about.end(), [&](const auto& old) { return old.first == name; });
+        if (same != about.end())
+            same->second = value;
+        else
+            about.emplace_back(name, value);
+    }
+    durable::replace(impl_->file, hdf5_image(impl_->contents));
+    impl_->journal.remove();
+    impl_->finished = true;
+}
+
+Result read_result(const fs::path& file) {
+    Contents contents = load(file);
+    Result result;
+    const std::size_t width = contents.series.size();
+    for (std::size_t j = 0; j < width; ++j) {
+        auto& column = result.series[contents.series[j]];
+        column.reserve(contents.rows.size() / width);
+        for (std::size_t i = j; i < contents.rows.size(); i += width) column.push_back(contents.rows[i]);
+    }
+    result.case_text = std::move(contents.case_text);
+    result.about = std::move(contents.about);
+    result.series_names = std::move(contents.series);
+    result.frames = std::move(contents.frames);
+    result.checkpoint = std::move(contents.checkpoint);
+    return result;
+}
+
+void repair_result(const fs::path& file) {
+    const auto path = resolved(file);
+    require_result(path);
+    if (!fs::exists(journal_path(path))) return;
+    Journal journal(path);
+    durable::replace(path, hdf5_image(load(path)));
+    journal.remove();
+}
+
+}  // namespace tubule

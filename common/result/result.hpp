@@ -1,0 +1,87 @@
+// The result file NAME.hdf: one writer, one reader. Layout: docs/results.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace tubule {
+
+struct Array {
+    std::string name;
+    std::vector<std::size_t> shape;  // row-major
+    std::vector<double> data;
+};
+
+// A frame (/frames/000123) or a restart record (/checkpoint): a time, named numbers (attributes), named arrays.
+struct Record {
+    double time = 0;
+    std::vector<std::pair<std::string, double>> numbers;
+    std::vector<Array> arrays;
+};
+
+using Value = std::variant<std::int64_t, double, std::string>;
+using About = std::vector<std::pair<std::string, Value>>;
+
+struct CaseText {
+    std::string text;               // verbatim
+    std::vector<std::string> sets;  // overrides "key=value"
+};
+
+// Writes a result so that every row and frame handed over survives a kill at any later moment:
+// each goes to an append-only journal NAME.hdf.journal first; NAME.hdf itself is only ever replaced
+// as a whole (write aside, rename). Non-finite numbers and impossible names are refused with
+// std::invalid_argument, I/O errors and a second writer of the same file with std::runtime_error naming
+// the file; arguments that are refused leave nothing behind. A writer destroyed before finish() leaves its
+// journal.
+class ResultWriter {
+public:
+    // Begins a new result: NAME.hdf is there when this returns, still without rows. An old result of that
+    // name is replaced; a file that is no result is not (std::runtime_error). `series` must contain "time".
+    static ResultWriter create(const std::filesystem::path& file, const CaseText& c, const About& about,
+                               const std::vector<std::string>& series);
+    // Goes on with a result from its newest restart record (checkpoint or last frame, whichever is later);
+    // rows and frames later than that are dropped, and what finish() had added to /about.
+    // restart_record() gives it. Throws std::runtime_error if there is none.
+    static ResultWriter resume(const std::filesystem::path& file);
+    ResultWriter(ResultWriter&&) noexcept;
+    ResultWriter& operator=(ResultWriter&&) noexcept;
+    ~ResultWriter();
+
+    const Record& restart_record() const;      // of a resumed result
+    void row(std::span<const double> values);  // one value a series, in the order given to create
+    void frame(const Record& frame);
+    void checkpoint(const Record& state);  // replaces the one before
+    void discard();                        // forgets all rows, frames and the checkpoint: the run begins again
+    void finish(const About& more);        // adds to /about, writes NAME.hdf whole, removes the journal
+
+private:
+    struct Impl;
+    explicit ResultWriter(std::unique_ptr<Impl>);
+    std::unique_ptr<Impl> impl_;
+};
+
+struct Result {
+    CaseText case_text;
+    About about;
+    std::vector<std::string> series_names;  // in order of writing
+    std::map<std::string, std::vector<double>> series;
+    std::vector<Record> frames;
+    std::optional<Record> checkpoint;
+};
+
+// Reads a result; if a journal lies beside it (the run was killed, or is still going on), its complete
+// records are included. Throws std::runtime_error naming the file when it is no result.
+Result read_result(const std::filesystem::path& file);
+
+// Merges a left-over journal into the file, so that it can be read by any HDF5 program.
+void repair_result(const std::filesystem::path& file);
+
+}  // namespace tubule
