@@ -1,0 +1,127 @@
+// Splines over one cell of a periodic profile: degree p, any knots, any smoothness at the knots.
+// Cubic and quintic Hermite elements are the special cases (3, 1) and (5, 2) of (degree, smoothness).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <span>
+#include <vector>
+
+namespace tubule::axisym {
+
+// The part [z0, z1] of the axis that is solved for; the rest of the tube follows by translation, or
+// with `mirror` by reflection at both ends.
+struct Cell {
+    double z0 = 0, z1 = 1;
+    bool mirror = false;
+    int copies = 1;  // translational copies in the period of the case
+    double length() const { return z1 - z0; }
+    int images() const { return copies * (mirror ? 2 : 1); }
+    double period() const { return length() * images(); }
+};
+
+class ProfileSpace {
+public:
+    static constexpr int lanes = 4;      // quadrature points evaluated at once
+    static constexpr int max_width = 8;  // active splines per element, degree 7 at most
+
+    // `breaks` ascends from cell.z0 to cell.z1 (at least 2 elements); degree 3, 5 or 7;
+    // 1 <= smoothness < degree. Throws std::invalid_argument.
+    ProfileSpace(Cell cell, std::vector<double> breaks, int degree, int smoothness);
+
+    // Values, first and second derivatives of the active splines at `lanes` Gauss points, in two
+    // layouts: by_point to gather coefficients into points, by_spline to scatter points into coefficients.
+    struct Basis {
+        alignas(32) double by_point[3][max_width][lanes];
+        alignas(32) double by_spline[lanes][3][max_width];
+        alignas(32) double weight[lanes];
+        alignas(32) double z[lanes];
+    };
+
+    int size() const { return size_; }
+    int elements() const { return static_cast<int>(breaks_.size()) - 1; }
+    int degree() const { return degree_; }
+    int smoothness() const { return smoothness_; }
+    int width() const { return degree_ + 1; }
+    // Groups of Gauss points per element: 4 points integrate the energy of quintics to the order
+    // (8) at which it converges, septics take 8.
+    int groups() const { return degree_ <= 5 ? 1 : 2; }
+    const Cell& cell() const { return cell_; }
+    const std::vector<double>& breaks() const { return breaks_; }
+    const Basis& basis(int element, int group) const { return basis_[element * groups() + group]; }
+    const int* dofs(int element) const { return &dofs_[element * width()]; }
+
+    int element_at(double z) const;
+    // r, r', r'' of the spline at z inside `element` (or its ends).
+    std::array<double, 3> evaluate(const double* coefficients, int element, double z) const;
+    double value(const double* coefficients, int element, double z) const;
+    // The derivative of order `degree`, constant on each element.
+    double top_derivative(const double* coefficients, int element) const;
+    // A zero of r' near z, by Newton from z and staying in its neighbourhood: the place of a neck or a belly.
+    double extremum_near(const double* coefficients, double z) const;
+
+    // Projection of f(z), least squares at the quadrature points: exact if f is in this space. Throws SolveError if
+    // the mesh is degenerate.
+    template <class F>
+    Eigen::VectorXd project(F&& f) const {
+        Eigen::VectorXd load = Eigen::VectorXd::Zero(size_);
+        for (int e = 0; e < elements(); ++e)
+            for (int g = 0; g < groups(); ++g) {
+                const Basis& b = basis(e, g);
+                for (int q = 0; q < lanes; ++q) {
+                    const double value = b.weight[q] * f(b.z[q]);
+                    for (int a = 0; a < width(); ++a) load[dofs(e)[a]] += value * b.by_spline[q][0][a];
+                }
+            }
+        return solve_mass(load);
+    }
+    // Projection of a spline on other knots; the same function if those knots are all here too.
+    Eigen::VectorXd prolong(const ProfileSpace& other, const Eigen::VectorXd& coefficients) const;
+    // prolong() as a matrix, for `coarse` with all its knots among these: each spline of it is a
+    // combination of a few here, found from blossoms at the knots in between (Oslo algorithm).
+    Eigen::SparseMatrix<double> prolongation(const ProfileSpace& coarse) const;
+
+    // The spline over [start, start + period] as (knots, coefficients) in the usual convention
+    // (scipy BSpline), unfolded over all copies and mirror images.
+    struct Unfolded {
+        std::vector<double> knots, coefficients;
+    };
+    Unfolded unfold(const Eigen::VectorXd& coefficients, double start) const;
+
+private:
+    // The active splines of one element: everything that does not depend on the point, done once.
+    struct Active {
+        int p;
+        double knots[2 * max_width];                    // of the active splines
+        double inverse_span[max_width][2 * max_width];  // [d][i] = 1 / (knots[i + d] - knots[i]), 0 for a repeated knot
+        double combo[3][max_width][max_width];          // derivative k of spline a in splines of degree p - k
+        double top[max_width];                          // derivative p of spline a
+
+        Active(const ProfileSpace& space, int element);
+        // out[k * (p + 1) + a] = derivative k = 0 ... derivatives (at most 2) of spline a at z.
+        template <class T>
+        void operator()(const T& z, int derivatives, T* out) const;
+    };
+
+    double knot(int index) const;  // raw, extended beyond the cell by translation or reflection
+    int dof_of(int raw) const;
+    int first_raw(int element) const;
+    void tabulate();
+    Eigen::VectorXd solve_mass(const Eigen::VectorXd& load) const;
+
+    Cell cell_;
+    std::vector<double> breaks_;
+    int degree_, smoothness_, multiplicity_, size_ = 0;
+    std::vector<int> dofs_;
+    std::vector<Basis> basis_;
+    std::vector<Active> active_;
+};
+
+// Gauss-Legendre rule with n points on [0, 1] (nodes, weights).
+struct GaussRule {
+    std::vector<double> nodes, weights;
+};
+GaussRule gauss_rule(int n);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,24 @@
+// How a case becomes a profile to solve for: the cell, the first mesh.
+#pragma once
+
+#include <vector>
+
+#include "axisym/profile_space.hpp"
+#include "common/case/case.hpp"
+
+namespace tubule::axisym {
+
+// The smallest part of the tube that determines it: a period divided by the common waves of its modes,
+// halved if the modes are even about a plane. The flow keeps both symmetries exactly, and so does the
+// reduced problem. With `symmetry` off: the whole period.
+Cell cell_of(const Tube& tube, bool symmetry);
+
+// Elements such that the energy lost to the spline (Observation, defect) comes to `target`, as far as that of the
+// present mesh tells: sizes follow the local need, and grow by no more than a fixed ratio. At least `fewest`.
+std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+                                   int fewest);
+
+// Breaks of n equal elements.
+std::vector<double> uniform_breaks(const Cell& cell, int n);
+
+}  // namespace tubule::axisym
