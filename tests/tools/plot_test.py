@@ -1,0 +1,440 @@
+#!/usr/bin/python3
+"""Pictures: drawn from results made up here, whose curvatures are exact (docs/results.md has the layout).
+
+    plot_test.py [TUBULE]    with the program, its subcommand `plot` is tested too
+"""
+
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
+sys.path.insert(0, str(PLOT))
+import energy  # noqa: E402
+import labels  # noqa: E402
+import results  # noqa: E402
+import tubes  # noqa: E402
+import work_precision  # noqa: E402
+
+TUBULE = None
+CASE = """tier = "axisym"
+[about]
+title = "A made-up tube"
+[energy]
+k20 = 0.2
+H0 = -2.0
+k42 = {k42}
+[shape]
+kind = "tube"
+length = 2.0
+[[shape.mode]]
+amplitude = 0.2
+[time]
+end = 1.0
+"""
+TERMS = ["--term=20=k_{20}(H-H_0)^2", "--term=42=k_{42}K^2"]
+
+
+def tube(time, amplitude, length=2.0, points=65):
+    """z, r, H, K of r = 1 + a cos(2 pi z / length), a = amplitude exp(-3 t), by the formulas for a graph r(z)."""
+    z, q, a = np.linspace(0, length, points), 2 * np.pi / length, amplitude * np.exp(-3 * time)
+    r, slope, bend = 1 + a * np.cos(q * z), -a * q * np.sin(q * z), -a * q * q * np.cos(q * z)
+    g = np.sqrt(1 + slope**2)
+    return {"z": z, "r": r, "H": (bend / g**2 - 1 / r) / g, "K": -bend / (r * g**4)}
+
+
+def write(path, k42=0.0, sets=(), times=(0, 0.01, 0.05, 0.2, 0.5, 1.0), amplitude=0.2, stop="finished", rows=40):
+    """A result with a frame at each time and `rows` rows of series."""
+    with h5py.File(path, "w") as file:
+        for name in ("id", "sequence", "about_begun"):
+            file.attrs[name] = np.uint64(1)
+        text = h5py.string_dtype()
+        case = file.create_dataset("case", data=CASE.format(k42=k42), dtype=text)
+        case.attrs.create("set", np.array(sets, dtype=object), shape=(len(sets),), dtype=text)
+        about = file.create_group("about")
+        if stop:
+            about.attrs["stop"] = stop
+            about.attrs["stop_time"] = float(times[-1]) if times else 1.0
+        time = np.linspace(0, times[-1] if times else 1.0, rows) if rows else np.empty(0)
+        bend, gauss = 3 + np.exp(-6 * time), 5 * k42 * np.exp(-6 * time)
+        columns = {"time": time, "energy": bend + gauss, "energy_20": bend, "energy_40": 0 * time, "energy_42": gauss}
+        series = file.create_group("series")
+        series.attrs["order"] = np.array(list(columns), dtype=text)
+        for name, values in columns.items():
+            series[name] = values
+        file.create_group("frames")
+        for index, t in enumerate(times):
+            frame = file.create_group(f"frames/{index:06d}")
+            frame.attrs["time"] = float(t)
+            for name, values in tube(t, amplitude).items():
+                frame[name] = values
+    return path
+
+
+def png_size(path):
+    header = path.read_bytes()[:24]
+    assert header[:8] == b"\x89PNG\r\n\x1a\n", path
+    return struct.unpack(">II", header[16:24])
+
+
+def svg_texts(path):
+    nodes = xml.etree.ElementTree.parse(path).iter("{http://www.w3.org/2000/svg}text")
+    return ["".join(node.itertext()).strip() for node in nodes]
+
+
+class InFolder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def plot(self, *arguments, program=None):
+        command = [program, "plot"] if program else [sys.executable, "-B", PLOT / "plot.py", *TERMS]
+        return subprocess.run([*map(str, command), *map(str, arguments)], capture_output=True, text=True)
+
+    def drawn(self, *arguments, **options):
+        """Texts of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
+        done = self.plot(*arguments, "-o", self.folder / "p.png", "-o", self.folder / "p.svg", **options)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        width, height = png_size(self.folder / "p.png")
+        self.assertEqual(width, 2100)  # 7 inches at 300 dpi
+        self.assertGreater(height, 300)
+        self.assertGreater((self.folder / "p.png").stat().st_size, 20000)
+        return svg_texts(self.folder / "p.svg")
+
+    def refused(self, words, *arguments, status=2, **options):
+        done = self.plot(*arguments, **options)
+        self.assertEqual(done.returncode, status, done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertIn(words, done.stderr)
+
+
+class Labels(unittest.TestCase):
+    def words(self, *cases, sets=None):
+        effective = [labels.effective_case(text, s) for text, s in zip(cases, sets or [[]] * len(cases))]
+        return labels.row_labels(effective, [f"file{i}" for i in range(len(cases))])
+
+    def test_only_what_differs_is_named(self):
+        self.assertEqual(
+            self.words(CASE.format(k42=0), CASE.format(k42=0.06)), [["k\u2084\u2082 = 0"], ["k\u2084\u2082 = 0.06"]]
+        )
+
+    def test_overrides_count_and_equal_numbers_are_equal(self):
+        # The second case says 0.0 where the first says 0: no difference; H0 comes from the overrides alone.
+        found = self.words(CASE.format(k42=0), CASE.format(k42="0.0"), sets=[["energy.H0=-1"], []])
+        self.assertEqual(found, [["H\u2080 = \u22121"], ["H\u2080 = \u22122"]])
+
+    def test_later_overrides_win(self):
+        case = labels.effective_case(CASE.format(k42=0), ["energy.k42=1", "energy.k42=0.5"])
+        self.assertEqual(case["energy"]["k42"], 0.5)
+
+    def test_modes_are_reached_by_index(self):
+        text = CASE.format(k42=0)
+        self.assertEqual(
+            self.words(text, text, sets=[[], ["shape.mode.0.amplitude=0.3"]]),
+            [["amplitude = 0.2"], ["amplitude = 0.3"]],
+        )
+        self.assertEqual(
+            self.words(text, text, sets=[[], ["shape.mode.1.amplitude=0.1"]]),
+            [["no mode 1"], ["mode 1 amplitude = 0.1"]],
+        )
+
+    def test_missing_tables_are_made_and_bare_words_are_strings(self):
+        case = labels.effective_case("", ["model.kind=gradient-flow", "shape.mode.0.n=2"])
+        self.assertEqual(case, {"model": {"kind": "gradient-flow"}, "shape": {"mode": [{"n": 2}]}})
+
+    def test_absent_keys(self):
+        text = CASE.format(k42=0)
+        self.assertEqual(
+            self.words(text, text, sets=[[], ["energy.k40=0.1"]]),
+            [["k\u2084\u2080 by default"], ["k\u2084\u2080 = 0.1"]],
+        )
+
+    def test_about_expect_and_time_are_no_difference(self):
+        text = CASE.format(k42=0)
+        sets = [["about.title=x", "time.output=[1,2]"], ["expect.stop=finished", "time.end=3", "energy.k42=1"]]
+        self.assertEqual(self.words(text, text, sets=sets), [["k\u2084\u2082 = 0"], ["k\u2084\u2082 = 1"]])
+
+    def test_file_names_where_labels_do_not_tell_apart(self):
+        text = CASE.format(k42=0)
+        self.assertEqual(self.words(text, text), [["file0"], ["file1"]])
+        many = [f"energy.x{i}=1" for i in range(5)]
+        self.assertEqual(self.words(text, text, sets=[[], many]), [["file0"], ["file1"]])
+        self.assertEqual(
+            self.words(text, text, text, sets=[[], [], ["energy.k42=1"]]),
+            [["k\u2084\u2082 = 0", "file0"], ["k\u2084\u2082 = 0", "file1"], ["k\u2084\u2082 = 1", "file2"]],
+        )
+
+    def test_equal_last_words_are_told_apart(self):
+        text = CASE.format(k42=0)
+        found = self.words(text, text, sets=[["a.x=1", "b.x=1"], ["a.x=2", "b.x=2"]])
+        self.assertEqual(found[0], ["a.x = 1", "b.x = 1"])
+
+    def test_bad_cases_and_overrides(self):
+        for text, sets, words in (
+            ("[energy", [], "not valid TOML"),
+            ("", ["energy.k42"], "not of the form key=value"),
+            ("", ["shape.mode.3.n=2"], "does not fit the case"),
+            ("tier = 'axisym'", ["tier.x=2"], "does not fit the case"),
+        ):
+            with self.assertRaisesRegex(labels.BadCase, words):
+                labels.effective_case(text, sets)
+
+    def test_formulas(self):
+        self.assertEqual(labels.formula("k_{20}(H-H_0)^2"), "k\u2082\u2080(H\u2212H\u2080)\u00b2")
+        self.assertEqual(labels.formula("E_{42}"), "E\u2084\u2082")
+
+
+class Columns(InFolder):
+    def read(self, name, **options):
+        return results.read_result(str(write(self.folder / name, **options)))
+
+    def test_six_at_most_first_and_last_kept(self):
+        times = [float(i) for i in range(31)]
+        found = [column.time for column in tubes.choose_columns([self.read("a.hdf", times=times)])]
+        self.assertEqual(found, [0, 6, 12, 18, 24, 30])
+
+    def test_a_run_that_stopped_ends_in_the_next_column(self):
+        whole = self.read("whole.hdf", times=[0, 1, 2, 3])
+        pinched = self.read("pinched.hdf", times=[0, 1, 1.5], stop="pinch-off")
+        columns = tubes.choose_columns([whole, pinched])
+        self.assertEqual([column.time for column in columns], [0, 1, 2, 3])
+        self.assertEqual(columns[2].cells[1].time, 1.5)
+        self.assertEqual([column.stops[1] for column in columns], [None, None, "pinch-off", None])
+        self.assertIsNone(columns[3].cells[1])
+
+    def test_all_runs_stopped_early(self):
+        early = [self.read(f"{i}.hdf", times=[0, 1 + i / 10], stop="overhang") for i in range(2)]
+        columns = tubes.choose_columns(early)
+        self.assertEqual([column.time for column in columns], [0, None])
+        self.assertEqual([frame.time for frame in columns[1].cells], [1, 1.1])
+
+    def test_shared_times_go_first(self):
+        a, b = self.read("a.hdf", times=[0, 1, 2, 3]), self.read("b.hdf", times=[0, 1.5, 2, 3])
+        self.assertEqual([column.time for column in tubes.choose_columns([a, b])], [0, 2, 3])
+
+    def test_wanted_times(self):
+        result = self.read("a.hdf", times=[0, 1, 2, 3])
+        self.assertEqual([column.time for column in tubes.choose_columns([result], [2, 0])], [0, 2])
+        with self.assertRaisesRegex(results.BadInput, "no result has a frame at t = 1.5; there are .* 0, 1, 2, 3"):
+            tubes.choose_columns([result], [0, 1.5])
+
+
+class Scales(unittest.TestCase):
+    def test_a_neck_does_not_set_the_colour_scale(self):
+        values, area = np.append(np.linspace(-1, 1, 1000), -1e6), np.append(np.ones(1000), 1e-3)
+        norm, extend = tubes.colour_scale([values], [area], 0.0)
+        self.assertAlmostEqual(norm.vmax, tubes.MARGIN * tubes.COVERED, delta=0.01)  # 98 % of a uniform spread
+        self.assertEqual((norm.vmin, extend), (-norm.vmax, "min"))
+
+    def test_rounding_is_no_colour(self):
+        norm, extend = tubes.colour_scale([np.array([1e-14, -1e-14])], [np.ones(2)], 0.0)
+        self.assertEqual((norm.vmin, norm.vmax, extend), (-1, 1, "neither"))
+        norm, _ = tubes.colour_scale([np.full(5, -2.0)], [np.ones(5)], -2.0)
+        self.assertEqual(norm(-2.0), 0.5)
+
+    def test_interpolation_is_exact_on_parabolas_and_never_overshoots(self):
+        x = np.linspace(0, 2, 21)
+        fine = np.linspace(0, 2, 501)
+        self.assertLess(np.abs(energy.monotone_cubic(x, (1 + x) ** 2, fine) - (1 + fine) ** 2).max(), 1e-4)
+        steep = energy.monotone_cubic(np.array([0.0, 1, 2, 3]), np.array([5.0, 0, 0, 0]), np.linspace(0, 3, 301))
+        self.assertGreaterEqual(steep.min(), 0)
+        self.assertTrue((np.diff(steep) <= 0).all())
+
+
+class Pictures(InFolder):
+    def test_three_results_labelled_by_what_differs(self):
+        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06, 0.12))]
+        texts = self.drawn(*files)
+        for words in ("k\u2084\u2082 = 0", "k\u2084\u2082 = 0.06", "k\u2084\u2082 = 0.12"):
+            self.assertEqual(texts.count(words), 2, words)  # beside its row and in the legend
+        formulas = "k\u2082\u2080(H\u2212H\u2080)\u00b2", "k\u2084\u2082K\u00b2"
+        for words in ("(a)", "(b)", "t\u2081 = 0.01", "t\u2085 = 1", "total", *formulas, "bending energy E"):
+            self.assertIn(words, texts)
+        self.assertFalse([text for text in texts if "energy_40" in text or "E\u2084\u2080" in text])  # zero: no line
+
+    def test_one_result_has_its_title_and_default_names(self):
+        done = self.plot(write(self.folder / "one.hdf"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(png_size(self.folder / "one.png")[0], 2100)
+        self.assertIn("A made-up tube", svg_texts(self.folder / "one.svg"))
+
+    def test_a_stop_is_marked_in_both_panels(self):
+        whole = write(self.folder / "a.hdf")
+        texts = self.drawn(whole, write(self.folder / "b.hdf", k42=1, times=[0, 0.01, 0.03], stop="pinch-off"))
+        self.assertIn("pinch-off at t = 0.03", texts)
+        self.assertIn("pinch-off", texts)  # below its last tube, which stands in the column of t = 0.05,
+        self.assertIn("t = 0.03", texts)  # and so has its own time
+
+    def test_kinds_and_pdf(self):
+        file = write(self.folder / "a.hdf")
+        self.assertNotIn("bending energy E", self.drawn(file, "--kind", "profiles"))
+        texts = self.drawn(file, "--kind", "energy")
+        self.assertIn("bending energy E", texts)
+        self.assertFalse([text for text in texts if "mean curvature" in text])
+        self.assertEqual(self.plot(file, "-o", self.folder / "a.pdf").returncode, 0)
+        self.assertEqual((self.folder / "a.pdf").read_bytes()[:5], b"%PDF-")
+
+    def test_wanted_times(self):
+        texts = self.drawn(write(self.folder / "a.hdf"), "--times", "0,0.2")
+        self.assertIn("t\u2081 = 0.2", texts)
+        self.assertNotIn("t\u2082 = 0.5", texts)
+
+    def test_drawing_again_gives_the_same_files(self):
+        file = write(self.folder / "a.hdf")
+        self.drawn(file)
+        before = (self.folder / "p.svg").read_bytes()
+        self.drawn(file)
+        self.assertEqual((self.folder / "p.svg").read_bytes(), before)
+
+    def test_degenerate_inputs(self):
+        for name, options in {
+            "uniform tube": {"amplitude": 0.0},
+            "one frame": {"times": [0.0], "rows": 1},
+            "no frames": {"times": []},
+            "no series": {"rows": 0},
+            "times going back": {"times": [0, 0.5, 0.2, 0.5, 1]},
+            "nearly pinched": {"amplitude": 0.9999},
+            "never finished": {"stop": None},
+        }.items():
+            with self.subTest(name):
+                self.drawn(write(self.folder / "a.hdf", **options))
+
+    def test_eight_rows_one_of_them_without_frames(self):
+        files = [write(self.folder / f"{i}.hdf", k42=i, times=[] if i == 3 else [0, 0.5, 1]) for i in range(8)]
+        texts = self.drawn(*files)
+        self.assertEqual(texts.count("k\u2084\u2082 = 3"), 2)
+
+    def test_a_profile_that_is_no_graph(self):
+        file = write(self.folder / "a.hdf", times=[0])
+        angle = np.linspace(0, np.pi, 65)
+        with h5py.File(file, "a") as f:
+            f["frames/000000/z"][:] = np.linspace(0, 2, 65) + 0.5 * np.sin(4 * angle)
+        self.drawn(file)
+
+
+class Refusals(InFolder):
+    def test_files(self):
+        text = self.folder / "text.hdf"
+        text.write_text("no HDF5")
+        self.refused(str(text), text)
+        self.refused("missing.hdf", self.folder / "missing.hdf")
+        with h5py.File(self.folder / "other.hdf", "w") as file:
+            file["x"] = 1
+        self.refused("other.hdf: is not a result of tubule (it has no /case)", self.folder / "other.hdf")
+
+    def test_damaged_records(self):
+        def damaged(change, words):
+            path = write(self.folder / "damaged.hdf")
+            with h5py.File(path, "a") as file:
+                change(file)
+            self.refused(words, path)
+
+        def short(file):
+            del file["frames/000001/r"]
+            file["frames/000001/r"] = np.ones(3)
+
+        def nan(file):
+            file["frames/000001/H"][3] = np.nan
+
+        def lack(file):
+            del file["frames/000001/K"]
+
+        def ragged(file):
+            del file["series/energy"]
+            file["series/energy"] = np.ones(3)
+
+        def text(file):
+            file["case"][()] = "[energy"
+
+        damaged(short, "frame 000001: z, r, H, K must be lists of one length")
+        damaged(nan, "frame 000001 holds numbers that are not finite")
+        damaged(lack, "frame 000001 lacks K")
+        damaged(ragged, "series of different lengths")
+        damaged(text, "its case is not valid TOML")
+
+    def test_nothing_to_draw(self):
+        self.refused("no frames to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")
+        self.refused("no energy series to draw", write(self.folder / "a.hdf", rows=0), "--kind", "energy")
+        self.refused("neither frames nor an energy series", write(self.folder / "a.hdf", rows=0, times=[]))
+
+    def test_arguments(self):
+        file = write(self.folder / "a.hdf")
+        self.refused("is not a list of numbers", file, "--times", "0,x")
+        self.refused("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3")
+        self.refused("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg")
+        self.refused("does not exist", file, "-o", self.folder / "none/x.png")
+        (self.folder / "taken.png").mkdir()
+        self.refused("taken.png: cannot be written", file, "-o", self.folder / "taken.png")
+
+    def test_missing_library_names_its_package(self):
+        # A module of that name that cannot be imported, found before Debian's.
+        (self.folder / "h5py.py").write_text("raise ImportError")
+        path = f"sys.path[:0] = [{str(self.folder)!r}, {str(PLOT)!r}]"
+        script = f"import sys; {path}; sys.argv = ['plot', 'a.hdf']; import plot; sys.exit(plot.main())"
+        done = subprocess.run([sys.executable, "-B", "-c", script], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("has no h5py; install the package python3-h5py", done.stderr)
+
+
+class WorkPrecision(InFolder):
+    def draw(self, text):
+        table = self.folder / "table.csv"
+        table.write_text(text)
+        command = [sys.executable, "-B", PLOT / "work_precision.py", table, "-o", self.folder / "w.svg"]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_chart(self):
+        rows = 'series,energy_asked,error,estimate,cpu_ms\n"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
+        done = self.draw(rows)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        texts = svg_texts(self.folder / "w.svg")
+        for words in ("k42 = 0", "prototype, tuned by hand", "asked: 1e-4", "asked: 1e-6"):
+            self.assertIn(words, texts)
+        table = work_precision.read_table(self.folder / "table.csv")
+        self.assertEqual([row[0] for row in table["k42 = 0"]], [1e-4, 1e-6])  # coarse first
+
+    def test_refusals(self):
+        for text, words in (
+            ("a,b\n1,2\n", "must have the columns"),
+            ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,fast\n", "must have the columns"),
+            ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,-1\n", "negative or not finite"),
+            ("series,energy_asked,error,estimate,cpu_ms\n", "has no rows"),
+        ):
+            done = self.draw(text)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, done.stderr)
+
+
+class Command(InFolder):
+    """`tubule plot` itself; in the suite only where the program is given."""
+
+    def test_labels_and_formulas_come_through(self):
+        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0.06, 0.12))]
+        texts = self.drawn("--times", "0,0.2", *files, program=TUBULE)
+        for words in ("k\u2084\u2082 = 0.06", "k\u2084\u2082K\u00b2", "t\u2081 = 0.2"):
+            self.assertIn(words, texts)
+
+    def test_exit_status(self):
+        self.refused("missing.hdf", self.folder / "missing.hdf", program=TUBULE)
+        self.refused("no result has a frame", write(self.folder / "a.hdf"), "--times", "7", program=TUBULE)
+
+
+def load_tests(loader, suite, pattern):
+    if TUBULE:
+        return suite
+    cases = (Labels, Columns, Scales, Pictures, Refusals, WorkPrecision)
+    return unittest.TestSuite(loader.loadTestsFromTestCase(case) for case in cases)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1 and not sys.argv[1].startswith("-") and Path(sys.argv[1]).is_file():
+        TUBULE = sys.argv.pop(1)
+    unittest.main()

@@ -1,0 +1,594 @@
+// Case files: every refusal with its place and its words, the accepted forms, overrides, writing back; and the
+// tube that a case describes. Lines and columns are counted by hand in the text below.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <complex>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "common/case/read.hpp"
+#include "common/case/text.hpp"
+
+namespace tubule {
+namespace {
+
+const std::string good =
+    "tier = \"axisym\"\n"                   // 1
+    "[about]\n"                             // 2
+    "title = \"test\"\n"                    // 3
+    "[energy]\n"                            // 4
+    "k20 = 1.0\n"                           // 5
+    "k42 = 0.06\n"                          // 6
+    "[model]\n"                             // 7
+    "kind = \"gradient-flow\"\n"            // 8
+    "[shape]\n"                             // 9
+    "kind = \"tube\"\n"                     // 10
+    "radius = 1.0\n"                        // 11
+    "length = 2.0\n"                        // 12
+    "[[shape.mode]]\n"                      // 13
+    "amplitude = 0.3\n"                     // 14
+    "n = 1\n"                               // 15
+    "[accuracy]\n"                          // 16
+    "energy = 1e-6\n"                       // 17
+    "[discretisation]\n"                    // 18
+    "order = 5\n"                           // 19
+    "[time]\n"                              // 20
+    "end = 1.4\n"                           // 21
+    "output = [0.1, 0.2]\n"                 // 22
+    "[expect]\n"                            // 23
+    "energy = {value = 1.0, rel = 1e-6}\n"  // 24
+    "[[expect.at]]\n"                       // 25
+    "time = 0.1\n"                          // 26
+    "r_min = {value = 0.7, abs = 1e-3}\n";  // 27
+
+// The good case with one piece of text replaced.
+std::string with(const std::string& old_text, const std::string& new_text) {
+    std::string text = good;
+    const std::size_t at = text.find(old_text);
+    EXPECT_NE(at, std::string::npos) << "no '" << old_text << "' in the good case";
+    return text.replace(at, old_text.size(), new_text);
+}
+
+std::string refusal(const std::string& text, const std::vector<std::string>& sets = {}) {
+    try {
+        parse_case(text, sets, "case.toml");
+    } catch (const CaseError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+// A piece of the good case, what to write instead, and what that must be answered.
+struct Edit {
+    std::string old_text, new_text, message;
+};
+void expect_refused(const std::vector<Edit>& edits) {
+    for (const Edit& edit : edits)
+        EXPECT_EQ(refusal(with(edit.old_text, edit.new_text)), "case.toml:" + edit.message) << edit.new_text;
+}
+
+// An override of the good case and the words that must follow it.
+struct Override {
+    std::string set, message;
+};
+void expect_refused(const std::vector<Override>& overrides) {
+    for (const auto& [set, message] : overrides) EXPECT_EQ(refusal(good, {set}), "--set " + set + ": " + message);
+}
+
+TEST(CaseRefusal, TextThatIsNoToml) {
+    expect_refused({Edit{"k20 = 1.0", "k20 = one",
+                         "5:7: not valid TOML: Error while parsing value: could not determine "
+                         "value type"},
+                    Edit{"length = 2.0", "radius = 2.0",
+                         "12:10: not valid TOML: Error while parsing key-value pair: cannot redefine existing "
+                         "floating-point 'radius'"}});
+}
+
+TEST(CaseRefusal, UnknownKeysAndTables) {
+    const std::string tables = "tier, about, energy, model, shape, accuracy, discretisation, time, expect";
+    expect_refused({
+        Edit{"tier =", "teir =", "1:1: unknown key teir; did you mean 'tier'? Allowed here: " + tables},
+        Edit{"[discretisation]", "[velocity]", "18:2: unknown key velocity. Allowed here: " + tables},
+        Edit{"[[shape.mode]]", "[time.mode]",
+             "13:7: unknown key time.mode. Allowed here: end, output, stationary, limit"},
+        Edit{"title", "tilte", "3:1: unknown key about.tilte; did you mean 'title'? Allowed here: title, source"},
+        Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0"},
+        Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
+        Edit{"kind = \"gr", "Re = 1\nkind = \"gr", "8:1: unknown key model.Re. Allowed here: kind, volume"},
+        // Reported as misspelt, not as the missing radius:
+        Edit{"radius", "  raduis",
+             "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
+             "length, mode"},
+        Edit{"kind = \"tube\"", "knd = \"tube\"",
+             "10:1: unknown key shape.knd; did you mean 'kind'? Allowed here: kind, radius, length, mode"},
+        Edit{"n = 1", "l = 1",
+             "15:1: unknown key shape.mode.0.l; did you mean 'n'? Allowed here: amplitude, n, m, phase"},
+        Edit{"energy = 1e-6", "rmin = 1e-6",
+             "17:1: unknown key accuracy.rmin; did you mean 'r_min'? Allowed here: "
+             "energy, r_min"},
+        Edit{"order", "oder",
+             "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
+             "order, smoothness, time_tolerance, time_order, symmetry"},
+        Edit{"end =", "ende =",
+             "21:1: unknown key time.ende; did you mean 'end'? Allowed here: end, output, "
+             "stationary, limit"},
+    });
+}
+
+TEST(CaseRefusal, UnknownSeries) {
+    const std::string series =
+        "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, "
+        "r_min, r_max, energy_error, mode_<n>";
+    const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
+    expect_refused({
+        Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
+        Edit{"energy = {", "mode_01 = {", "24:1: unknown key expect.mode_01." + at_end},
+        Edit{"energy = {", "mode_-1 = {", "24:1: unknown key expect.mode_-1." + at_end},
+        Edit{"energy = {", "mode_ = {", "24:1: unknown key expect.mode_." + at_end},
+        Edit{"r_min", "rmin",
+             "27:1: unknown key expect.at.0.rmin; did you mean 'r_min'? Allowed here: time, " + series},
+        Edit{"rel", "tol", "24:24: unknown key expect.energy.tol. Allowed here: value, rel, abs"},
+    });
+}
+
+TEST(CaseRefusal, MissingKeys) {
+    expect_refused({
+        Edit{"tier = \"axisym\"", "", "1:1: missing key tier: \"axisym\""},
+        Edit{"kind = \"tube\"", "", "9:1: missing key shape.kind: \"tube\""},
+        Edit{"radius = 1.0", "", "9:1: missing key shape.radius: a number > 0"},
+        Edit{"length = 2.0", "", "9:1: missing key shape.length: a number > 0"},
+        Edit{"amplitude = 0.3", "", "13:1: missing key shape.mode.0.amplitude: a finite number"},
+        Edit{"n = 1\n", "\n", "13:1: missing key shape.mode.0.n: an integer >= 0 and <= 10000"},
+        Edit{"end = 1.4", "", "20:1: missing key time.end: a number > 0"},
+        Edit{"[time]\nend = 1.4\noutput = [0.1, 0.2]", "", "1:1: missing key time.end: a number > 0"},
+        Edit{"value = 1.0, ", "", "24:10: missing key expect.energy.value: a finite number"},
+        Edit{"time = 0.1\n", "", "25:1: missing key expect.at.0.time: a number >= 0 and <= 1.4 (time.end)"},
+    });
+    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: \"axisym\"");
+}
+
+TEST(CaseRefusal, WrongTypes) {
+    expect_refused({
+        Edit{"\"axisym\"", "1", "1:8: tier must be \"axisym\", not 1"},
+        Edit{"\"test\"", "2024-01-01", "3:9: about.title must be a string, not a date or time"},
+        Edit{"title = \"test\"", "source = true", "3:10: about.source must be a string, not true"},
+        Edit{"0.06", "\"0.06\"", "6:7: energy.k42 must be a finite number, not the string \"0.06\""},
+        Edit{"k42 = 0.06", "H0 = [1]", "6:6: energy.H0 must be a finite number, not a list"},
+        Edit{"[about]\ntitle = \"test\"", "about = 0.5", "2:9: about must be a table, not 0.5"},
+        Edit{"[[shape.mode]]", "[shape.mode]",
+             "13:1: shape.mode must be a list of tables, [[shape.mode]], not a table"},
+        Edit{"[[shape.mode]]\namplitude = 0.3\nn = 1", "mode = [3]", "13:9: shape.mode.0 must be a table, not 3"},
+        Edit{"n = 1", "n = 1.0", "15:5: shape.mode.0.n must be an integer >= 0 and <= 10000, not 1.0"},
+        Edit{"n = 1", "n = 1\nphase = {}", "16:9: shape.mode.0.phase must be a finite number, not a table"},
+        Edit{"order = 5", "elements = 64.5",
+             "19:12: discretisation.elements must be an integer >= 4 and <= 100000, not "
+             "64.5"},
+        Edit{"order = 5", "symmetry = 1", "19:12: discretisation.symmetry must be true or false, not 1"},
+        Edit{"[0.1, 0.2]", "0.1", "22:10: time.output must be a list of increasing numbers, not 0.1"},
+        Edit{"[0.1, 0.2]", "[0.1, \"b\"]",
+             "22:16: time.output.1 must be a number >= 0 and <= 1.4 (time.end), not the "
+             "string \"b\""},
+        Edit{"{value = 1.0, rel = 1e-6}", "1.0", "24:10: expect.energy must be a table, not 1.0"},
+        Edit{"[[expect.at]]", "[expect.at]", "25:1: expect.at must be a list of tables, [[expect.at]], not a table"},
+    });
+}
+
+TEST(CaseRefusal, UnknownChoices) {
+    const std::string stops =
+        "one of \"finished\", \"stationary\", \"pinch-off\", \"overhang\", \"ill-posed\", "
+        "\"self-intersection\", \"resolution-lost\", \"mesh-lost\", \"solver-failed\", "
+        "\"time-limit\", \"interrupted\"";
+    expect_refused({
+        Edit{"\"axisym\"", "\"surface3d\"", "1:8: tier must be \"axisym\", not \"surface3d\""},
+        Edit{"\"axisym\"", "\"Axisim\"", "1:8: tier must be \"axisym\", not \"Axisim\"; did you mean 'axisym'?"},
+        Edit{"\"gradient-flow\"", "\"fluid\"", "8:8: model.kind must be \"gradient-flow\", not \"fluid\""},
+        Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"fixed\"",
+             "9:10: model.volume must be \"free\", not \"fixed\""},
+        Edit{"\"tube\"", "\"sphere\"", "10:8: shape.kind must be \"tube\", not \"sphere\""},
+        Edit{"[expect]", "[expect]\nstop = \"pinchoff\"",
+             "24:8: expect.stop must be " + stops + ", not \"pinchoff\"; did you mean 'pinch-off'?"},
+    });
+}
+
+TEST(CaseRefusal, NumbersOutOfRange) {
+    expect_refused({
+        Edit{"k20 = 1.0", "k20 = inf", "5:7: energy.k20 must be a finite number, not inf"},
+        Edit{"k20 = 1.0", "H0 = nan", "5:6: energy.H0 must be a finite number, not nan"},
+        Edit{"radius = 1.0", "radius = 0", "11:10: shape.radius must be a number > 0, not 0"},
+        Edit{"radius = 1.0", "radius = inf", "11:10: shape.radius must be a number > 0, not inf"},
+        Edit{"length = 2.0", "length = -2", "12:10: shape.length must be a number > 0, not -2"},
+        Edit{"0.3", "-inf", "14:13: shape.mode.0.amplitude must be a finite number, not -inf"},
+        Edit{"n = 1\n", "n = -1\n", "15:5: shape.mode.0.n must be an integer >= 0 and <= 10000, not -1"},
+        Edit{"n = 1\n", "n = 10001\n", "15:5: shape.mode.0.n must be an integer >= 0 and <= 10000, not 10001"},
+        Edit{"n = 1\n", "n = 1\nm = 10001\n",
+             "16:5: shape.mode.0.m must be an integer >= -10000 and <= 10000, not 10001"},
+        Edit{"n = 1\n", "n = 1\nm = -10001\n",
+             "16:5: shape.mode.0.m must be an integer >= -10000 and <= 10000, not -10001"},
+        Edit{"energy = 1e-6", "energy = 1e-12",
+             "17:10: accuracy.energy must be a number > 1e-12 and <= 0.1, not 1e-12"},
+        Edit{"energy = 1e-6", "energy = 0.11", "17:10: accuracy.energy must be a number > 1e-12 and <= 0.1, not 0.11"},
+        Edit{"energy = 1e-6", "r_min = 0.0", "17:9: accuracy.r_min must be a number > 0, not 0.0"},
+        Edit{"order = 5", "order = 4", "19:9: discretisation.order must be one of 3, 5, 7, not 4"},
+        Edit{"order = 5", "order = 9", "19:9: discretisation.order must be one of 3, 5, 7, not 9"},
+        Edit{"order = 5", "order = 5\nsmoothness = 5",
+             "20:14: discretisation.smoothness must be an integer >= 1 and <= 4 (order - 1), not 5"},
+        Edit{"order = 5", "smoothness = 0",
+             "19:14: discretisation.smoothness must be an integer >= 1 and <= 4 (order - 1), not 0"},
+        Edit{"order = 5", "elements = 3",
+             "19:12: discretisation.elements must be an integer >= 4 and <= 100000, not 3"},
+        Edit{"order = 5", "elements = 100001",
+             "19:12: discretisation.elements must be an integer >= 4 and <= 100000, not 100001"},
+        Edit{"order = 5", "elements = 9000000000000000000",
+             "19:12: discretisation.elements must be an integer >= 4 and <= 100000, not 9000000000000000000"},
+        Edit{"order = 5", "time_tolerance = 1e-14",
+             "19:18: discretisation.time_tolerance must be a number > 1e-14 and <= 0.1, not 1e-14"},
+        Edit{"order = 5", "time_tolerance = 0.2",
+             "19:18: discretisation.time_tolerance must be a number > 1e-14 and <= 0.1, not 0.2"},
+        Edit{"order = 5", "time_order = 0", "19:14: discretisation.time_order must be an integer >= 1 and <= 5, not 0"},
+        Edit{"order = 5", "time_order = 6", "19:14: discretisation.time_order must be an integer >= 1 and <= 5, not 6"},
+        Edit{"end = 1.4", "end = 0", "21:7: time.end must be a number > 0, not 0"},
+        Edit{"[0.1, 0.2]", "[-0.1]", "22:11: time.output.0 must be a number >= 0 and <= 1.4 (time.end), not -0.1"},
+        Edit{"[0.1, 0.2]", "[1.5]", "22:11: time.output.0 must be a number >= 0 and <= 1.4 (time.end), not 1.5"},
+        Edit{"[0.1, 0.2]", "[]\nlimit = 0", "23:9: time.limit must be a number > 0, not 0"},
+        Edit{"[0.1, 0.2]", "[]\nstationary = 0.0", "23:14: time.stationary must be a number > 0, not 0.0"},
+        Edit{"rel = 1e-6", "rel = 0", "24:30: expect.energy.rel must be a number > 0, not 0"},
+        Edit{"rel = 1e-6", "abs = -1", "24:30: expect.energy.abs must be a number > 0, not -1"},
+        Edit{"value = 1.0", "value = nan", "24:19: expect.energy.value must be a finite number, not nan"},
+        Edit{"energy = {value = 1.0", "stop_time = {value = 1.5",
+             "24:22: expect.stop_time.value must be a number >= 0 and <= 1.4 (time.end), not 1.5"},
+        Edit{"energy = {value = 1.0", "time = {value = 1.5",
+             "24:17: expect.time.value must be a number >= 0 and <= 1.4 (time.end), not 1.5"},
+        Edit{"time = 0.1\n", "time = 1.5\n",
+             "26:8: expect.at.0.time must be a number >= 0 and <= 1.4 (time.end), not 1.5"},
+    });
+}
+
+TEST(CaseRefusal, OutputTimesOutOfOrder) {
+    const std::string rule = "time.output is a list of increasing numbers";
+    expect_refused({
+        Edit{"[0.1, 0.2]", "[0.2, 0.1]",
+             "22:16: time.output.1 must be larger than the 0.2 before it, not 0.1: " + rule},
+        Edit{"[0.1, 0.2]", "[0.2, 0.2]",
+             "22:16: time.output.1 must be larger than the 0.2 before it, not 0.2: " + rule},
+    });
+}
+
+TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
+    const std::string no_energy = "energy needs a modulus other than zero: k20, k40, k42";
+    expect_refused({
+        Edit{"k20 = 1.0\nk42 = 0.06", "H0 = 1", "4:1: " + no_energy},
+        Edit{"[energy]\nk20 = 1.0\nk42 = 0.06", "", "1:1: " + no_energy},
+        // 1 + 1.25 cos(pi z) is smallest at z = 1
+        Edit{"0.3", "1.25", "9:1: shape must have r0(z) > 0 everywhere, but r0 = -0.25 at z = 1"},
+        // touches the axis: r0 = 0 is refused, too
+        Edit{"0.3", "1.0", "9:1: shape must have r0(z) > 0 everywhere, but r0 = 0 at z = 1"},
+        // negative only for |z - 0.984085| < 1.4e-4, far between samples; z = 1 - 0.05/pi
+        Edit{"0.3", "1.0000001\nphase = 0.05",
+             "9:1: shape must have r0(z) > 0 everywhere, but r0 = -1e-07 at z = 0.984085"},
+        // a mode of n = 0 shifts the radius
+        Edit{"0.3\nn = 1", "-1\nn = 0", "9:1: shape must have r0(z) > 0 everywhere, but r0 = 0 at z = 0"},
+        Edit{"n = 1\n", "n = 1\nm = 2\n",
+             "16:5: shape.mode.0.m must be 0, not 2: tier \"axisym\" is axisymmetric and has no waves around the axis"},
+        Edit{"energy = 1e-6", "r_min = 0.7",
+             "17:9: accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.7"},
+        // the default of r_min, too
+        Edit{"radius = 1.0", "radius = 0.3005",
+             "16:1: accuracy.r_min must be below the smallest radius of the start (0.0005 at z = 1), not 0.001"},
+        Edit{", rel = 1e-6", "", "24:10: expect.energy needs a tolerance: rel, abs or both"},
+        Edit{"value = 1.0", "value = 0",
+             "24:10: expect.energy needs abs: a relative tolerance of the value 0 allows nothing"},
+        Edit{"r_min = {value = 0.7, abs = 1e-3}", "", "25:1: expect.at.0 expects nothing: add a series"},
+    });
+}
+
+TEST(CaseRefusal, Files) {
+    const auto message = [](const std::filesystem::path& path) -> std::string {
+        try {
+            read_case(path);
+        } catch (const CaseError& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    const std::filesystem::path folder = testing::TempDir();
+    EXPECT_EQ(message(folder), folder.string() + ": is a directory, not a case file");
+    const std::filesystem::path absent = folder / "no_such_case.toml";
+    EXPECT_EQ(message(absent), absent.string() + ": cannot be opened: No such file or directory");
+}
+
+TEST(CaseRefusal, Overrides) {
+    const std::string form = "must have the form key=value, such as --set energy.k42=0.06";
+    expect_refused({
+        Override{"energy.k42", form},
+        Override{"=3", form},
+        Override{"energy..k42=3", form},
+        Override{"time.output=[0.1", "not valid TOML: Error while parsing array: encountered end-of-file"},
+        Override{"about.title=\xff", "not valid TOML: Encountered invalid utf-8 sequence"},
+        Override{"time.end.x=1", "time.end is neither a table nor a list, it has no 'x'"},
+        Override{"shape.mode.2.n=1", "shape.mode is a list of 1: '2' must be an index from 0 to 1 (1 adds an entry)"},
+        Override{"shape.mode.n=1", "shape.mode is a list of 1: 'n' must be an index from 0 to 1 (1 adds an entry)"},
+        Override{"shape.mode.-1.n=1", "shape.mode is a list of 1: '-1' must be an index from 0 to 1 (1 adds an entry)"},
+        // all checks of files apply, and name the override
+        Override{"energy.k42=abc", "energy.k42 must be a finite number, not the string \"abc\""},
+        Override{"energy.k42=", "energy.k42 must be a finite number, not the string \"\""},
+        Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
+        Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
+        Override{"mode.0.n=1",
+                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, "
+                 "shape, accuracy, discretisation, time, expect"},
+        Override{"model.kind=stokes", "model.kind must be \"gradient-flow\", not \"stokes\""},
+        Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
+        Override{"accuracy.r_min=0.8",
+                 "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},
+        Override{"time.output.1=0.1",
+                 "time.output.1 must be larger than the 0.1 before it, not 0.1: time.output is a "
+                 "list of increasing numbers"},
+        Override{"shape.mode.0.m=1",
+                 "shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no waves "
+                 "around the axis"},
+    });
+    // A place in the file may be to blame because of an override elsewhere.
+    EXPECT_EQ(refusal(good, {"shape.radius=0.25"}),
+              "case.toml:9:1: shape must have r0(z) > 0 everywhere, but r0 = -0.05 at z = 1 (with --set "
+              "shape.radius=0.25)");
+}
+
+TEST(Case, HoldsWhatTheFileSays) {
+    const Case c = parse_case(good, {}, "case.toml");
+    EXPECT_EQ(c.path, "case.toml");
+    EXPECT_EQ(c.text, good);
+    EXPECT_EQ(c.title, "test");
+    EXPECT_EQ(c.energy.k, (std::array{1.0, 0.0, 0.06}));
+    EXPECT_EQ(c.energy.H0, 0);
+    const Tube& tube = std::get<Tube>(c.shape);
+    EXPECT_EQ(tube.radius, 1);
+    EXPECT_EQ(tube.length, 2);
+    ASSERT_EQ(tube.modes.size(), 1u);
+    EXPECT_EQ(tube.modes[0].amplitude, 0.3);
+    EXPECT_EQ(tube.modes[0].n, 1);
+    EXPECT_EQ(c.accuracy.energy, 1e-6);
+    EXPECT_EQ(c.time.end, 1.4);
+    EXPECT_EQ(c.time.output, (std::vector{0.1, 0.2}));
+    EXPECT_EQ(c.expect.stop, Stop::finished);  // the default once [expect] is there
+    ASSERT_EQ(c.expect.values.size(), 2u);
+    EXPECT_EQ(c.expect.values[0].series, "energy");
+    EXPECT_FALSE(c.expect.values[0].time);
+    EXPECT_EQ(c.expect.values[0].value, 1.0);
+    EXPECT_EQ(c.expect.values[0].rel, 1e-6);
+    EXPECT_FALSE(c.expect.values[0].abs);
+    EXPECT_EQ(c.expect.values[1].series, "r_min");
+    EXPECT_EQ(c.expect.values[1].time, 0.1);
+    EXPECT_EQ(c.expect.values[1].abs, 1e-3);
+}
+
+TEST(Case, DefaultsAreThoseOfThePlainData) {
+    const Case c = parse_case(
+        "tier = \"axisym\"\nenergy.k40 = 1\ntime.end = 2\n"
+        "shape = {kind = \"tube\", radius = 1, length = 3}\n",
+        {}, "case.toml");
+    EXPECT_EQ(c.energy.k, (std::array{0.0, 1.0, 0.0}));  // an integer where a float is wanted
+    EXPECT_EQ(c.model, ModelKind::gradient_flow);
+    EXPECT_EQ(c.accuracy.energy, Accuracy{}.energy);
+    EXPECT_EQ(c.accuracy.r_min, Accuracy{}.r_min);
+    EXPECT_EQ(c.discretisation.order, Discretisation{}.order);
+    EXPECT_EQ(c.discretisation.time_order, Discretisation{}.time_order);
+    EXPECT_EQ(c.discretisation.symmetry, Discretisation{}.symmetry);
+    EXPECT_FALSE(c.discretisation.elements || c.discretisation.smoothness || c.discretisation.time_tolerance);
+    EXPECT_TRUE(c.time.output.empty());
+    EXPECT_FALSE(c.time.stationary || c.time.limit);
+    EXPECT_FALSE(c.expect.stop);
+    EXPECT_TRUE(c.expect.values.empty());
+}
+
+TEST(Case, AcceptsEveryKeyAtTheEdgeOfItsRange) {
+    const Case c = parse_case(
+        good,
+        {"about.source=Fig. 3", "energy.k40=2", "energy.H0=-2", "model.volume=free", "accuracy.energy=0.1",
+         "accuracy.r_min=0.69", "discretisation.order=7", "discretisation.smoothness=6",
+         "discretisation.elements=100000", "discretisation.time_tolerance=0.1", "discretisation.time_order=1",
+         "discretisation.symmetry=false", "time.output=[0, 1.4]", "time.stationary=1e-9", "time.limit=60",
+         "expect.stop=pinch-off", "expect.stop_time={value = 1.4, rel = 1e-5}", "expect.mode_0={value = 0, abs = 1}",
+         "expect.at.0.time=1.4"},
+        "case.toml");
+    EXPECT_EQ(c.source, "Fig. 3");
+    EXPECT_EQ(c.energy.k[1], 2);
+    EXPECT_EQ(c.energy.H0, -2);
+    EXPECT_EQ(c.accuracy.energy, 0.1);
+    EXPECT_EQ(c.accuracy.r_min, 0.69);
+    EXPECT_EQ(c.discretisation.order, 7);
+    EXPECT_EQ(c.discretisation.smoothness, 6);
+    EXPECT_EQ(c.discretisation.elements, 100000);
+    EXPECT_EQ(c.discretisation.time_tolerance, 0.1);
+    EXPECT_EQ(c.discretisation.time_order, 1);
+    EXPECT_FALSE(c.discretisation.symmetry);
+    EXPECT_EQ(c.time.output, (std::vector{0.0, 1.4}));
+    EXPECT_EQ(c.time.stationary, 1e-9);
+    EXPECT_EQ(c.time.limit, 60);
+    EXPECT_EQ(c.expect.stop, Stop::pinch_off);
+    ASSERT_EQ(c.expect.values.size(), 4u);  // at the end in alphabetical order of the keys, then at moments
+    EXPECT_EQ(c.expect.values[1].series, "mode_0");
+    EXPECT_EQ(c.expect.values[2].series, "time");
+    EXPECT_EQ(c.expect.values[2].value, 1.4);
+    EXPECT_EQ(c.expect.values[3].time, 1.4);
+}
+
+TEST(Case, KnowsTheSeriesOfEveryEnergyTerm) {
+    for_each_bending_term([](std::size_t, const auto& term) {
+        const std::string series = std::string("energy_") + term.name;
+        const Case c = parse_case(good, {"expect." + series + "={value = 1, rel = 0.1}"}, "case.toml");
+        EXPECT_EQ(c.expect.values[1].series, series);
+    });
+}
+
+TEST(Case, TakesTheSameModeTwice) {
+    const Case c = parse_case(good, {"shape.mode.1={amplitude = 0.3, n = 1}"}, "case.toml");
+    EXPECT_EQ(std::get<Tube>(c.shape).modes.size(), 2u);
+}
+
+TEST(CaseOverride, ReplacesAppendsAndMakesTables) {
+    const std::vector<std::string> sets{
+        "energy.k42=0",      "shape.mode.0.amplitude=0.2", "shape.mode.1.n=3",    "shape.mode.1.amplitude=1e-3",
+        "time.output.2=0.5", "about.title=two words",      "about.source=\"1.5\""};
+    const Case c = parse_case(good, sets, "case.toml");
+    EXPECT_EQ(c.sets, sets);
+    EXPECT_EQ(c.text, good);
+    EXPECT_EQ(c.energy.k[2], 0);
+    const Tube& tube = std::get<Tube>(c.shape);
+    ASSERT_EQ(tube.modes.size(), 2u);
+    EXPECT_EQ(tube.modes[0].amplitude, 0.2);
+    EXPECT_EQ(tube.modes[1].n, 3);
+    EXPECT_EQ(tube.modes[1].amplitude, 1e-3);
+    EXPECT_EQ(c.time.output, (std::vector{0.1, 0.2, 0.5}));
+    EXPECT_EQ(c.title, "two words");
+    EXPECT_EQ(c.source, "1.5");
+
+    // A whole case can be made of overrides, lists included.
+    const Case bare = parse_case(
+        "",
+        {"tier=axisym", "energy.k20=1", "model.kind=gradient-flow", "shape.kind=tube", "shape.radius=1",
+         "shape.length=2", "shape.mode.0.n=2", "shape.mode.0.amplitude=0.1", "time.end=1", "time.output.0=0.5"},
+        "case.toml");
+    EXPECT_EQ(std::get<Tube>(bare.shape).modes.at(0).n, 2);
+    EXPECT_EQ(bare.time.output, std::vector{0.5});
+}
+
+TEST(CaseOverride, TheLastOneWins) {
+    EXPECT_EQ(parse_case(good, {"energy.k42=1", "energy.k42=2"}, "case.toml").energy.k[2], 2);
+}
+
+// A file of this process alone: tests run side by side.
+std::filesystem::path temporary(const std::string& name) {
+    return std::filesystem::path(testing::TempDir()) / (std::to_string(getpid()) + "_" + name);
+}
+
+TEST(CaseFile, ReadsWhatParseReads) {
+    const std::filesystem::path path = temporary("good.toml");
+    std::ofstream(path) << good;
+    const Case c = read_case(path, {"energy.k42=0.12"});
+    std::filesystem::remove(path);
+    EXPECT_EQ(c.path, path.string());
+    EXPECT_EQ(c.text, good);
+    EXPECT_EQ(c.energy.k[2], 0.12);
+}
+
+// What the program prints (both streams), and its exit status.
+std::pair<std::string, int> run_program(const std::string& arguments) {
+    FILE* pipe = popen((TUBULE_PROGRAM " " + arguments + " 2>&1").c_str(), "r");
+    std::string output;
+    for (int c; (c = std::fgetc(pipe)) != EOF;) output += static_cast<char>(c);
+    const int status = pclose(pipe);
+    return {output, WIFEXITED(status) ? WEXITSTATUS(status) : -1};
+}
+
+TEST(CheckCommand, PrintsTheEffectiveCaseAndLooksAtAllCases) {
+    const std::string good_path = temporary("good.toml"), bad_path = temporary("bad.toml");
+    std::ofstream(good_path) << good;
+    std::ofstream(bad_path) << with("radius", "raduis");
+
+    const auto [output, status] = run_program("check --set energy.k42=0.5 " + good_path);
+    EXPECT_EQ(status, 0);
+    const Case c = parse_case(good, {"energy.k42=0.5"}, good_path);
+    EXPECT_EQ(output, "# OK " + good_path + "\n" + effective_toml(c) + "\n");
+
+    const auto [both, failed] = run_program("check " + bad_path + " " + good_path);
+    EXPECT_EQ(failed, 2);
+    EXPECT_EQ(both.find(bad_path + ":11:1: unknown key shape.raduis"), 0u) << both;
+    EXPECT_NE(both.find("# OK " + good_path), std::string::npos) << both;
+    std::filesystem::remove(good_path);
+    std::filesystem::remove(bad_path);
+}
+
+TEST(CaseFile, TheDocumentedExampleIsOne) {
+    std::ifstream file(TUBULE_TESTS "/../docs/case_files.md");
+    const std::string guide{std::istreambuf_iterator<char>(file), {}};
+    const std::string fence = "```toml\n";
+    const std::size_t begin = guide.find(fence);
+    ASSERT_NE(begin, std::string::npos);
+    const std::string example = guide.substr(begin + fence.size(), guide.find("```", begin + 3) - begin - fence.size());
+    EXPECT_EQ(refusal(example), "accepted");
+}
+
+TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
+    const Case c = parse_case(good, {"energy.H0=-2", "expect.stop_time={value = 1.4, abs = 0.5}"}, "case.toml");
+    EXPECT_EQ(
+        effective_toml(c),
+        "tier = \"axisym\"\n"
+        "\n[about]\ntitle = \"test\"\n"
+        "\n[energy]\nk20 = 1\nk40 = 0\nk42 = 0.06\nH0 = -2\n"
+        "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\n"
+        "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
+        "\n[[shape.mode]]\namplitude = 0.3\nn = 1\nm = 0\nphase = 0\n"
+        "\n[accuracy]\nenergy = 1e-06\nr_min = 0.001\n"
+        "\n[discretisation]\norder = 5\ntime_order = 5\nsymmetry = true\n"
+        "\n[time]\nend = 1.4\noutput = [0.1, 0.2]\n"
+        "\n[expect]\nstop = \"finished\"\nenergy = {value = 1, rel = 1e-06}\nstop_time = {value = 1.4, abs = 0.5}\n"
+        "\n[[expect.at]]\ntime = 0.1\nr_min = {value = 0.7, abs = 0.001}\n");
+}
+
+TEST(EffectiveToml, ReadsBackExactly) {
+    const Case c = parse_case(
+        good,
+        {"about.title='quote \" backslash \\ tab \t'", "energy.k20=0.1234567890123456789", "energy.k40=1e300",
+         "energy.H0=-1e-300", "shape.mode.1={amplitude = -1e-5, n = 7, phase = 2}", "discretisation.elements=64",
+         "discretisation.smoothness=2", "discretisation.time_tolerance=1e-10", "time.stationary=1e-8", "time.limit=3.5",
+         "expect.stop=overhang", "expect.at.1={time = 0.3, area = {value = 12, rel = 1e-3, abs = 1}}",
+         "expect.at.1.volume={value = 6, rel = 0.1}"},
+        "case.toml");
+    const std::string text = effective_toml(c);
+    const Case again = parse_case(text, {}, "case.toml");
+    EXPECT_EQ(effective_toml(again), text);
+    EXPECT_EQ(again.title, "quote \" backslash \\ tab \t");
+    EXPECT_EQ(again.energy.k, c.energy.k);
+    EXPECT_EQ(again.energy.H0, -1e-300);
+    EXPECT_EQ(std::get<Tube>(again.shape).modes[1].phase, 2);
+    EXPECT_EQ(again.discretisation.elements, 64);
+    EXPECT_EQ(again.discretisation.smoothness, 2);
+    EXPECT_EQ(again.discretisation.time_tolerance, 1e-10);
+    EXPECT_EQ(again.time.stationary, 1e-8);
+    EXPECT_EQ(again.time.limit, 3.5);
+    EXPECT_EQ(again.expect.stop, Stop::overhang);
+    ASSERT_EQ(again.expect.values.size(), 4u);
+    EXPECT_EQ(again.expect.values[2].series, "area");
+    EXPECT_EQ(again.expect.values[3].series, "volume");
+    EXPECT_EQ(again.expect.values[3].time, 0.3);
+}
+
+TEST(NearMiss, AllowsOneSlipInThreeLetters) {
+    EXPECT_EQ(near_miss("Length", {"radius", "length"}), "length");  // letter case
+    EXPECT_EQ(near_miss("k24", {"k20", "k42"}), "k42");              // neighbours swapped
+    EXPECT_EQ(near_miss("stationery", {"finished", "stationary"}), "stationary");
+    EXPECT_FALSE(near_miss("sphere", {"tube"}));
+}
+
+TEST(Tube, RadiusIsDifferentiable) {
+    const Tube tube{1.5, 3, {{0.2, 2, 0, 0.4}, {0.1, 0, 0, 0}}};
+    const double q = 2 * std::numbers::pi * 2 / 3, z = 0.7, h = 1e-30;
+    EXPECT_DOUBLE_EQ(radius_at(tube, z), 1.6 + 0.2 * std::cos(q * z + 0.4));  // the formula of the shape
+    // Complex step, exact to rounding: r0(z + i h) = r0 + i h r0'.
+    EXPECT_DOUBLE_EQ(radius_at(tube, std::complex<double>(z, h)).imag() / h, -0.2 * q * std::sin(q * z + 0.4));
+}
+
+TEST(Tube, NarrowestPlaceLiesBetweenSamples) {
+    // 1 + a cos x + b cos 2x, x = pi z, is smallest at cos x = -a/(4b), with the value 1 - a^2/(8b) - b.
+    const Tube tube{1, 2, {{0.3, 1, 0, 0}, {0.2, 2, 0, 0}}};
+    const Neck neck = narrowest(tube);
+    EXPECT_NEAR(neck.radius, 0.74375, 1e-14);
+    EXPECT_NEAR(std::cos(std::numbers::pi * neck.z), -0.375, 1e-6);
+    EXPECT_EQ(narrowest(Tube{0.5, 2, {}}).radius, 0.5);  // uniform
+}
+
+TEST(Tube, VolumeIsExact) {
+    // Modes of the same n add as waves; the trapezoidal rule is exact for trigonometric polynomials.
+    const Tube tube{1, 2, {{0.2, 1, 0, 0.3}, {0.1, 1, 0, 1}, {0.05, 3, 0, 0}, {0.04, 0, 0, 0.5}}};
+    double sum = 0;
+    const int n = 16;
+    for (int i = 0; i < n; ++i) sum += std::pow(radius_at(tube, tube.length * i / n), 2);
+    EXPECT_NEAR(volume(tube), std::numbers::pi * tube.length * sum / n, 1e-13);
+}
+
+}  // namespace
+}  // namespace tubule

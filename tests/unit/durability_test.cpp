@@ -1,0 +1,590 @@
+// A result is killed at every system call by which it reaches the disk, and at twenty random moments. What a call has
+// reported must be there afterwards, bit for bit, and nothing else but the call under way.
+//
+// Expected values: `Model` below, which keeps in plain vectors what the calls mean, and knows no file.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <bit>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/result/durable_io.hpp"
+#include "common/result/journal.hpp"
+#include "common/result/result.hpp"
+
+namespace tubule {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> series = {"time", "energy"};
+const std::string case_text = "tier = \"axisym\"\n# \xC3\xA9l\xC3\xA9gant\n";
+
+// Numbers whose last bits matter.
+Record make_record(double time, std::size_t size) {
+    Record record{time, {{"degree", 5}, {"energy", -1.0 / (3 + time)}}, {{"z", {size}, {}}, {"X", {size, 2}, {}}}};
+    for (Array& array : record.arrays) {
+        std::size_t n = 1;
+        for (const std::size_t extent : array.shape) n *= extent;
+        for (std::size_t i = 0; i < n; ++i) array.data.push_back(static_cast<double>(i) / 7 + time / 3);
+    }
+    if (size > 1) record.arrays[0].data[1] = -0.0;
+    return record;
+}
+
+// What a result means, in plain vectors.
+struct Model {
+    std::string text;
+    std::vector<std::vector<double>> rows;
+    std::vector<Record> frames;
+    std::optional<Record> checkpoint;
+    std::optional<std::string> stop;
+
+    const Record* restart() const {
+        const Record* last = frames.empty() ? nullptr : &frames.back();
+        return checkpoint && (!last || checkpoint->time >= last->time) ? &*checkpoint : last;
+    }
+    void resume() {
+        const double time = restart()->time;
+        std::erase_if(rows, [&](const auto& row) { return row[0] > time; });
+        std::erase_if(frames, [&](const Record& frame) { return frame.time > time; });
+        stop.reset();
+    }
+};
+
+bool same(double a, double b) {
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+bool same(const Record& a, const Record& b) {
+    bool equal = same(a.time, b.time) && a.numbers.size() == b.numbers.size() && a.arrays.size() == b.arrays.size();
+    for (std::size_t i = 0; equal && i < a.numbers.size(); ++i)
+        equal = a.numbers[i].first == b.numbers[i].first && same(a.numbers[i].second, b.numbers[i].second);
+    for (std::size_t i = 0; equal && i < a.arrays.size(); ++i) {
+        const Array& x = a.arrays[i];
+        const Array& y = b.arrays[i];
+        equal = x.name == y.name && x.shape == y.shape && x.data.size() == y.data.size();
+        for (std::size_t j = 0; equal && j < x.data.size(); ++j) equal = same(x.data[j], y.data[j]);
+    }
+    return equal;
+}
+
+bool same(const Result& result, const Model& model) {
+    std::optional<std::string> stop;
+    for (const auto& [name, value] : result.about)
+        if (name == "stop") stop = std::get<std::string>(value);
+    bool equal = result.case_text.text == model.text && result.series_names == series && stop == model.stop &&
+                 result.series.at("time").size() == model.rows.size() && result.frames.size() == model.frames.size() &&
+                 result.checkpoint.has_value() == model.checkpoint.has_value();
+    for (std::size_t i = 0; equal && i < model.rows.size(); ++i)
+        equal = same(result.series.at("time")[i], model.rows[i][0]) &&
+                same(result.series.at("energy")[i], model.rows[i][1]);
+    for (std::size_t i = 0; equal && i < model.frames.size(); ++i) equal = same(result.frames[i], model.frames[i]);
+    return equal && (!model.checkpoint || same(*result.checkpoint, *model.checkpoint));
+}
+
+// One call to the library, and what it means.
+struct Step {
+    std::string name;
+    std::function<void(std::optional<ResultWriter>&, const fs::path&)> call;
+    std::function<void(Model&)> meaning;
+};
+
+Step create(const std::string& text) {
+    return {"create",
+            [=](auto& writer, const fs::path& file) {
+                writer = ResultWriter::create(file, {text, {"a=1"}}, {{"version", "0"}}, series);
+            },
+            [=](Model& m) {
+                m = Model{text, {}, {}, {}, {}};
+            }};
+}
+Step row(double time) {
+    const std::vector<double> values = {time, 1 / (1 + time)};
+    return {"row", [=](auto& writer, const fs::path&) { writer->row(values); },
+            [=](Model& m) { m.rows.push_back(values); }};
+}
+Step frame(double time, std::size_t size = 3) {
+    const Record record = make_record(time, size);
+    return {"frame", [=](auto& writer, const fs::path&) { writer->frame(record); },
+            [=](Model& m) { m.frames.push_back(record); }};
+}
+Step checkpoint(double time) {
+    const Record record = make_record(time, 2);
+    return {"checkpoint", [=](auto& writer, const fs::path&) { writer->checkpoint(record); },
+            [=](Model& m) { m.checkpoint = record; }};
+}
+Step discard() {
+    return {"discard", [](auto& writer, const fs::path&) { writer->discard(); },
+            [](Model& m) {
+                m.rows.clear();
+                m.frames.clear();
+                m.checkpoint.reset();
+            }};
+}
+Step finish(const std::string& stop) {
+    return {"finish",
+            [=](auto& writer, const fs::path&) {
+                writer->finish({{"stop", stop}});
+            },
+            [=](Model& m) { m.stop = stop; }};
+}
+// As if the process had died here.
+Step abandon() {
+    return {"abandon", [](auto& writer, const fs::path&) { writer.reset(); }, [](Model&) {}};
+}
+Step resume() {
+    return {"resume", [](auto& writer, const fs::path& file) { writer = ResultWriter::resume(file); },
+            [](Model& m) { m.resume(); }};
+}
+Step repair() {
+    return {"repair", [](auto&, const fs::path& file) { repair_result(file); }, [](Model&) {}};
+}
+
+// An earlier result of the same name, unfinished, with a journal.
+const std::vector<Step> before = {create("# before\n"), row(0), frame(0), row(1)};
+
+// The big frames make the journal outgrow the file, so that there are consolidations within the run.
+const std::vector<Step> run = {create(case_text),
+                               row(0),
+                               frame(0),
+                               row(1),
+                               frame(1, 6000),
+                               row(2),
+                               checkpoint(2),
+                               discard(),
+                               row(0),
+                               frame(0),
+                               row(1),
+                               checkpoint(1),
+                               row(2),
+                               frame(2, 6000),
+                               row(3),
+                               abandon(),
+                               resume(),
+                               row(3),
+                               checkpoint(3),
+                               frame(3),
+                               row(4),
+                               abandon(),
+                               repair(),
+                               resume(),
+                               row(4),
+                               finish("time-limit"),
+                               abandon(),
+                               resume(),
+                               row(5),
+                               frame(5),
+                               finish("finished")};
+
+class Durability : public testing::Test {
+protected:
+    void SetUp() override {
+        std::string pattern = (fs::temp_directory_path() / "tubule-durability-XXXXXX").string();
+        ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+        directory = pattern;
+        file = directory / "run.hdf";
+    }
+    void TearDown() override {
+        journal_slack = slack;
+        durable::fault = nullptr;
+        fs::remove_all(directory);
+    }
+    void clear() {
+        for (const auto& entry : fs::directory_iterator(directory))
+            if (entry.is_regular_file()) fs::remove(entry.path());
+    }
+
+    static void take(const std::vector<Step>& steps, const fs::path& file) {
+        std::optional<ResultWriter> writer;
+        for (const Step& step : steps) step.call(writer, file);
+    }
+
+    const std::size_t slack = journal_slack;
+    fs::path directory, file;
+};
+
+// Kills the process at its n-th operation; of a write, the given share of the bytes still reaches the file.
+void die_at(std::size_t n, double share) {
+    durable::fault = [n, share](const durable::Operation& operation) mutable {
+        if (n-- > 0) return 0;
+        if (operation.call == durable::Call::write) {
+            const auto part = static_cast<std::size_t>(share * static_cast<double>(operation.bytes.size()));
+            if (::write(operation.fd, operation.bytes.data(), part) < 0) std::abort();
+        }
+        ::raise(SIGKILL);
+        return 0;
+    };
+}
+
+struct Child {
+    int reported = 0;  // calls that have returned
+    bool killed = false;
+};
+
+// Runs work(report) in a child process; report() tells the parent that one more call has returned.
+// The parent may do `meanwhile(pid, next report)`.
+Child in_child(const std::function<void(const std::function<void()>&)>& work,
+               const std::function<void(pid_t, const std::function<bool()>&)>& meanwhile = {}) {
+    int ends[2];
+    if (::pipe(ends) != 0) throw std::runtime_error("no pipe");
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+        ::close(ends[0]);
+        try {
+            work([&] {
+                const char one = 1;
+                if (::write(ends[1], &one, 1) != 1) std::abort();
+            });
+        } catch (const std::exception& e) {
+            fprintf(stderr, "child: %s\n", e.what());
+            ::_exit(1);
+        }
+        ::_exit(0);
+    }
+    ::close(ends[1]);
+    Child child;
+    const auto next = [&] {
+        char one = 0;
+        const bool got = ::read(ends[0], &one, 1) == 1;
+        child.reported += got;
+        return got;
+    };
+    if (meanwhile) meanwhile(pid, next);
+    while (next()) {
+    }
+    ::close(ends[0]);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    child.killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
+    EXPECT_TRUE(child.killed || (WIFEXITED(status) && WEXITSTATUS(status) == 0));
+    return child;
+}
+
+// The result can be gone on with, if it has something to go on from.
+void expect_resumable(const fs::path& file, Model model) {
+    if (!model.restart()) {
+        EXPECT_THROW(ResultWriter::resume(file), std::runtime_error);
+        return;
+    }
+    const Record restart = *model.restart();
+    std::optional<ResultWriter> writer;
+    for (const Step& step : {resume(), row(restart.time + 1), frame(restart.time + 1), finish("finished")}) {
+        step.call(writer, file);
+        step.meaning(model);
+        EXPECT_TRUE(same(writer->restart_record(), restart));
+        EXPECT_TRUE(same(read_result(file), model)) << "after " << step.name;
+    }
+    EXPECT_FALSE(fs::exists(journal_path(file)));
+}
+
+TEST_F(Durability, KilledAtEveryOperationOfARun) {
+    const auto& steps = run;
+    Model old;
+    for (const Step& step : before) step.meaning(old);
+    std::vector<Model> models = {old};  // after each step
+    for (const Step& step : steps) {
+        models.push_back(models.back());
+        step.meaning(models.back());
+    }
+
+    std::vector<durable::Call> operations;
+    take(before, file);
+    const fs::path kept = directory / "kept";
+    fs::create_directory(kept);
+    for (const fs::path& path : {file, journal_path(file)}) fs::copy(path, kept / path.filename());
+    journal_slack = 0;
+    durable::fault = [&](const durable::Operation& operation) {
+        operations.push_back(operation.call);
+        return 0;
+    };
+    take(steps, file);
+    durable::fault = nullptr;
+    journal_slack = slack;
+    // There must be consolidations by outgrowing, too: the 6 by create, resume, repair and finish have 2 writes at
+    // most.
+    ASSERT_GT(operations.size(), 60u);
+
+    for (std::size_t n = 0; n < operations.size(); ++n) {
+        // All of a write may have happened and the process be dead nevertheless: share 1.
+        const bool writes = operations[n] == durable::Call::write;
+        for (const double share : writes ? std::vector{0.0, 0.4, 0.999999, 1.0} : std::vector{0.0}) {
+            SCOPED_TRACE("operation " + std::to_string(n) + ", share " + std::to_string(share));
+            clear();
+            fs::copy(kept, directory);
+            const Child child = in_child([&](const auto& report) {
+                journal_slack = 0;
+                die_at(n, share);
+                std::optional<ResultWriter> writer;
+                for (const Step& step : steps) {
+                    step.call(writer, file);
+                    report();
+                }
+            });
+            ASSERT_TRUE(child.killed);
+            const auto done = static_cast<std::size_t>(child.reported);
+            SCOPED_TRACE("killed in " + steps[done].name);
+
+            const Result result = read_result(file);
+            const bool before_call = same(result, models[done]);
+            ASSERT_TRUE(before_call || same(result, models[done + 1]));
+            const Model& model = before_call ? models[done] : models[done + 1];
+            // Reading has changed nothing; merging for good changes the files, but not what they say.
+            repair_result(file);
+            ASSERT_FALSE(fs::exists(journal_path(file)));
+            ASSERT_TRUE(same(read_result(file), model));
+            expect_resumable(file, model);
+            if (HasFailure()) return;
+        }
+    }
+}
+
+TEST_F(Durability, ResumedWithoutRepairAfterBeingKilledAtEveryOperation) {
+    const std::vector<Step> steps = {create(case_text), row(0), frame(0, 6000), row(1), checkpoint(1), row(2)};
+    std::vector<Model> models = {Model{}};
+    for (const Step& step : steps) {
+        models.push_back(models.back());
+        step.meaning(models.back());
+    }
+    bool killed = true;
+    for (std::size_t n = 0; killed; ++n) {
+        SCOPED_TRACE("operation " + std::to_string(n));
+        clear();
+        const Child child = in_child([&](const auto& report) {
+            journal_slack = 0;
+            die_at(n, 0.5);
+            std::optional<ResultWriter> writer;
+            for (const Step& step : steps) {
+                step.call(writer, file);
+                report();
+            }
+        });
+        killed = child.killed;
+        const auto done = static_cast<std::size_t>(child.reported);
+        if (!fs::exists(file)) {
+            ASSERT_EQ(done, 0u);
+            ASSERT_THROW(read_result(file), std::runtime_error);
+            continue;
+        }
+        const bool one_more = killed && !same(read_result(file), models[done]);
+        ASSERT_TRUE(same(read_result(file), models[done + one_more]));
+        expect_resumable(file, models[done + one_more]);
+        if (HasFailure()) return;
+    }
+}
+
+TEST_F(Durability, TwentyKillsAtRandomMomentsOfManyFrames) {
+    std::mt19937 random(20240229);
+    int most = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+        SCOPED_TRACE("trial " + std::to_string(trial));
+        clear();
+        const int wait_for = std::uniform_int_distribution(1, 400)(random);
+        const auto pause = std::uniform_int_distribution<unsigned>(0, 2000)(random);
+        const Child child = in_child(
+            [&](const auto& report) {
+                journal_slack = 100'000;
+                auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+                for (int i = 0; i < 60'000; ++i) {
+                    if (i % 2)
+                        writer.frame(make_record(i, 100));
+                    else
+                        writer.row(std::vector<double>{static_cast<double>(i), 1.0 / (i + 1)});
+                    report();
+                }
+            },
+            [&](pid_t pid, const auto& next) {
+                for (int i = 0; i < wait_for; ++i) next();
+                ::usleep(pause);
+                ::kill(pid, SIGKILL);
+            });
+        ASSERT_TRUE(child.killed);
+        ASSERT_GE(child.reported, wait_for);
+        most = std::max(most, child.reported);
+
+        const Result result = read_result(file);
+        const auto calls = result.frames.size() + result.series.at("time").size();
+        ASSERT_GE(calls, static_cast<std::size_t>(child.reported));
+        ASSERT_LE(calls, static_cast<std::size_t>(child.reported) + 1);
+        Model model{case_text, {}, {}, {}, {}};
+        for (int i = 0; i < static_cast<int>(calls); ++i) {
+            if (i % 2)
+                model.frames.push_back(make_record(i, 100));
+            else
+                model.rows.push_back({static_cast<double>(i), 1.0 / (i + 1)});
+        }
+        ASSERT_TRUE(same(result, model));
+        expect_resumable(file, model);
+        if (HasFailure()) return;
+    }
+    EXPECT_GT(most, 100);
+}
+
+// ---- errors instead of kills
+
+// Makes every operation of the kind fail with `error`; of a write, half of the bytes still reach the file.
+void break_disk(durable::Call call, int error) {
+    durable::fault = [=](const durable::Operation& operation) {
+        if (operation.call != call) return 0;
+        if (call == durable::Call::write)
+            if (::write(operation.fd, operation.bytes.data(), operation.bytes.size() / 2) < 0) std::abort();
+        return error;
+    };
+}
+
+std::string message_of(const std::function<void()>& call) {
+    try {
+        call();
+    } catch (const std::runtime_error& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+TEST_F(Durability, AFullDiskIsReportedAndCostsNothingWritten) {
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.row(std::vector<double>{0, 1});
+    break_disk(durable::Call::write, ENOSPC);
+    const std::string message = message_of([&] { writer.row(std::vector<double>{1, 2}); });
+    EXPECT_NE(message.find("run.hdf.journal: No space left on device"), std::string::npos) << message;
+    EXPECT_THROW(writer.finish({}), std::runtime_error);
+    EXPECT_FALSE(fs::exists(directory / "run.hdf.tmp"));
+    EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});
+
+    // Someone made room: the torn record must not hide what follows.
+    durable::fault = nullptr;
+    writer.row(std::vector<double>{2, 3});
+    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 2}));
+    writer.finish({});
+    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 2}));
+}
+
+TEST_F(Durability, ATornRecordThatCannotBeCutOffStopsTheJournal) {
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.row(std::vector<double>{0, 1});
+    durable::fault = [](const durable::Operation& operation) {
+        if (operation.call == durable::Call::write && ::write(operation.fd, operation.bytes.data(), 9) < 0)
+            std::abort();
+        return EIO;
+    };
+    EXPECT_THROW(writer.row(std::vector<double>{1, 2}), std::runtime_error);
+    durable::fault = nullptr;
+    // Accepting this row would promise what a kill would break.
+    EXPECT_NE(message_of([&] { writer.row(std::vector<double>{2, 3}); }).find("damaged"), std::string::npos);
+    EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});
+    writer.finish({});
+    EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});
+}
+
+TEST_F(Durability, EveryFailingOperationOfCreateNamesTheFileAndKeepsTheOldResult) {
+    using durable::Call;
+    for (const auto& [call, error, words] :
+         {std::tuple(Call::open, EACCES, "Permission denied"), std::tuple(Call::write, ENOSPC, "No space left"),
+          std::tuple(Call::sync, EIO, "Input/output error"),
+          std::tuple(Call::rename, EROFS, "Read-only file system")}) {
+        SCOPED_TRACE(words);
+        clear();
+        take({create("# before\n"), row(0), frame(0), finish("finished")}, file);
+        break_disk(call, error);
+        const std::string message = message_of([&] { ResultWriter::create(file, {case_text, {}}, {}, series); });
+        durable::fault = nullptr;
+        EXPECT_NE(message.find(file.string()), std::string::npos) << message;
+        EXPECT_NE(message.find(words), std::string::npos) << message;
+        EXPECT_EQ(read_result(file).case_text.text, "# before\n");
+        EXPECT_EQ(read_result(file).frames.size(), 1u);
+        for (const auto& entry : fs::directory_iterator(directory)) EXPECT_EQ(entry.path(), file);  // no litter
+    }
+}
+
+// ---- several parties
+
+TEST_F(Durability, ASecondWriterIsRefusedAsLongAsTheFirstIsThere) {
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.frame(make_record(0, 3));
+    for (const auto& second :
+         std::vector<std::function<void()>>{[&] {
+                                                ResultWriter::create(file, {case_text, {}}, {}, series);
+                                            },
+                                            [&] { ResultWriter::resume(file); }, [&] { repair_result(file); }}) {
+        EXPECT_NE(message_of(second).find("another process is writing"), std::string::npos);
+    }
+    EXPECT_EQ(read_result(file).frames.size(), 1u);
+    writer.finish({});
+    EXPECT_NO_THROW(ResultWriter::resume(file));
+}
+
+// A reader sees a prefix of the run at any time, at least as long as the one it saw before.
+TEST_F(Durability, ReadingWhileARunGoesOn) {
+    const std::size_t calls = 3000;
+    ResultWriter::create(file, {case_text, {}}, {}, series).frame(make_record(0, 3));
+    const Child child = in_child(
+        [&](const auto& report) {
+            journal_slack = 2000;
+            auto writer = ResultWriter::resume(file);
+            report();
+            for (std::size_t i = 0; i < calls; ++i) {
+                writer.row(std::vector<double>{static_cast<double>(i), 0.5});
+                report();
+            }
+        },
+        [&](pid_t, const auto& next) {
+            next();
+            std::size_t seen = 0;
+            for (int reads = 0; seen < calls && reads < 100'000 && !HasFailure(); ++reads) {
+                const auto times = read_result(file).series.at("time");
+                EXPECT_GE(times.size(), seen);
+                seen = times.size();
+                for (std::size_t i = 0; i < seen; ++i) EXPECT_EQ(times[i], static_cast<double>(i));
+            }
+            EXPECT_EQ(seen, calls);
+        });
+    EXPECT_FALSE(child.killed);
+    EXPECT_EQ(read_result(file).series.at("time").size(), calls);
+}
+
+TEST_F(Durability, AnOldCopyOfTheFileBesideItsNewerJournalIsNotTakenForWhole) {
+    journal_slack = 0;
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    const fs::path copy = directory / "copy.hdf";
+    fs::copy_file(file, copy);
+    writer.frame(make_record(0, 6000));  // outgrows the file: consolidated, the journal begins anew
+    writer.row(std::vector<double>{1, 2});
+    fs::copy_file(journal_path(file), journal_path(copy));
+    EXPECT_NE(message_of([&] { read_result(copy); }).find("old copy"), std::string::npos);
+}
+
+// Damage in the middle of the journal, as a loss of power may cause: what is before it counts, what follows does not.
+TEST_F(Durability, ADamagedRecordEndsTheJournal) {
+    {
+        auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+        for (int i = 0; i < 5; ++i) writer.row(std::vector<double>{static_cast<double>(i), 1});
+    }
+    const auto size = fs::file_size(journal_path(file));
+    const auto record = (size - 16) / 5;  // 16 bytes of header, five records of equal size
+    std::fstream journal(journal_path(file), std::ios::in | std::ios::out | std::ios::binary);
+    journal.seekp(static_cast<std::streamoff>(16 + 3 * record + record - 1));
+    journal.put('\x55');
+    journal.close();
+    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2}));
+}
+
+TEST(Crc32, CheckValue) {
+    // The check value of CRC-32/ISO-HDLC in the catalogue of parametrised CRC algorithms.
+    const std::string digits = "123456789";
+    EXPECT_EQ(crc32(0, std::as_bytes(std::span(digits))), 0xCBF43926u);
+    // Continued over two parts it is the same.
+    const std::uint32_t first = crc32(0, std::as_bytes(std::span(digits).first(4)));
+    EXPECT_EQ(crc32(first, std::as_bytes(std::span(digits).subspan(4))), 0xCBF43926u);
+}
+
+}  // namespace
+}  // namespace tubule

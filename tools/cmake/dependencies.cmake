@@ -1,0 +1,8 @@
+# What the libraries Tubule::common and Tubule::axisym need; read by our build and by that of those who use them.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(SUNDIALS 6.4 REQUIRED COMPONENTS idas nvecserial sunmatrixsparse sunlinsolklu)
+find_package(SuiteSparse REQUIRED COMPONENTS KLU)
+find_package(GSL REQUIRED)
+find_package(HDF5 REQUIRED COMPONENTS C)
+find_package(tomlplusplus REQUIRED)
+find_package(fmt REQUIRED)

@@ -1,0 +1,100 @@
+// tubule plot RESULT... : draws results by the Python scripts of tools/plot.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "common/energy/bending.hpp"
+#include "common/result/result.hpp"
+#include "tools/command/commands.hpp"
+
+namespace tubule {
+
+namespace {
+
+constexpr const char* python = "/usr/bin/python3";  // PATH's python3 may lack Debian's modules
+
+struct PlotOptions {
+    std::vector<std::string> results, outputs;
+    std::vector<double> times;
+    std::string kind = "all";
+};
+
+// <prefix>/share/tubule/plot/plot.py of an installed program, else the one this program was built beside.
+std::filesystem::path script() {
+    std::error_code ignored;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+    const auto installed = program.parent_path().parent_path() / "share/tubule/plot/plot.py";
+    return std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path(TUBULE_PLOT_DIR) / "plot.py";
+}
+
+std::vector<std::string> script_arguments(const PlotOptions& options) {
+    std::vector<std::string> arguments{python, "-B", script().string(), "--kind=" + options.kind};
+    if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
+    for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
+    for_each_bending_term([&](std::size_t, const auto& term) {
+        arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
+    });
+    arguments.push_back("--");
+    arguments.insert(arguments.end(), options.results.begin(), options.results.end());
+    return arguments;
+}
+
+// Python takes this process' place, so that its exit status is ours. Returns only when that is impossible.
+int plot(const PlotOptions& options) {
+    try {
+        for (const std::string& result : options.results) repair_result(result);
+    } catch (const std::runtime_error& error) {
+        fmt::print(stderr, "{}\n", error.what());
+        return 2;
+    }
+    if (access(python, X_OK) != 0) {
+        fmt::print(stderr, "tubule plot needs {}; install the packages python3 python3-matplotlib python3-h5py\n",
+                   python);
+        return 4;
+    }
+    std::vector<std::string> arguments = script_arguments(options);
+    if (!std::filesystem::exists(arguments[2])) {
+        fmt::print(stderr, "tubule plot: its script {} is missing; install or build tubule again\n", arguments[2]);
+        return 4;
+    }
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    std::fflush(nullptr);
+    execv(python, argv.data());
+    fmt::print(stderr, "tubule plot: cannot start {}: {}\n", python, std::strerror(errno));
+    return 4;
+}
+
+}  // namespace
+
+void add_plot(CLI::App& app, int& exit_status) {
+    CLI::App* command = app.add_subcommand("plot", "Draw tubes at the output times and energies over time");
+    const auto options = std::make_shared<PlotOptions>();
+    command->add_option("RESULT", options->results, "result files; several are labelled by what differs in their cases")
+        ->required();
+    command
+        ->add_option("-o,--output", options->outputs,
+                     "picture to write, .png, .svg or .pdf; may be repeated (default: both RESULT.png and .svg)")
+        ->allow_extra_args(false);
+    command->add_option("--times", options->times, "times of the tubes, such as 0,0.05,1.4 (default: up to six frames)")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    command->add_option("--kind", options->kind, "what to draw: profiles, energy, all")
+        ->check(CLI::IsMember({"profiles", "energy", "all"}))
+        ->capture_default_str();
+    command->callback([options, &exit_status] { exit_status = plot(*options); });
+}
+
+}  // namespace tubule

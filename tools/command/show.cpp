@@ -1,0 +1,257 @@
+// tubule show FILE: a result in words, as CSV or as JSON. Reads the journal of an unfinished run too, and writes
+// nothing.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/case/read.hpp"
+#include "common/result/result.hpp"
+#include "tools/command/commands.hpp"
+
+namespace tubule {
+
+namespace {
+
+struct ShowOptions {
+    std::string file;
+    bool csv = false, json = false;
+    std::optional<long> frame;
+};
+
+using Text = fmt::memory_buffer;
+
+template <class... Args>
+void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+// ---- words
+
+std::string title_of(const Result& result, const std::string& file) {
+    try {
+        return parse_case(result.case_text.text, result.case_text.sets, file).title;
+    } catch (const CaseError&) {
+        return "";  // written by a version with other keys; the rest of the result can be shown all the same
+    }
+}
+
+std::string words(const Value& value) {
+    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+// What only a resumed run can make sense of.
+bool is_private(const Array& array) {
+    return array.name.starts_with("restart_");
+}
+
+std::string array_list(const Record& record) {
+    std::string list;
+    for (const Array& array : record.arrays)
+        if (!is_private(array))
+            list += fmt::format("{}{}[{}]", list.empty() ? "" : ", ", array.name, fmt::join(array.shape, ", "));
+    return list;
+}
+
+// The numbers of the first frame are the columns: the frames of a result are all alike.
+void add_frames(Text& out, const std::vector<Record>& frames) {
+    if (frames.empty()) return;
+    add(out, "\n{:>6} {:>14}", "frame", "time");
+    for (const auto& [name, value] : frames.front().numbers) add(out, " {:>14}", name);
+    add(out, "  arrays\n");
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        add(out, "{:>6} {:>14.8g}", i, frames[i].time);
+        for (const auto& [name, value] : frames[i].numbers) add(out, " {:>14.8g}", value);
+        add(out, "  {}\n", array_list(frames[i]));
+    }
+}
+
+void add_summary(Text& out, const Result& result, const std::string& file) {
+    const auto line = [&](std::string_view name, const std::string& value) { add(out, "{:<18} {}\n", name, value); };
+    line("file", file);
+    line("title", title_of(result, file));
+    if (!result.case_text.sets.empty()) line("set", fmt::format("{}", fmt::join(result.case_text.sets, "  ")));
+    const bool stopped =
+        std::any_of(result.about.begin(), result.about.end(), [](const auto& entry) { return entry.first == "stop"; });
+    for (const auto& [name, value] : result.about) line(name, words(value));
+    if (!stopped) line("stop", "none yet: the run is going on, or was killed");
+    const auto& times = result.series.at(result.series_names.front());
+    line("rows", std::to_string(times.size()));
+    line("frames", std::to_string(result.frames.size()));
+    if (result.checkpoint) line("checkpoint", fmt::format("time {:.8g}", result.checkpoint->time));
+    if (!times.empty()) {
+        add(out, "\nlast row\n");
+        for (const std::string& name : result.series_names)
+            line("  " + name, fmt::format("{:.12g}", result.series.at(name).back()));
+    }
+    add_frames(out, result.frames);
+}
+
+// ---- CSV
+
+struct Column {
+    std::string name;
+    const std::vector<double>* values;
+};
+
+void add_table(Text& out, const std::vector<Column>& columns) {
+    for (std::size_t j = 0; j < columns.size(); ++j) add(out, "{}{}", j > 0 ? "," : "", columns[j].name);
+    add(out, "\n");
+    const std::size_t rows = columns.empty() ? 0 : columns.front().values->size();
+    for (std::size_t i = 0; i < rows; ++i) {
+        for (std::size_t j = 0; j < columns.size(); ++j)
+            add(out, "{}{:.17g}", j > 0 ? "," : "", (*columns[j].values)[i]);
+        add(out, "\n");
+    }
+}
+
+std::vector<Column> series_columns(const Result& result) {
+    std::vector<Column> columns;
+    for (const std::string& name : result.series_names) columns.push_back({name, &result.series.at(name)});
+    return columns;
+}
+
+// The arrays sampled at the points z. The spline's own may happen to be as long, but their rows are no points.
+std::vector<Column> sampled_columns(const Record& frame) {
+    const auto z = std::find_if(frame.arrays.begin(), frame.arrays.end(), [](const Array& a) { return a.name == "z"; });
+    if (z == frame.arrays.end()) throw std::runtime_error("the frame has no array z of sampling points");
+    std::vector<Column> columns;
+    for (const Array& array : frame.arrays)
+        if (array.shape == z->shape && array.name != "knots" && array.name != "coefficients" && !is_private(array))
+            columns.push_back({array.name, &array.data});
+    return columns;
+}
+
+// ---- JSON
+
+std::string json(const std::string& text) {
+    std::string quoted = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\')
+            quoted += {'\\', c};
+        else if (static_cast<unsigned char>(c) < 0x20)
+            quoted += fmt::format("\\u{:04x}", static_cast<int>(c));
+        else
+            quoted += c;
+    }
+    return quoted + '"';
+}
+// The shortest that reads back the same, with a point or exponent, so that 1.0 stays a floating-point number.
+std::string json(double value) {
+    const std::string digits = fmt::format("{}", value);
+    return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
+}
+std::string json(std::int64_t value) {
+    return fmt::format("{}", value);
+}
+std::string json(std::size_t value) {
+    return fmt::format("{}", value);
+}
+std::string json(const Value& value) {
+    return std::visit([](const auto& v) { return json(v); }, value);
+}
+template <class T>
+std::string json(const std::vector<T>& values) {
+    std::string list = "[";
+    for (const T& value : values) list += (list.size() > 1 ? ", " : "") + json(value);
+    return list + "]";
+}
+template <class T>
+std::string json(const std::vector<std::pair<std::string, T>>& entries) {
+    std::string object = "{";
+    for (const auto& [name, value] : entries)
+        object += fmt::format("{}{}: {}", object.size() > 1 ? ", " : "", json(name), json(value));
+    return object + "}";
+}
+
+// Of arrays only the shapes, unless `data` too is wanted (row-major, in one list).
+std::string json(const Record& record, bool data) {
+    std::string arrays;
+    for (const Array& array : record.arrays) {
+        arrays += fmt::format("{}{}: {{\"shape\": {}", arrays.empty() ? "" : ", ", json(array.name), json(array.shape));
+        if (data) arrays += fmt::format(", \"data\": {}", json(array.data));
+        arrays += "}";
+    }
+    return fmt::format("{{\"time\": {}, \"numbers\": {}, \"arrays\": {{{}}}}}", json(record.time), json(record.numbers),
+                       arrays);
+}
+
+void add_json(Text& out, const Result& result, std::optional<std::size_t> with_data) {
+    add(out, "{{\n\"case\": {{\"text\": {}, \"set\": {}}},\n", json(result.case_text.text),
+        json(result.case_text.sets));
+    add(out, "\"about\": {},\n\"series\": {{", json(result.about));
+    for (std::size_t j = 0; j < result.series_names.size(); ++j) {
+        const std::string& name = result.series_names[j];
+        add(out, "{}\n{}: {}", j > 0 ? "," : "", json(name), json(result.series.at(name)));
+    }
+    add(out, "\n}},\n\"frames\": [");
+    for (std::size_t i = 0; i < result.frames.size(); ++i)
+        add(out, "{}\n{}", i > 0 ? "," : "", json(result.frames[i], with_data == i));
+    add(out, "\n],\n\"checkpoint\": {}\n}}\n", result.checkpoint ? json(*result.checkpoint, false) : "null");
+}
+
+// ----
+
+// Negative numbers count from the last frame.
+std::size_t frame_index(const Result& result, long asked) {
+    const long count = static_cast<long>(result.frames.size());
+    if (asked >= count || asked < -count)
+        throw std::runtime_error(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
+                                           : fmt::format("no frame {}: there are none", asked));
+    return static_cast<std::size_t>(asked < 0 ? count + asked : asked);
+}
+
+Text shown(const ShowOptions& options) {
+    if (options.frame && !options.csv && !options.json) throw std::runtime_error("--frame goes with --csv or --json");
+    const Result result = read_result(options.file);
+    std::optional<std::size_t> frame;
+    if (options.frame) frame = frame_index(result, *options.frame);
+    Text out;
+    if (options.json)
+        add_json(out, result, frame);
+    else if (options.csv)
+        add_table(out, frame ? sampled_columns(result.frames[*frame]) : series_columns(result));
+    else
+        add_summary(out, result, options.file);
+    return out;
+}
+
+int show(const ShowOptions& options) {
+    try {
+        const Text out = shown(options);
+        if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0)
+            throw std::runtime_error(fmt::format("cannot write the output: {}", std::strerror(errno)));
+        return 0;
+    } catch (const std::runtime_error& error) {
+        const std::string_view words = error.what();
+        const bool named = words.find(options.file) != std::string_view::npos;
+        fmt::print(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
+        return 2;
+    }
+}
+
+}  // namespace
+
+void add_show(CLI::App& app, int& exit_status) {
+    CLI::App* command = app.add_subcommand("show", "Print a result: a summary, or its numbers as CSV or JSON");
+    const auto options = std::make_shared<ShowOptions>();
+    command->add_option("FILE", options->file, "result file NAME.hdf")->required();
+    CLI::Option* csv = command->add_flag("--csv", options->csv, "the series, in full precision");
+    command->add_flag("--json", options->json, "everything but the numbers of the frames' arrays")->excludes(csv);
+    command->add_option(
+        "--frame", options->frame,
+        "with --csv: the sampled arrays of this frame instead; with --json: its arrays too (-1: the last)");
+    command->callback([options, &exit_status] { exit_status = show(*options); });
+}
+
+}  // namespace tubule

@@ -1,0 +1,173 @@
+"""What tells several cases apart, in words short enough for a picture. Standard library only."""
+
+import textwrap
+import tomllib
+
+SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
+SUPERSCRIPT = dict(zip("0123456789", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"))
+MINUS = "\u2212"
+NOT_SET = object()
+MAX_DIFFERENCES = 4  # cases that differ in more are called by their names
+
+# Never a label: what a case says about itself, what tests expect of it, and times, which one sees.
+IGNORED = ("about.", "expect.", "time.")
+NAMES = {
+    "tier": "tier",
+    "accuracy.energy": "accuracy",
+    "accuracy.r_min": "neck floor",
+    "model.kind": "model",
+    "shape.kind": "shape",
+}
+
+
+class BadCase(ValueError):
+    """The case text or one of its overrides cannot be read."""
+
+
+def effective_case(text, sets):
+    """The case as nested dicts after its overrides "a.b=value", applied in order; array entries by index."""
+    try:
+        case = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise BadCase(f"its case is not valid TOML: {error}") from error
+    for override in sets:
+        path, equals, value = override.partition("=")
+        if not equals:
+            raise BadCase(f"its override '{override}' is not of the form key=value")
+        *parents, leaf = path.strip().split(".")
+        node = case
+        try:
+            for step, following in zip(parents, [*parents[1:], leaf]):
+                node = _entry(node, step, [] if following.isdigit() else {})
+            if isinstance(node, list):
+                _entry(node, leaf, None)
+                leaf = int(leaf)
+            node[leaf] = _toml_value(value.strip())
+        except (IndexError, TypeError, ValueError) as error:
+            raise BadCase(f"its override '{override}' does not fit the case") from error
+    return case
+
+
+def _entry(node, step, fresh):
+    """node[step], made from `fresh` where a dict lacks it or a list is one short."""
+    if isinstance(node, list):
+        index = int(step)
+        if index == len(node):
+            node.append(fresh)
+        return node[index]
+    return node.setdefault(step, fresh)
+
+
+def _toml_value(text):
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text  # a bare word: --set model.kind=gradient-flow
+
+
+def flatten(node, prefix=""):
+    """{"shape.mode.0.amplitude": 0.25, ...}; an array of plain values stays one value."""
+    if isinstance(node, dict):
+        items = node.items()
+    elif isinstance(node, list) and any(isinstance(entry, (dict, list)) for entry in node):
+        items = ((str(index), entry) for index, entry in enumerate(node))
+    else:
+        return {prefix: node}
+    flat = {}
+    for key, value in items:
+        flat |= flatten(value, f"{prefix}.{key}" if prefix else key)
+    return flat
+
+
+def differences(cases):
+    """Keys, in order of first appearance, whose values are not the same in all cases."""
+    flats = [flatten(case) for case in cases]
+    keys = dict.fromkeys(key for flat in flats for key in flat)
+    return [
+        key
+        for key in keys
+        if not key.startswith(IGNORED) and any(flat.get(key, NOT_SET) != flats[0].get(key, NOT_SET) for flat in flats)
+    ]
+
+
+def row_labels(cases, fallbacks):
+    """One list of words ("k42 = 0.06", ...) a case: what differs, else its fallback."""
+    if len(cases) == 1:
+        return [[fallbacks[0]]]
+    keys = differences(cases)
+    if len(keys) > MAX_DIFFERENCES:
+        return [[fallback] for fallback in fallbacks]
+    flats = [flatten(case) for case in cases]
+    names = _names(keys, flats)
+    labels = []
+    for flat in flats:
+        words = []
+        for key in keys:
+            mode = ".".join(key.split(".")[:3]) + "." if key.startswith("shape.mode.") else None
+            if key in flat:
+                words.append(f"{names[key]} = {_value(flat[key])}")
+            elif mode and not any(other.startswith(mode) for other in flat):
+                words.append(f"no mode {key.split('.')[2]}")
+            else:
+                words.append(f"{names[key]} by default")
+        labels.append(list(dict.fromkeys(words)))
+    if len({tuple(label) for label in labels}) < len(labels):
+        labels = [[*label, fallback] for label, fallback in zip(labels, fallbacks)]
+    return labels
+
+
+def _names(keys, flats):
+    single_mode = not any(key.startswith("shape.mode.1.") for flat in flats for key in flat)
+    names = {}
+    for key in keys:
+        parts = key.split(".")
+        if key in NAMES:
+            names[key] = NAMES[key]
+        elif key.startswith("shape.mode."):
+            names[key] = parts[3] if single_mode else f"mode {parts[2]} {parts[3]}"
+        else:
+            clash = sum(other.split(".")[-1] == parts[-1] for other in keys) > 1
+            names[key] = key if clash else symbol(parts[-1])
+    return names
+
+
+def symbol(key):
+    """k42 and H0 with their digits set below the line; other words as they are."""
+    letter, digits = key[:1], key[1:]
+    return letter + "".join(SUBSCRIPT[d] for d in digits) if letter in "kH" and digits.isdigit() else key
+
+
+def _value(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return number(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(entry) for entry in value) + "]"
+    return str(value)
+
+
+def number(value):
+    """Six digits at most, with a true minus sign."""
+    return f"{value:.6g}".replace("-", MINUS)
+
+
+def wrapped(words, width):
+    """Words one a line, long ones broken."""
+    return "\n".join("\n".join(textwrap.wrap(word, width)) for word in words)
+
+
+def formula(mathtext):
+    """k_{20}(H-H_0)^2 with real sub- and superscripts, so that an SVG holds it as plain text."""
+    out, table, braced = [], None, False
+    for char in mathtext:
+        if char in "_^":
+            table = SUBSCRIPT if char == "_" else SUPERSCRIPT
+        elif char == "{":
+            braced = table is not None
+        elif char == "}":
+            table, braced = None, False
+        else:
+            out.append((table or {}).get(char, MINUS if char == "-" else char))
+            table = table if braced else None
+    return "".join(out)

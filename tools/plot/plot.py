@@ -1,0 +1,98 @@
+#!/usr/bin/python3
+"""Draws results of tubule: tubes at the output times, and energies over time. See `tubule plot --help`."""
+
+import argparse
+import os
+import sys
+
+EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
+DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
+
+
+def arguments():
+    parser = argparse.ArgumentParser(prog="tubule plot", description=__doc__)
+    parser.add_argument("results", nargs="+")
+    parser.add_argument("-o", "--output", action="append", default=[])
+    parser.add_argument("--times", default="")
+    parser.add_argument("--kind", choices=("profiles", "energy", "all"), default="all")
+    parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
+    return parser.parse_args()
+
+
+def draw(paths, outputs, times, kind, term_labels):
+    """Reads all, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
+    from matplotlib.figure import Figure
+
+    import style
+    from energy import EnergyPanel
+    from labels import row_labels
+    from results import BadInput, read_result
+    from tubes import TubePanel, choose_columns
+
+    style.check_outputs(outputs)
+    results = [read_result(path) for path in paths]
+    names = [os.path.splitext(os.path.basename(path))[0] for path in paths]
+    labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
+
+    tubes = energy = None
+    columns = choose_columns(results, times) if any(r.frames for r in results) else []
+    if kind != "energy" and columns:
+        tubes = TubePanel(results, labels, columns)
+    drawable = [i for i, r in enumerate(results) if "energy" in r.series]
+    if kind != "profiles" and drawable:
+        marked = [column.time for column in columns if column.time is not None]
+        energy = EnergyPanel([results[i] for i in drawable], [labels[i] for i in drawable], marked, term_labels)
+    panels = [panel for panel in (tubes, energy) if panel]
+    if not panels:
+        wanted = {"profiles": "no frames", "energy": "no energy series", "all": "neither frames nor an energy series"}
+        raise BadInput(f"{', '.join(paths)}: {wanted[kind]} to draw")
+
+    bars = 0.62 if tubes else 0.0
+    title = 0.2 if len(results) == 1 else 0.0
+    figure = Figure(figsize=(style.WIDTH, title + sum(panel.height for panel in panels) + bars + 0.1))
+    top = figure.get_figheight() - 0.05
+    if title:
+        figure.text(0.5, top / figure.get_figheight(), ", ".join(labels[0]), ha="center", va="top", fontsize=9)
+        top -= title
+    for letter, panel in zip("ab", panels):
+        top -= panel.height
+        panel.draw(figure, top)
+        if len(panels) > 1:
+            figure.text(0.01, (top + panel.height) / figure.get_figheight(), f"({letter})", va="top", fontsize=9)
+        if panel is tubes:
+            top -= bars
+            tubes.draw_colour_bars(figure, top + 0.08)
+    style.save(figure, outputs)
+
+
+def main():
+    options = arguments()
+    base = os.path.splitext(options.results[0])[0]
+    outputs = options.output or [base + ".png", base + ".svg"]
+    try:
+        times = [float(time) for time in options.times.split(",") if time]
+    except ValueError:
+        print(f"tubule plot: --times: '{options.times}' is not a list of numbers t1,t2,...", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    for module, package in DEBIAN_PACKAGES.items():
+        try:
+            __import__(module)
+        except ImportError:
+            print(f"tubule plot: {sys.executable} has no {module}; install the package {package}", file=sys.stderr)
+            return EXIT_UNAVAILABLE
+    # A result file never changes in place, so there is nothing to lock against; on some disks locks fail.
+    os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    from results import BadInput
+
+    try:
+        draw(options.results, outputs, times, options.kind, dict(term.split("=", 1) for term in options.term))
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return EXIT_BAD_INPUT
+    for path in outputs:
+        print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,235 @@
+"""Panel (a): one row of tubes a result, one column a time; left halves coloured by H, right halves by K."""
+
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from labels import number, wrapped
+from results import BadInput
+from style import WIDTH, time_name, time_text
+
+MAX_COLUMNS = 6
+MAX_HEIGHT = 5.6  # inches of all rows together
+MAX_TUBE_WIDTH = 1.5  # inches
+COLUMN_GAP, ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.14, 0.24, 16
+SCALE_BAR = 0.3  # inches right of the last column
+STRIPS = 40  # across half a tube
+MIN_POINTS, POINTS_PER_INCH = 300, 150  # along a tube
+COVERED = 0.98  # part of all membrane area whose curvature lies inside the colour scale
+MARGIN = 1.25  # the colour scale reaches further than that by this factor
+ROUNDING = 1e-9  # a uniform tube has K = 0 but for this, which must not be blown up to full colour
+H_COLOURS, K_COLOURS = "PuOr", "RdBu_r"
+
+
+@dataclass
+class Column:
+    time: float | None  # None: the last state of runs that ended before the first common time or after the last
+    cells: list  # a Frame or None for each result
+    stops: list  # why the run ended with this frame, or None
+
+
+def same_time(a, b, span):
+    return abs(a - b) <= 1e-6 * abs(b) + 1e-12 * span
+
+
+def choose_columns(results, times=None):
+    """Columns of frames at the wanted times, else at up to six of the times there are, evenly by number.
+
+    Times that all results have go before others. Of several results, the last frame of one that did not get
+    to its end is no common time: it stands, with the reason, in the first later column.
+    """
+    span = max(result.end_time for result in results)
+    lone = len(results) == 1
+
+    def is_stop(result, frame):
+        return result.stopped_early is not None and frame is result.frames[-1]
+
+    def has(result, time):
+        """A frame at that time, or none to expect because the run had stopped."""
+        ended = result.stopped_early is not None and result.end_time < time
+        return ended or any(same_time(frame.time, time, span) for frame in result.frames)
+
+    candidates = []
+    for time in sorted(f.time for r in results for f in r.frames if lone or not is_stop(r, f)):
+        if not candidates or not same_time(time, candidates[-1], span):
+            candidates.append(time)
+    shared = [time for time in candidates if all(has(result, time) for result in results)]
+    if len(shared) > 2:
+        candidates = shared
+    if times:
+        available = sorted({f.time for r in results for f in r.frames})
+        for time in times:
+            if not any(same_time(time, other, span) for other in available):
+                known = ", ".join(time_text(t) for t in available[:12]) + (", ..." if len(available) > 12 else "")
+                raise BadInput(f"--times: no result has a frame at t = {number(time)}; there are frames at {known}")
+        candidates = sorted(set(times))
+    elif len(candidates) > MAX_COLUMNS:
+        picks = np.linspace(0, len(candidates) - 1, MAX_COLUMNS).round().astype(int)
+        candidates = [candidates[i] for i in picks]
+
+    columns = [Column(time, [None] * len(results), [None] * len(results)) for time in candidates]
+    last = Column(None, [None] * len(results), [None] * len(results))
+    for row, result in enumerate(results):
+        for frame in result.frames:
+            column = next((c for c in columns if same_time(frame.time, c.time, span)), None)
+            if column is None and is_stop(result, frame) and not times:
+                column = next((c for c in columns if c.time > frame.time), last)
+            if column:
+                column.cells[row] = frame
+                column.stops[row] = result.stopped_early if is_stop(result, frame) else None
+    return columns + ([last] if any(last.cells) else [])
+
+
+def _caption(column, row):
+    """Why the run of a row ended with the frame in this column, and when unless the column's header says it."""
+    stop, frame = column.stops[row], column.cells[row]
+    if not stop:
+        return ""
+    shown = column.time is not None and same_time(frame.time, column.time, frame.time)
+    return stop if shown else f"{stop}\nt = {time_text(frame.time)}"
+
+
+def colour_scale(values, areas, centre):
+    """A symmetric scale around `centre` that covers nearly all area: a pinching neck does not bleach the rest."""
+    distance = np.abs(np.concatenate(values) - centre)
+    area = np.concatenate(areas)
+    order = np.argsort(distance)
+    covered = np.cumsum(area[order]) / area.sum()
+    half = MARGIN * distance[order][min(np.searchsorted(covered, COVERED), distance.size - 1)]
+    if half < ROUNDING * max(1.0, abs(centre)):
+        half = max(1.0, abs(centre))
+    beyond_low = any((v < centre - half).any() for v in values)
+    beyond_high = any((v > centre + half).any() for v in values)
+    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond_low, beyond_high]
+    return Normalize(centre - half, centre + half), extend
+
+
+def _area(frame):
+    return np.abs(frame.r) * np.hypot(np.gradient(frame.r), np.gradient(frame.z)) + 1e-300
+
+
+class TubePanel:
+    """Sizes everything in inches first, so that the figure can be made to fit; then draws."""
+
+    def __init__(self, results, labels, columns):
+        self.results, self.columns = results, columns
+        lone = len(results) == 1  # its label is the title of the picture
+        self.labels = [""] if lone else [wrapped(label, LABEL_WIDTH) for label in labels]
+        frames = [frame for column in columns for frame in column.cells if frame]
+        self.frames = frames
+        lines = [line for label in self.labels for line in label.split("\n")]
+        self.left = 0.2 + 0.062 * max(map(len, lines))
+
+        widths = [2 * max(frame.r.max() for frame in column.cells if frame) for column in columns]
+        lengths = [max((f.length for f in cells if f), default=0.0) for cells in zip(*(c.cells for c in columns))]
+        self.captions = [[_caption(column, row) for column in columns] for row in range(len(results))]
+        captions = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
+        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - COLUMN_GAP * len(columns)
+        room_y = MAX_HEIGHT - sum(captions) - ROW_GAP * len(results)
+        self.scale = min(room_x / sum(widths), room_y / sum(lengths), MAX_TUBE_WIDTH / max(widths))
+
+        # A label or a column header needs room even where the tube is small.
+        cell_widths = [max(self.scale * width, 0.62) for width in widths]
+        squeeze = room_x / max(room_x, sum(cell_widths))
+        pitch = [squeeze * width + COLUMN_GAP for width in cell_widths]
+        slack = (room_x + COLUMN_GAP * len(columns) - sum(pitch)) / len(columns)
+        slack = min(slack, 0.5)
+        self.centres = self.left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
+        label_heights = [0.14 * (label.count("\n") + 1) for label in self.labels]
+        tube_heights = [max(self.scale * length, label) for length, label in zip(lengths, label_heights)]
+        self.height = HEADER + sum(tube_heights) + sum(captions) + ROW_GAP * len(results)
+        tops = self.height - HEADER - np.cumsum([0, *(t + c + ROW_GAP for t, c in zip(tube_heights, captions))][:-1])
+        self.middles = [top - tall / 2 for top, tall in zip(tops, tube_heights)]
+        if lone:
+            occupied = self.centres[0] - self.scale * widths[0] / 2, self.centres[-1] + self.scale * widths[-1] / 2
+            self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
+        self.right = self.centres[-1] + self.scale * widths[-1] / 2
+
+        common_H0 = {result.H0 for result in results}
+        self.H_centre = common_H0.pop() if len(common_H0) == 1 else 0.0
+        areas = [_area(frame) for frame in frames]
+        self.H_norm, self.H_extend = colour_scale([frame.H for frame in frames], areas, self.H_centre)
+        self.K_norm, self.K_extend = colour_scale([frame.K for frame in frames], areas, 0.0)
+
+    def draw(self, figure, bottom):
+        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        width, height = figure.get_size_inches()
+        axes = figure.add_axes([0, bottom / height, 1, self.height / height])
+        axes.set(xlim=(0, width), ylim=(0, self.height))
+        axes.axis("off")
+        for index, (column, x) in enumerate(zip(self.columns, self.centres)):
+            title = "last state" if column.time is None else f"{time_name(index)} = {time_text(column.time)}"
+            axes.text(x, self.height - 0.06, title, ha="center", va="top")
+            captions = [row[index] for row in self.captions]
+            for frame, caption, y in zip(column.cells, captions, self.middles):
+                if frame:
+                    self._draw_tube(axes, frame, x, y)
+                if caption:
+                    below = y - self.scale * frame.length / 2 - 0.07
+                    axes.text(x, below, caption, ha="center", va="top", fontsize=6.5, linespacing=1.1)
+        for label, y in zip(self.labels, self.middles):
+            axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
+        self._draw_scale_bar(axes)
+
+    def _draw_tube(self, axes, frame, x, y):
+        points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))
+        place = np.linspace(0, frame.z.size - 1, points)  # as dense as the frame's own samples where those are dense
+
+        def sampled(values):
+            return np.interp(place, np.arange(frame.z.size), values)
+
+        r = self.scale * sampled(frame.r)
+        z = self.scale * sampled(frame.z - (frame.z.min() + frame.z.max()) / 2) + y
+        # Strips even in the angle around the axis; the light comes from the reader, from a little above.
+        s = np.sin(np.linspace(0, np.pi / 2, STRIPS + 1))
+        middle = (s[1:] + s[:-1]) / 2
+        slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened: necks would go black
+        lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
+        shade = (0.7 + 0.3 * np.clip(lit, 0, 1))[..., None]
+        for side, values, norm, colours in (
+            (-1, frame.H, self.H_norm, H_COLOURS),
+            (1, frame.K, self.K_norm, K_COLOURS),
+        ):
+            values = sampled(values)
+            rgb = plt.get_cmap(colours)(norm((values[1:] + values[:-1]) / 2))[:, None, :3] * shade
+            corners = np.stack([x + side * r[:, None] * s, np.broadcast_to(z[:, None], (z.size, s.size))], axis=-1)
+            mesh = QuadMesh(corners, antialiased=False, rasterized=True, linewidth=0, zorder=1)
+            mesh.set_facecolor(rgb.reshape(-1, 3))
+            axes.add_collection(mesh, autolim=False)
+            axes.plot(x + side * r, z, color="0.1", linewidth=0.7, solid_capstyle="butt", zorder=3)
+        reach = 0.5 * self.scale * frame.length + 0.05
+        axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
+
+    def _draw_scale_bar(self, axes):
+        longest = max(frame.length for frame in self.frames)
+        bar = float(f"{longest / 2:.0e}")
+        size = self.scale * bar
+        x, y = self.right + 0.14, self.middles[-1] - self.scale * longest / 2
+        axes.plot([x, x], [y, y + size], color="0.1", linewidth=1.0, solid_capstyle="butt")
+        axes.text(x + 0.05, y + size / 2, number(bar), ha="left", va="center", fontsize=7)
+
+    def draw_colour_bars(self, figure, bottom):
+        """Two colour bars in the 0.5 inches above `bottom`."""
+        width, height = figure.get_size_inches()
+        H_label = "mean curvature H (left halves)"
+        if self.H_centre:
+            H_label += f", white: H\u2080 = {number(self.H_centre)}"
+        bars = (
+            (0.12, self.H_norm, H_COLOURS, self.H_extend, H_label),
+            (0.56, self.K_norm, K_COLOURS, self.K_extend, "Gaussian curvature K (right halves)"),
+        )
+        for left, norm, colours, extend, label in bars:
+            axes = figure.add_axes([left, (bottom + 0.38) / height, 0.34, 0.09 / height])
+            bar = figure.colorbar(ScalarMappable(norm, colours), cax=axes, orientation="horizontal", extend=extend)
+            bar.outline.set_linewidth(0.5)
+            bar.set_label(label, labelpad=2)
+            bar.ax.tick_params(width=0.5, length=2.5)
+            bar.locator = MaxNLocator(5)
+            bar.formatter = FuncFormatter(lambda value, _: number(value))
+            bar.solids.set_rasterized(True)
+            bar.solids.set_edgecolor("face")

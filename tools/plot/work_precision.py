@@ -1,0 +1,94 @@
+#!/usr/bin/python3
+"""Draws error against CPU time from a table with the columns series, energy_asked, error, estimate, cpu_ms."""
+
+import argparse
+import csv
+import os
+import sys
+
+COLUMNS = ("energy_asked", "error", "estimate", "cpu_ms")
+# CPU milliseconds of the prototype with settings tuned by hand, quintic B-splines, for the errors it then had.
+PROTOTYPE = ((1e-4, 0.51), (1e-6, 1.3), (1e-8, 4.8))
+FLOOR = 1e-16  # an error of zero is drawn here
+
+
+def read_table(path):
+    """{series: rows of COLUMNS, by accuracy asked, coarse first}. Raises BadInput."""
+    from results import BadInput
+
+    lines = {}
+    try:
+        with open(path, newline="") as file:
+            for row in csv.DictReader(file):
+                values = tuple(float(row[name]) for name in COLUMNS)
+                if not all(0 <= value < float("inf") for value in values):
+                    raise ValueError(f"a value is negative or not finite in {values}")
+                lines.setdefault(row["series"], []).append(values)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise BadInput(f"{path}: must have the columns series, {', '.join(COLUMNS)} with numbers ({error})") from error
+    if not lines:
+        raise BadInput(f"{path}: has no rows")
+    return {name: sorted(rows, reverse=True) for name, rows in lines.items()}
+
+
+def draw(path, outputs):
+    """Error filled, the program's own estimate of it hollow above; dotted lines at the accuracies asked for."""
+    import numpy as np
+    import style
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    style.check_outputs(outputs)
+    lines = read_table(path)
+    figure = Figure(figsize=(style.WIDTH * 0.68, 3.2))
+    axes = figure.add_axes([0.135, 0.125, 0.73, 0.845])
+    reference = np.array(PROTOTYPE)
+    handles = [Line2D([], [], color="0.55", linestyle="--", marker="D", markersize=4, label="prototype, tuned by hand")]
+    axes.loglog(reference[:, 1], reference[:, 0], color="0.55", linestyle="--", marker="D", markersize=4, zorder=1)
+    for index, ((name, rows), colour) in enumerate(zip(lines.items(), style.line_colours(len(lines)))):
+        _, error, estimate, cpu = np.array(rows).T
+        error, estimate = np.maximum(error, FLOOR), np.maximum(estimate, FLOOR)
+        marker = style.MARKERS[index % len(style.MARKERS)]
+        axes.loglog(cpu, error, color=colour, marker=marker, zorder=3)
+        axes.loglog(cpu, estimate, color=colour, marker=marker, mfc="white", linestyle="", zorder=3)
+        axes.vlines(cpu, np.minimum(error, estimate), np.maximum(error, estimate), colors=[colour], lw=0.6, zorder=2)
+        handles.append(Line2D([], [], color=colour, marker=marker, label=name))
+    hollow = {"color": "0.3", "marker": "o", "mfc": "white", "linestyle": ""}
+    handles.append(Line2D([], [], label="estimate by the run itself", **hollow))
+    axes.set_xlabel("CPU time of a whole run (ms)")
+    axes.set_ylabel("largest error of the energy, relative")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    for asked in sorted({row[0] for rows in lines.values() for row in rows}):
+        axes.axhline(asked, color="0.6", linewidth=0.6, linestyle=":", zorder=0)
+        text = "asked: " + f"{asked:.0e}".replace("e-0", "e-")
+        axes.annotate(text, (1, asked), (4, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                      va="center", fontsize=6.5, color="0.35")
+    axes.margins(x=0.08, y=0.1)
+    axes.legend(handles=handles, loc="best")
+    style.save(figure, outputs)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("table")
+    parser.add_argument("-o", "--output", action="append", required=True)
+    options = parser.parse_args()
+    from results import BadInput
+
+    try:
+        draw(options.table, options.output)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return 2
+    for path in options.output:
+        print(os.path.relpath(path))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
