@@ -176,6 +176,7 @@ void Flow::interpolate(double t, double* x, double* v) const {
 }
 
 Eigen::VectorXd Flow::acceleration() const {
+    if (order() < 2) return Eigen::VectorXd::Zero(N_VGetLength(impl_->x));
     require(IDAGetDky(impl_->ida, impl_->time, 2, impl_->scratch), "the acceleration");
     return Eigen::Map<const Eigen::VectorXd>(data(impl_->scratch), N_VGetLength(impl_->x));
 }

@@ -47,7 +47,7 @@ public:
     const double* v() const;  // the rates that solve the flow's equations, not the slope of the dense output
     // State at a time within the last step (dense output of the order of the step).
     void interpolate(double t, double* x, double* v) const;
-    // Second derivative of the coefficients in time at the end of the last step.
+    // Second derivative of the coefficients in time at the end of the last step; 0 if that was of order 1.
     Eigen::VectorXd acceleration() const;
     double dissipated(double t) const;  // INT dissipation dt from t0 to a time within the last step
     double step_size() const;           // of the last step

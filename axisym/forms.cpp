@@ -20,6 +20,9 @@ using Pack = stdx::simd<double, stdx::simd_abi::deduce_t<double, lanes>>;
 Pack load(const double* p) {
     return Pack(p, stdx::vector_aligned);
 }
+void store(const Pack& v, double* p) {
+    v.copy_to(p, stdx::vector_aligned);
+}
 
 // The density and its derivatives in H and K, summed over the terms in use.
 template <class T>
@@ -105,14 +108,23 @@ template <int P>
             const auto energy = energy_density<1>(bending_, at.r, at.r1, at.r2, p);
             const Pack weight = load(basis.weight);
             const Pack drag = (2 * pi) * at.r * p.inverse_speed.v * gather<P>(basis, dofs, v);
-            const Pack c0 = weight * (energy.d[0] + drag), c1 = weight * energy.d[1], c2 = weight * energy.d[2];
+            // Through memory: a broadcast load is cheaper than taking a lane out of a register.
+            alignas(32) double c[3][lanes];
+            store(weight * (energy.d[0] + drag), c[0]);
+            store(weight * energy.d[1], c[1]);
+            store(weight * energy.d[2], c[2]);
             for (int q = 0; q < lanes; ++q) {
                 const auto& s = basis.by_spline[q];
-                low += c0[q] * load(s[0]) + c1[q] * load(s[1]) + c2[q] * load(s[2]);
-                high += c0[q] * load(s[0] + lanes) + c1[q] * load(s[1] + lanes) + c2[q] * load(s[2] + lanes);
+                for (int d = 0; d < 3; ++d) {
+                    low += c[d][q] * load(s[d]);
+                    high += c[d][q] * load(s[d] + lanes);
+                }
             }
         }
-        for (int a = 0; a <= P; ++a) F[dofs[a]] += images_ * (a < lanes ? low[a] : high[a - lanes]);
+        alignas(32) double local[wide];
+        store(low, local);
+        store(high, local + lanes);
+        for (int a = 0; a <= P; ++a) F[dofs[a]] += images_ * local[a];
     }
     return stdx::hmin(smallest) > 0;
 }
@@ -134,26 +146,40 @@ template <int P>
             // Drag 2 pi (r/g) v and its derivatives in r, r', v.
             const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
             const Pack drag_r = drag * rate, drag_r1 = (2 * pi) * weight * at.r * rate * p.inverse_speed.d[1];
-            const Pack c[3][3] = {{weight * energy.dd[0] + drag_r + cj * at.r * drag, weight * energy.dd[1] + drag_r1,
-                                   weight * energy.dd[2]},
-                                  {weight * energy.dd[1], weight * energy.dd[3], weight * energy.dd[4]},
-                                  {weight * energy.dd[2], weight * energy.dd[4], weight * energy.dd[5]}};
+            alignas(32) double c[3][3][lanes];
+            store(weight * energy.dd[0] + drag_r + cj * at.r * drag, c[0][0]);
+            store(weight * energy.dd[1] + drag_r1, c[0][1]);
+            store(weight * energy.dd[1], c[1][0]);
+            store(weight * energy.dd[2], c[0][2]);
+            store(weight * energy.dd[2], c[2][0]);
+            store(weight * energy.dd[3], c[1][1]);
+            store(weight * energy.dd[4], c[1][2]);
+            store(weight * energy.dd[4], c[2][1]);
+            store(weight * energy.dd[5], c[2][2]);
             for (int q = 0; q < lanes; ++q) {
                 const auto& s = basis.by_spline[q];
+#pragma GCC unroll 8
                 for (int half = 0; half * lanes <= P; ++half) {
                     Pack column[3];  // c contracted with the splines a, the rows of the local matrix
+#pragma GCC unroll 8
                     for (int d = 0; d < 3; ++d) {
-                        column[d] = Pack(0.0);
-                        for (int k = 0; k < 3; ++k) column[d] += c[k][d][q] * load(s[k] + half * lanes);
+                        column[d] = c[0][d][q] * load(s[0] + half * lanes);
+                        for (int k = 1; k < 3; ++k) column[d] += c[k][d][q] * load(s[k] + half * lanes);
                     }
+#pragma GCC unroll 8
                     for (int b = 0; b <= P; ++b)
                         local[b][half] += s[0][b] * column[0] + s[1][b] * column[1] + s[2][b] * column[2];
                 }
             }
         }
         const int* slot = &slots_[static_cast<std::size_t>(e) * w * w];
-        for (int b = 0; b <= P; ++b)
-            for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * local[b][a / lanes][a % lanes];
+        alignas(32) double column[wide];
+#pragma GCC unroll 8
+        for (int b = 0; b <= P; ++b) {
+            store(local[b][0], column);
+            store(local[b][1], column + lanes);
+            for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * column[a];
+        }
     }
 }
 

@@ -161,12 +161,12 @@ double ProfileSpace::value(const double* c, int element, double z) const {
 }
 
 double ProfileSpace::extremum_near(const double* c, double z) const {
-    for (int iteration = 0; iteration < 3; ++iteration) {
+    for (int iteration = 0; iteration < 4; ++iteration) {
         const int e = element_at(z);
         const auto [r, r1, r2] = evaluate(c, e, z);
-        if (r2 == 0) break;
-        const double reach = breaks_[e + 1] - breaks_[e];
-        z = std::clamp(z - std::clamp(r1 / r2, -reach, reach), cell_.z0, cell_.z1);
+        const double reach = breaks_[e + 1] - breaks_[e], before = z;
+        if (r2 != 0) z = std::clamp(z - std::clamp(r1 / r2, -reach, reach), cell_.z0, cell_.z1);
+        if (std::abs(z - before) < 0.02 * reach) break;  // the next step would be smaller than 1e-3, r exact to 1e-6 of it
     }
     return z;
 }

@@ -18,11 +18,13 @@ namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions.md, "Ask for accuracy".
-constexpr double stated_over_computed = 1.25;     // error stated / error computed by the transport
-constexpr double tolerance_per_accuracy = 0.5;    // time tolerance / asked accuracy
-constexpr double defect_per_accuracy = 1.0 / 25;  // defect at which to remesh / (asked accuracy * E_ref)
-constexpr double remesh_margin = 1.0 / 50;        // defect after a remesh / defect before
-constexpr double start_margin = 1.0 / 500;        // defect of the start / defect at which to remesh
+constexpr double stated_over_computed = 1.8;      // error stated / error computed by the transport
+constexpr double tolerance_per_accuracy = 0.4;    // time tolerance / asked accuracy
+constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh / (asked accuracy * E_ref)
+constexpr double remesh_margin = 1.0 / 10;        // defect after a remesh / defect before
+constexpr double start_margin = 1.0 / 3000;       // defect of the start / defect at which to remesh
+constexpr int error_steps = 8;                    // the error is carried on after so many steps, or when
+constexpr double error_change = 0.25;             // the logarithm of the dissipation changed so much
 constexpr int most_attempts = 8;
 constexpr int most_elements = 4000;  // of one cell
 constexpr int fewest_elements = 3;
@@ -128,6 +130,7 @@ private:
     int steps_since_error_ = 0, failures_ = 0;
     Eigen::VectorXd good_x_;
     double good_t_ = 0;
+    double margin_ = remesh_margin;
     double last_row_ = -1, last_frame_ = -1;
     std::vector<double> row_;
 };
@@ -307,7 +310,7 @@ void Attempt::write_outputs(double until, const Observation& o) {
 
 // True if the error is beyond what was asked and something can be done about it.
 bool Attempt::estimate_error(const Observation& o) {
-    stage_->transport.advance();
+    if (steps_since_error_ > 0) stage_->transport.advance();
     excess = stage_->transport.energy_error(o.energy);
     dissipation_last_ = o.dissipation;
     steps_since_error_ = 0;
@@ -386,7 +389,6 @@ std::optional<StopReport> Attempt::remesh(double target) {
                                       place(o.z_steep)),
                           "ask for less accuracy"};
     }
-    stage_->transport.advance();
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
     auto next = std::make_unique<Stage>(stage_->space.cell(), std::move(breaks), case_);
     const Eigen::VectorXd projected = next->space.prolong(stage_->space, x);
@@ -435,7 +437,7 @@ std::optional<StopReport> Attempt::go() {
         const Observation o = observe(t, flow_->x(), flow_->v());
         stage_->transport.add_step(t - before, flow_->x(), flow_->v());
         const double change = std::abs(std::log(o.dissipation / dissipation_last_));
-        if (++steps_since_error_ >= 12 || !(change < 0.25) || outcome != Flow::Outcome::step)
+        if (++steps_since_error_ >= error_steps || !(change < error_change) || outcome != Flow::Outcome::step)
             if (estimate_error(o)) return std::nullopt;
         write_outputs(t, o);
         if (last_row_ < t) write_row(t, o, flow_->x(), dissipated_before_ + flow_->dissipated(t));
@@ -445,7 +447,13 @@ std::optional<StopReport> Attempt::go() {
         failures_ = 0;
         stop = check(outcome, o);
         const double lost = std::accumulate(defect_.begin(), defect_.end(), 0.0);
-        if (!stop && settings_.free_mesh && lost > settings_.defect) stop = remesh(settings_.defect * remesh_margin);
+        if (!stop && settings_.free_mesh && lost > settings_.defect) {
+            if (estimate_error(o)) return std::nullopt;
+            // A shape that keeps sharpening gets more room each time: every remesh restarts the integrator.
+            const bool soon = flow_->counters().steps < 50;
+            margin_ = soon && summary.meshes > 1 ? std::max(margin_ / 8, 1e-3) : remesh_margin;
+            stop = remesh(settings_.defect * margin_);
+        }
     }
     return end_with(*stop);
 }
@@ -491,8 +499,11 @@ void accuracy_missed(const Case& c, RunSummary& summary) {
 }
 
 // After a run that was not accurate enough: what to compute with instead.
-Settings tightened(Settings s, const ErrorTransport::EnergyError& error, double allowed) {
-    const auto shrink = [&](double part) { return std::clamp(0.35 * allowed / part, 0.01, 0.6); };
+// The error was caught when it passed what is
+// allowed, not at its largest: the more often that happened, the bolder the next try.
+Settings tightened(Settings s, const ErrorTransport::EnergyError& error, double allowed, int attempt) {
+    const double goal = attempt == 1 ? 0.35 : 0.1;
+    const auto shrink = [&](double part) { return std::clamp(goal * allowed / part, 0.01, 0.6); };
     const double of_time = std::abs(error.total - error.spatial), of_space = std::abs(error.spatial);
     if (s.free_time && of_time > 0.3 * allowed) s.time_tolerance = std::max(s.time_tolerance * shrink(of_time), 1e-14);
     if (s.free_mesh && of_space > 0.3 * allowed) s.defect *= shrink(of_space);
@@ -520,7 +531,8 @@ RunSummary run(const Case& c, RunObserver& observer, const Record* restart) {
             if (!summary.as_accurate_as_asked && summary.stop.reason == Stop::finished) accuracy_missed(c, summary);
             return summary;
         }
-        settings = tightened(settings, attempt.excess, asked * attempt.summary.reference_energy / stated_over_computed);
+        settings =
+            tightened(settings, attempt.excess, asked * attempt.summary.reference_energy / stated_over_computed, count);
         observer.discard();
     }
 }
