@@ -41,6 +41,7 @@ void ErrorTransport::begin(const double* x, const double* v) {
 }
 
 void ErrorTransport::add_step(double h, const double* x, const double* v) {
+    if (h == 0) return;  // below the resolution of the time: the next step spans it
     const int n = coarse_.space().size();
     next_state_.noalias() = prolongation_ * Eigen::Map<const Eigen::VectorXd>(x, n);
     next_rate_.noalias() = prolongation_ * Eigen::Map<const Eigen::VectorXd>(v, n);

@@ -97,15 +97,14 @@ void require(int status, const char* what) {
 
 }  // namespace
 
-Flow::Flow(const Forms& forms, const Eigen::VectorXd& x0, double t0, const TimeControl& control, Observe observe,
-           std::function<Guards(const Observation&)> guards)
+Flow::Flow(const Forms& forms, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+           const TimeControl& control, Observe observe, std::function<Guards(const Observation&)> guards)
     : impl_(std::make_unique<Impl>(forms)) {
     Impl& s = *impl_;
     static_assert(sizeof(sunindextype) == sizeof(std::int64_t) || sizeof(sunindextype) == sizeof(int));
     s.observe = std::move(observe);
     s.guards = std::move(guards);
     s.time = t0;
-    const Eigen::VectorXd v0 = forms.rate(x0);
     const int n = static_cast<int>(x0.size());
     require(SUNContext_Create(nullptr, &s.context), "a context");
     s.x = N_VNew_Serial(n, s.context);

@@ -32,9 +32,9 @@ public:
     // Called at the end of each step with the time, the coefficients and their rates.
     using Observe = std::function<const Observation&(double t, const double* x, const double* v)>;
 
-    // forms must outlive the flow. Throws SolveError if the rate at x0 cannot be found.
-    Flow(const Forms& forms, const Eigen::VectorXd& x0, double t0, const TimeControl& control, Observe observe,
-         std::function<Guards(const Observation&)> guards);
+    // forms must outlive the flow; v0 are the rates at x0 (Forms::rate).
+    Flow(const Forms& forms, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+         const TimeControl& control, Observe observe, std::function<Guards(const Observation&)> guards);
     ~Flow();
     Flow(Flow&&) = delete;
 

@@ -10,19 +10,21 @@
 #include <numeric>
 #include <set>
 
+#include "axisym/derivatives.hpp"
 #include "axisym/error_transport.hpp"
 #include "axisym/frame.hpp"
 #include "axisym/start.hpp"
+#include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions.md, "Ask for accuracy".
 constexpr double stated_over_computed = 1.8;      // error stated / error computed by the transport
-constexpr double tolerance_per_accuracy = 0.4;    // time tolerance / asked accuracy
+constexpr double tolerance_per_accuracy = 0.35;   // time tolerance / asked accuracy
 constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh / (asked accuracy * E_ref)
 constexpr double remesh_margin = 1.0 / 10;        // defect after a remesh / defect before
-constexpr double start_margin = 1.0 / 3000;       // defect of the start / defect at which to remesh
+constexpr double start_margin = 1.0 / 4;          // defect of the start / defect at which to remesh
 constexpr int error_steps = 8;                    // the error is carried on after so many steps, or when
 constexpr double error_change = 0.25;             // the logarithm of the dissipation changed so much
 constexpr int most_attempts = 8;
@@ -30,6 +32,7 @@ constexpr int most_elements = 4000;  // of one cell
 constexpr int fewest_elements = 3;
 constexpr double overhang_steepness = 30;  // see Observation::steepness
 constexpr double hopeless_error = 0.1;     // of E_ref: explicit settings that lose the shape
+constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
 
 enum Guard { neck_floor, vertical_tangent, well_posed };
 
@@ -92,15 +95,21 @@ public:
     ErrorTransport::EnergyError excess;
 
 private:
+    std::vector<double> first_breaks(const Cell& cell, const std::function<double(double)>& start);
     const Observation& observe(double t, const double* x, const double* v);
     Observation look(const double* x, const double* v);
-    void make_flow(const Eigen::VectorXd& x, double t, double first_step);
+    void make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
     void use_stage(std::unique_ptr<Stage> stage);
     std::optional<StopReport> remesh(double target);
+    double first_step_after(const Eigen::VectorXd& x) const;
     std::optional<StopReport> recover();
+    std::optional<StopReport> step();
+    StopReport give_up(const std::string& what);
+    std::string suspects() const;
     StopReport end_with(const StopReport& stop);
     bool estimate_error(const Observation& o);
     std::optional<StopReport> check(Flow::Outcome outcome, const Observation& o);
+    Flow::Guards guards(const Observation& o) const;
     StopReport guard_report(int guard, const Observation& o) const;
     void write_outputs(double until, const Observation& o);
     void write_row(double t, const Observation& o, const double* x, double dissipated);
@@ -112,7 +121,7 @@ private:
     RunObserver& out_;
     Settings settings_;
     std::chrono::steady_clock::time_point started_;
-    bool may_give_up_;  // if too inaccurate, for another attempt
+    bool may_give_up_, gave_up_ = false;  // if too inaccurate, for another attempt
     std::vector<int> modes_;
     std::vector<std::array<Eigen::VectorXd, 2>> mode_functionals_;
     std::vector<double> outputs_;
@@ -131,6 +140,7 @@ private:
     Eigen::VectorXd good_x_;
     double good_t_ = 0;
     double margin_ = remesh_margin;
+    std::optional<double> least_symbol_;  // of a flow that is well-posed
     double last_row_ = -1, last_frame_ = -1;
     std::vector<double> row_;
 };
@@ -165,7 +175,7 @@ void Attempt::use_stage(std::unique_ptr<Stage> stage) {
     summary.elements = stage_->space.elements() * stage_->space.cell().images();
 }
 
-void Attempt::make_flow(const Eigen::VectorXd& x, double t, double first_step) {
+void Attempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step) {
     if (flow_) {
         dissipated_before_ += flow_->dissipated(flow_->time());
         counters_before_ += flow_->counters();
@@ -178,47 +188,56 @@ void Attempt::make_flow(const Eigen::VectorXd& x, double t, double first_step) {
     control.first_step = first_step;
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
     flow_ = std::make_unique<Flow>(
-        stage_->forms, x, t, control,
+        stage_->forms, x, v, t, control,
         [this](double t, const double* x, const double* v) -> const Observation& { return observe(t, x, v); },
         [this](const Observation& o) {
-            return Flow::Guards{o.r_min - case_.accuracy.r_min, overhang_steepness - o.steepness, o.symbol};
+            return guards(o);
         });
     stage_->transport.begin(flow_->x(), flow_->v());
     dissipation_last_ = observe(t, flow_->x(), flow_->v()).dissipation;
+    const auto negative = [](double k) { return k < 0; };
+    if (!least_symbol_)  // a symbol that cannot change its sign may come as close to 0 as it likes
+        least_symbol_ = std::ranges::any_of(case_.energy.k, negative) ? symbol_lost * now_.symbol : 0;
     steps_since_error_ = 0;
     good_x_ = x;
     good_t_ = t;
 }
 
-void Attempt::begin() {
-    const Tube& tube = std::get<Tube>(case_.shape);
+// Breaks that will do for the start and, as far as that can be foreseen, for what the flow makes of it. Sets
+// E_ref, and with it the defect that is tolerated.
+std::vector<double> Attempt::first_breaks(const Cell& cell, const std::function<double(double)>& start) {
     const Discretisation& d = case_.discretisation;
-    const Cell cell = cell_of(tube, d.symmetry);
-    const auto start = [&](double z) { return radius_at(tube, z); };
     int most_waves = 0;
-    for (const TubeMode& mode : tube.modes) most_waves = std::max(most_waves, mode.n);
+    for (const TubeMode& mode : std::get<Tube>(case_.shape).modes) most_waves = std::max(most_waves, mode.n);
     const int first = d.elements ? std::max(2, (*d.elements + cell.images() - 1) / cell.images())
-                                 : std::max(fewest_elements, 6 * most_waves / cell.images());
+                                 : std::max(fewest_elements, 8 * most_waves / cell.images());
+    const double share = settings_.defect;
     auto breaks = uniform_breaks(cell, first);
-    for (int pass = 0; pass < 12; ++pass) {
+    for (int pass = 0;; ++pass) {
         const ProfileSpace space = space_of(cell, breaks, case_);
         const Forms forms(space, case_.energy);
-        const Eigen::VectorXd x = space.project(start), rest = Eigen::VectorXd::Zero(x.size());
-        if (pass == 0) {
-            summary.reference_energy = forms.reference_energy(x);
-            settings_.defect *= summary.reference_energy;
-        }
-        forms.observe(x.data(), rest.data(), &defect_);
+        const Eigen::VectorXd x = space.project(start);
+        summary.reference_energy = forms.reference_energy(x);
+        settings_.defect = share * summary.reference_energy;
+        if (!settings_.free_mesh || pass == 8 || space.elements() >= most_elements) return breaks;
+        defect_ = foreseen_defect(forms, x, case_.time.end);
         const double lost = std::accumulate(defect_.begin(), defect_.end(), 0.0);
-        if (!settings_.free_mesh || lost < settings_.defect * start_margin || space.elements() >= most_elements) break;
+        if (lost < settings_.defect * start_margin) return breaks;
         breaks = adapted_breaks(space, defect_, settings_.defect * start_margin / 2, fewest_elements);
     }
+}
+
+void Attempt::begin() {
+    const Tube& tube = std::get<Tube>(case_.shape);
+    const Cell cell = cell_of(tube, case_.discretisation.symmetry);
+    const auto start = [&](double z) { return radius_at(tube, z); };
+    auto breaks = first_breaks(cell, start);
     use_stage(std::make_unique<Stage>(cell, std::move(breaks), case_));
     const Eigen::VectorXd x = stage_->space.project(start);
     ErrorTransport& transport = stage_->transport;
     transport.total = transport.spatial =
         transport.space().project(start) - transport.space().prolong(stage_->space, x);
-    make_flow(x, 0, 0);
+    make_flow(x, stage_->forms.rate(x), 0, 0);
     energy_start_ = now_.energy;
     write_row(0, now_, flow_->x(), 0);
     write_frame(0, now_, flow_->x(), flow_->v(), 0);
@@ -237,7 +256,7 @@ void Attempt::resume(const Record& restart) {
     error_max_ = state.error_max;
     next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), restart.time) - outputs_.begin();
     last_row_ = last_frame_ = restart.time;
-    make_flow(state.coefficients, restart.time, 0);
+    make_flow(state.coefficients, stage_->forms.rate(state.coefficients), restart.time, 0);
 }
 
 void Attempt::write_row(double t, const Observation& o, const double* x, double dissipated) {
@@ -308,7 +327,7 @@ void Attempt::write_outputs(double until, const Observation& o) {
     }
 }
 
-// True if the error is beyond what was asked and something can be done about it.
+// True, and the attempt is given up, if the error is beyond what was asked and something can be done about it.
 bool Attempt::estimate_error(const Observation& o) {
     if (steps_since_error_ > 0) stage_->transport.advance();
     excess = stage_->transport.energy_error(o.energy);
@@ -319,8 +338,13 @@ bool Attempt::estimate_error(const Observation& o) {
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
     if (error_now_ <= allowed || !may_give_up_) return false;
     const double of_time = std::abs(excess.total - excess.spatial);
-    return (settings_.free_mesh && std::abs(excess.spatial) > 0.4 * allowed) ||
-           (settings_.free_time && of_time > 0.4 * allowed);
+    gave_up_ = (settings_.free_mesh && std::abs(excess.spatial) > 0.4 * allowed) ||
+               (settings_.free_time && of_time > 0.4 * allowed);
+    return gave_up_;
+}
+
+Flow::Guards Attempt::guards(const Observation& o) const {
+    return {o.r_min - case_.accuracy.r_min, overhang_steepness - o.steepness, o.symbol - least_symbol_.value_or(0)};
 }
 
 StopReport Attempt::guard_report(int guard, const Observation& o) const {
@@ -381,7 +405,7 @@ std::optional<StopReport> Attempt::check(Flow::Outcome outcome, const Observatio
 std::optional<StopReport> Attempt::remesh(double target) {
     const double t = flow_->time();
     const Observation o = now_;
-    auto breaks = adapted_breaks(stage_->space, defect_, target, fewest_elements);
+    auto breaks = refined_breaks(stage_->space, defect_, target);
     if (static_cast<int>(breaks.size()) > most_elements + 1) {
         if (o.steepness > overhang_steepness / 4) return guard_report(vertical_tangent, o);
         return StopReport{Stop::resolution_lost, t,
@@ -393,69 +417,108 @@ std::optional<StopReport> Attempt::remesh(double target) {
     auto next = std::make_unique<Stage>(stage_->space.cell(), std::move(breaks), case_);
     const Eigen::VectorXd projected = next->space.prolong(stage_->space, x);
     next->transport.inherit(stage_->transport, x, projected);
-    // Such that backward Euler, with which the integration begins again, has the asked local error.
-    const Eigen::VectorXd acceleration = flow_->acceleration();
-    double norm = 0;
-    for (int i = 0; i < x.size(); ++i)
-        norm += std::pow(acceleration[i] / (settings_.time_tolerance * std::abs(x[i])), 2);
-    const double first_step = std::min(0.5 * std::sqrt(2 / std::sqrt(norm / x.size())), flow_->step_size());
+    const double dt = first_step_after(x);
     use_stage(std::move(next));
-    // The flow refers to the forms of its stage and must go first; its counters are wanted still.
-    make_flow(projected, t, first_step);
+    // The profile is the same, but on the new mesh its knots want to move, little and fast. Linearly implicit Euler
+    // damps that, where the integrator would chase it with steps of next to nothing: two steps for that, and a third
+    // whose error is accounted for.
+    const Forms& forms = stage_->forms;
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(projected.size());
+    Eigen::SparseMatrix<double> matrix = forms.pattern();
+    SparseLu lu;
+    std::array<Eigen::VectorXd, 4> states{projected}, rates;
+    for (int k = 1; k <= 3; ++k) {
+        forms.jacobian(states[k - 1].data(), rest.data(), 1 / dt, matrix.valuePtr());
+        lu.factor(matrix);
+        rates[k] = -lu.solve(forms.gradient(states[k - 1])) / dt;
+        states[k] = states[k - 1] + dt * rates[k];
+    }
+    make_flow(states[3], rates[3], t + 3 * dt, dt);
+    dissipated_before_ += 3 * dt * o.dissipation;
+    stage_->transport.begin(states[2].data(), rates[2].data());
+    stage_->transport.add_step(dt, states[3].data(), rates[3].data());
+    steps_since_error_ = 1;
     ++summary.meshes;
     return std::nullopt;
 }
 
+// Such that backward Euler, with which the integration begins again, has the asked local error from x on, and does
+// not pass an output.
+double Attempt::first_step_after(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd acceleration = flow_->acceleration();
+    double norm = 0;
+    for (int i = 0; i < x.size(); ++i)
+        norm += std::pow(acceleration[i] / (settings_.time_tolerance * std::abs(x[i])), 2);
+    const double step = std::min(0.5 * std::sqrt(2 / std::sqrt(norm / x.size())), flow_->step_size());
+    return std::min(step, 0.3 * (outputs_[next_output_] - flow_->time()));
+}
+
+// Names the terms whose derivatives are wrong at the last good state, if any.
+std::string Attempt::suspects() const {
+    std::string keys;
+    for (const TermCheck& term : check_terms(stage_->forms, good_x_))
+        if (!term.check.pass()) keys += (keys.empty() ? "" : ", ") + term.key;
+    return keys.empty() ? "the derivatives of all terms are right" : "wrong derivatives: " + keys;
+}
+
+StopReport Attempt::give_up(const std::string& what) {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(good_x_.size());
+    const Observation o = look(good_x_.data(), rest.data());
+    if (o.steepness > overhang_steepness / 4) return guard_report(vertical_tangent, o);
+    return {Stop::solver_failed, good_t_, fmt::format("{} ({})", what, suspects()),
+            "ask for more accuracy, or lower discretisation.time_order"};
+}
+
 std::optional<StopReport> Attempt::recover() {
     const std::string said = flow_->failure();
-    if (++failures_ > 3) {
-        const Observation o = look(good_x_.data(), flow_->v());
-        if (o.steepness > overhang_steepness / 4) return guard_report(vertical_tangent, o);
-        return StopReport{Stop::solver_failed, good_t_, fmt::format("the time integrator gave up: {}", said),
-                          "ask for more accuracy, or lower discretisation.time_order"};
-    }
-    make_flow(good_x_, good_t_, 0);
+    if (++failures_ > 3) return give_up("the time integrator gave up: " + said);
+    make_flow(good_x_, stage_->forms.rate(good_x_), good_t_, 0);
     return std::nullopt;
 }
 
 std::optional<StopReport> Attempt::go() {
     // A start beyond a limit stops at once: the integrator only sees limits being crossed.
-    const Flow::Guards guards{now_.r_min - case_.accuracy.r_min, overhang_steepness - now_.steepness, now_.symbol};
+    const Flow::Guards values = guards(now_);
     for (int i = 0; i < Flow::n_guards; ++i)
-        if (guards[i] <= 0) return end_with(guard_report(i, now_));
+        if (values[i] <= 0) return end_with(guard_report(i, now_));
 
     std::optional<StopReport> stop;
-    while (!stop) {
-        const double before = flow_->time();
-        const Flow::Outcome outcome = flow_->advance(case_.time.end);
-        if (outcome == Flow::Outcome::failed) {
-            stop = recover();
-            continue;
-        }
-        const double t = flow_->time();
-        if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
-        const Observation o = observe(t, flow_->x(), flow_->v());
-        stage_->transport.add_step(t - before, flow_->x(), flow_->v());
-        const double change = std::abs(std::log(o.dissipation / dissipation_last_));
-        if (++steps_since_error_ >= error_steps || !(change < error_change) || outcome != Flow::Outcome::step)
-            if (estimate_error(o)) return std::nullopt;
-        write_outputs(t, o);
-        if (last_row_ < t) write_row(t, o, flow_->x(), dissipated_before_ + flow_->dissipated(t));
-        out_.progress(t, o.energy, flow_->step_size());
-        good_x_ = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
-        good_t_ = t;
-        failures_ = 0;
-        stop = check(outcome, o);
-        const double lost = std::accumulate(defect_.begin(), defect_.end(), 0.0);
-        if (!stop && settings_.free_mesh && lost > settings_.defect) {
-            if (estimate_error(o)) return std::nullopt;
-            // A shape that keeps sharpening gets more room each time: every remesh restarts the integrator.
-            const bool soon = flow_->counters().steps < 50;
-            margin_ = soon && summary.meshes > 1 ? std::max(margin_ / 8, 1e-3) : remesh_margin;
-            stop = remesh(settings_.defect * margin_);
-        }
+    try {
+        while (!stop && !gave_up_) stop = step();
+    } catch (const SolveError& error) {
+        stop = give_up(error.what());
     }
+    if (gave_up_) return std::nullopt;
     return end_with(*stop);
+}
+
+// One step of the integrator, and all that is due after it.
+std::optional<StopReport> Attempt::step() {
+    const double before = flow_->time();
+    const Flow::Outcome outcome = flow_->advance(case_.time.end);
+    if (outcome == Flow::Outcome::failed) return recover();
+    const double t = flow_->time();
+    if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    const Observation o = observe(t, flow_->x(), flow_->v());
+    stage_->transport.add_step(t - before, flow_->x(), flow_->v());
+    const double change = std::abs(std::log(o.dissipation / dissipation_last_));
+    if (++steps_since_error_ >= error_steps || !(change < error_change) || outcome != Flow::Outcome::step)
+        if (estimate_error(o)) return std::nullopt;
+    write_outputs(t, o);
+    if (last_row_ < t) write_row(t, o, flow_->x(), dissipated_before_ + flow_->dissipated(t));
+    out_.progress(t, o.energy, flow_->step_size());
+    good_x_ = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
+    good_t_ = t;
+    failures_ = 0;
+    if (const auto stop = check(outcome, o)) return stop;
+    if (settings_.free_mesh && std::accumulate(defect_.begin(), defect_.end(), 0.0) > settings_.defect) {
+        if (estimate_error(o)) return std::nullopt;
+        // A shape that keeps sharpening gets more room each time: every remesh restarts the integrator.
+        const bool soon = flow_->counters().steps < 50;
+        margin_ = soon && summary.meshes > 1 ? std::max(margin_ / 8, 1e-3) : remesh_margin;
+        return remesh(settings_.defect * margin_);
+    }
+    return std::nullopt;
 }
 
 // Saves the state of a run that ended before its time, and sums up.
@@ -502,11 +565,14 @@ void accuracy_missed(const Case& c, RunSummary& summary) {
 // The error was caught when it passed what is
 // allowed, not at its largest: the more often that happened, the bolder the next try.
 Settings tightened(Settings s, const ErrorTransport::EnergyError& error, double allowed, int attempt) {
-    const double goal = attempt == 1 ? 0.35 : 0.1;
-    const auto shrink = [&](double part) { return std::clamp(goal * allowed / part, 0.01, 0.6); };
+    const double boldness = attempt == 1 ? 1 : 0.3;
+    const auto shrink = [&](double goal, double part) {
+        return std::clamp(boldness * goal * allowed / part, 0.01, 0.6);
+    };
     const double of_time = std::abs(error.total - error.spatial), of_space = std::abs(error.spatial);
-    if (s.free_time && of_time > 0.3 * allowed) s.time_tolerance = std::max(s.time_tolerance * shrink(of_time), 1e-14);
-    if (s.free_mesh && of_space > 0.3 * allowed) s.defect *= shrink(of_space);
+    if (s.free_time && of_time > 0.3 * allowed)
+        s.time_tolerance = std::max(s.time_tolerance * shrink(0.35, of_time), 1e-14);
+    if (s.free_mesh && of_space > 0.3 * allowed) s.defect *= shrink(0.15, of_space);
     return s;
 }
 

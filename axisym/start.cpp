@@ -6,6 +6,8 @@
 #include <numeric>
 #include <optional>
 
+#include "common/solve/sparse.hpp"
+
 namespace tubule::axisym {
 namespace {
 
@@ -47,53 +49,103 @@ std::vector<double> uniform_breaks(const Cell& cell, int n) {
     return breaks;
 }
 
-std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
-                                   int fewest) {
-    // The defect of an element of size h is c h^(2p-1). Equal shares mean h ~ c^(-1/(2p-1)).
-    constexpr int parts = 4;
+std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span) {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size()), force = forms.gradient(x);
+    std::vector<double> largest, defect;
+    forms.observe(x.data(), rest.data(), &largest);
+    Eigen::SparseMatrix<double> matrix = forms.pattern();
+    SparseLu lu;
+    for (double dt = span; dt > 5e-7 * span; dt /= 10) {
+        forms.jacobian(x.data(), rest.data(), 1 / dt, matrix.valuePtr());
+        try {
+            lu.factor(matrix);
+        } catch (const SolveError&) {
+            continue;  // a step this long goes nowhere; shorter ones may
+        }
+        const Eigen::VectorXd ahead = x - lu.solve(force);
+        if (!(forms.observe(ahead.data(), rest.data(), &defect).r_min > 0)) continue;
+        for (std::size_t e = 0; e < defect.size(); ++e) largest[e] = std::max(largest[e], defect[e]);
+    }
+    return largest;
+}
+
+namespace {
+
+// Elements per length that are wanted, constant between edges; each element of the mesh has `parts` such pieces.
+struct Density {
+    static constexpr int parts = 4;
+    std::vector<double> edges, value;
+    double width(int i) const { return edges[i + 1] - edges[i]; }
+    double integral() const {
+        double sum = 0;
+        for (std::size_t i = 0; i < value.size(); ++i) sum += value[i] * width(static_cast<int>(i));
+        return sum;
+    }
+};
+
+// The defect of an element of size h is c h^(2p-1). Equal shares mean h ~ c^(-1/(2p-1)).
+Density wanted_density(const ProfileSpace& space, const std::vector<double>& defect, double target, int fewest) {
     constexpr double growth = 0.35;  // of the element size per distance
-    const int exponent = 2 * space.degree() - 1, n = space.elements();
-    std::vector<double> edges, density;  // elements per length, up to a factor
-    for (int e = 0; e < n; ++e) {
+    const int exponent = 2 * space.degree() - 1;
+    Density d;
+    for (int e = 0; e < space.elements(); ++e) {
         const double z = space.breaks()[e], h = space.breaks()[e + 1] - z;
-        for (int i = 0; i < parts; ++i) {
-            edges.push_back(z + h * i / parts);
-            density.push_back(std::pow(defect[e] + 1e-300, 1.0 / exponent) / h);
+        for (int i = 0; i < Density::parts; ++i) {
+            d.edges.push_back(z + h * i / Density::parts);
+            d.value.push_back(std::pow(defect[e] + 1e-300, 1.0 / exponent) / h);
         }
     }
-    edges.push_back(space.breaks().back());
-    const int m = static_cast<int>(density.size());
-    const auto width = [&](int i) { return edges[i + 1] - edges[i]; };
-    const auto integral = [&] {
-        double sum = 0;
-        for (int i = 0; i < m; ++i) sum += density[i] * width(i);
-        return sum;
-    };
+    d.edges.push_back(space.breaks().back());
     // n equal shares of (INT density / n)^(2p-1) each. A density raised to even out the sizes needs more elements,
     // but costs no accuracy: count from the raw one.
-    const double needed = std::pow(std::pow(integral(), exponent) / target, 1.0 / (exponent - 1));
-    const double scale = std::max(needed, 1.0) / integral();
-    for (double& d : density) d = std::max(d * scale, fewest / space.cell().length());
+    const double raw = d.integral();
+    const double needed = std::pow(std::pow(raw, exponent) / target, 1.0 / (exponent - 1));
+    for (double& v : d.value) v = std::max(v * std::max(needed, 1.0) / raw, fewest / space.cell().length());
+    const int m = static_cast<int>(d.value.size());
+    const bool mirror = space.cell().mirror;
     const auto limit = [&](int i, int from) {  // size(i) <= size(from) + growth * distance
-        const double distance = (width(i) + width(from)) / 2;
-        density[i] = std::max(density[i], 1 / (1 / density[from] + growth * distance));
+        const double distance = (d.width(i) + d.width(from)) / 2;
+        d.value[i] = std::max(d.value[i], 1 / (1 / d.value[from] + growth * distance));
     };
-    for (int sweep = 0; sweep < (space.cell().mirror ? 1 : 2); ++sweep) {
+    for (int sweep = 0; sweep < (mirror ? 1 : 2); ++sweep) {
         for (int i = 0; i < m; ++i)
-            if (i > 0 || !space.cell().mirror) limit(i, i > 0 ? i - 1 : m - 1);
+            if (i > 0 || !mirror) limit(i, i > 0 ? i - 1 : m - 1);
         for (int i = m - 1; i >= 0; --i)
-            if (i + 1 < m || !space.cell().mirror) limit(i, i + 1 < m ? i + 1 : 0);
+            if (i + 1 < m || !mirror) limit(i, i + 1 < m ? i + 1 : 0);
     }
-    const int elements = std::max(fewest, static_cast<int>(std::ceil(integral())));
+    return d;
+}
+
+}  // namespace
+
+std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+                                   int fewest) {
+    const Density d = wanted_density(space, defect, target, fewest);
+    const int elements = std::max(fewest, static_cast<int>(std::ceil(d.integral())));
+    const double share = d.integral() / elements;
     std::vector<double> breaks{space.cell().z0};
-    double sum = 0, share = integral() / elements;
-    for (int i = 0; i < m; ++i) {
-        const double here = density[i] * width(i);
+    double sum = 0;
+    for (std::size_t i = 0; i < d.value.size(); ++i) {
+        const double here = d.value[i] * d.width(static_cast<int>(i));
         while (static_cast<int>(breaks.size()) < elements && sum + here >= share * breaks.size())
-            breaks.push_back(edges[i] + width(i) * (share * breaks.size() - sum) / here);
+            breaks.push_back(d.edges[i] + d.width(static_cast<int>(i)) * (share * breaks.size() - sum) / here);
         sum += here;
     }
     breaks.push_back(space.cell().z1);
+    return breaks;
+}
+
+std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target) {
+    const Density d = wanted_density(space, defect, target, 1);
+    std::vector<double> breaks{space.cell().z0};
+    for (int e = 0; e < space.elements(); ++e) {
+        double wanted = 0;
+        for (int i = e * Density::parts; i < (e + 1) * Density::parts; ++i) wanted += d.value[i] * d.width(i);
+        const double z = space.breaks()[e], h = space.breaks()[e + 1] - z;
+        const int pieces = std::max(1, static_cast<int>(std::ceil(wanted - 0.2)));
+        for (int i = 1; i < pieces; ++i) breaks.push_back(z + h * i / pieces);
+        breaks.push_back(space.breaks()[e + 1]);
+    }
     return breaks;
 }
 

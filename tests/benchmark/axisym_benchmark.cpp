@@ -1,0 +1,69 @@
+// Whole runs of the figure's case, settings chosen by the program: choosing them and the error estimate are included,
+// reading the case and writing the file are not. Counters: error against the independent reference and error
+// stated by the program, both relative; compare ratios within one run of this program.
+#include <benchmark/benchmark.h>
+
+#include "axisym/forms.hpp"
+#include "axisym/start.hpp"
+#include "tests/benchmark/figure_case.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+void figure_run(benchmark::State& state) {
+    Case c = figure_case();
+    c.accuracy.energy = std::pow(10.0, -static_cast<double>(state.range(0)));
+    RunSummary summary;
+    double error = 0;
+    for (auto _ : state) {
+        ErrorWatch watch;
+        summary = run(c, watch);
+        error = watch.error;
+    }
+    state.counters["error_of_E0"] = error;
+    state.counters["stated_of_Eref"] = summary.estimated_error;
+    state.counters["steps"] = static_cast<double>(summary.counters.steps);
+    state.counters["elements"] = summary.elements;
+    state.counters["attempts"] = summary.attempts;
+}
+BENCHMARK(figure_run)->DenseRange(3, 9)->Unit(benchmark::kMillisecond)->Name("figure_run/digits");
+
+// The kernels, per call on one cell of 8 elements.
+struct Kernel {
+    Cell cell{0.5, 1.5, true, 1};
+    ProfileSpace space;
+    Forms forms;
+    Eigen::VectorXd x, v, out;
+    std::vector<double> values;
+    explicit Kernel(int degree)
+        : space(cell, uniform_breaks(cell, 8), degree, degree - 1),
+          forms(space, figure_case().energy),
+          x(space.project([](double z) { return 1 + 0.25 * std::sin(std::numbers::pi * z); })),
+          v(forms.rate(x)),
+          out(x.size()),
+          values(forms.pattern().nonZeros()) {}
+};
+
+void residual(benchmark::State& state) {
+    Kernel k(static_cast<int>(state.range(0)));
+    for (auto _ : state) benchmark::DoNotOptimize(k.forms.residual(k.x.data(), k.v.data(), k.out.data()));
+}
+void jacobian(benchmark::State& state) {
+    Kernel k(static_cast<int>(state.range(0)));
+    for (auto _ : state) {
+        k.forms.jacobian(k.x.data(), k.v.data(), 1.0, k.values.data());
+        benchmark::ClobberMemory();
+    }
+}
+void observe(benchmark::State& state) {
+    Kernel k(static_cast<int>(state.range(0)));
+    for (auto _ : state) benchmark::DoNotOptimize(k.forms.observe(k.x.data(), k.v.data()).energy);
+}
+BENCHMARK(residual)->Arg(3)->Arg(5)->Arg(7)->Name("residual/degree");
+BENCHMARK(jacobian)->Arg(3)->Arg(5)->Arg(7)->Name("jacobian/degree");
+BENCHMARK(observe)->Arg(3)->Arg(5)->Arg(7)->Name("observe/degree");
+
+}  // namespace
+}  // namespace tubule::axisym
+
+BENCHMARK_MAIN();
