@@ -261,7 +261,7 @@ template <int P>
             o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(stdx::min(s, stdx::min(symbol(p.kappa_s), symbol(vertex)))));
             if (stiffness) {
                 const Pack ig2 = p.inverse_speed * p.inverse_speed;
-                stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * s);
+                stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
             }
             for (int q = 0; q < lanes; ++q) {
                 if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];

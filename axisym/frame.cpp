@@ -75,7 +75,7 @@ Record frame_record(double time, const ProfileSpace& space, const RestartState& 
                   array("restart_numbers",
                         std::vector<double>{cell.z0, cell.z1, cell.mirror ? 1.0 : 0.0, static_cast<double>(cell.copies),
                                             s.reference_energy, s.energy_start, s.dissipated, s.error_max,
-                                            s.time_tolerance, s.defect})};
+                                            s.time_tolerance, s.defect, s.least_symbol})};
     return out;
 }
 
@@ -85,12 +85,12 @@ RestartState restart_state(const Record& record) {
         return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(a.data.data(), a.data.size()));
     };
     const std::vector<double>& n = find(record, "restart_numbers").data;
-    if (n.size() != 10)
+    if (n.size() != 11)
         throw std::runtime_error("no restart record of tier axisym: restart_numbers has another length");
     RestartState s;
     s.cell = {n[0], n[1], n[2] != 0, static_cast<int>(n[3])};
     s.reference_energy = n[4], s.energy_start = n[5], s.dissipated = n[6];
-    s.error_max = n[7], s.time_tolerance = n[8], s.defect = n[9];
+    s.error_max = n[7], s.time_tolerance = n[8], s.defect = n[9], s.least_symbol = n[10];
     s.breaks = find(record, "restart_breaks").data;
     s.coefficients = vector("restart_coefficients");
     s.error_total = vector("restart_error_total");

@@ -30,7 +30,7 @@ constexpr double error_change = 0.25;             // the logarithm of the dissip
 constexpr int most_attempts = 8;
 constexpr int most_elements = 4000;  // of one cell
 constexpr int fewest_elements = 3;
-constexpr double overhang_steepness = 30;  // see Observation::steepness
+constexpr double overhang_steepness = 20;  // see Observation::steepness
 constexpr double hopeless_error = 0.1;     // of E_ref: explicit settings that lose the shape
 constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
 
@@ -190,9 +190,7 @@ void Attempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, doub
     flow_ = std::make_unique<Flow>(
         stage_->forms, x, v, t, control,
         [this](double t, const double* x, const double* v) -> const Observation& { return observe(t, x, v); },
-        [this](const Observation& o) {
-            return guards(o);
-        });
+        [this](const Observation& o) { return guards(o); });
     stage_->transport.begin(flow_->x(), flow_->v());
     dissipation_last_ = observe(t, flow_->x(), flow_->v()).dissipation;
     const auto negative = [](double k) { return k < 0; };
@@ -254,6 +252,7 @@ void Attempt::resume(const Record& restart) {
     energy_start_ = state.energy_start;
     dissipated_before_ = state.dissipated;
     error_max_ = state.error_max;
+    least_symbol_ = state.least_symbol;
     next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), restart.time) - outputs_.begin();
     last_row_ = last_frame_ = restart.time;
     make_flow(state.coefficients, stage_->forms.rate(state.coefficients), restart.time, 0);
@@ -297,6 +296,7 @@ Record Attempt::record(double t, const Observation& o, const double* x, const do
     state.energy_start = energy_start_;
     state.dissipated = dissipated;
     state.error_max = error_max_;
+    state.least_symbol = least_symbol_.value_or(0);
     return frame_record(t, stage_->space, state, Eigen::Map<const Eigen::VectorXd>(v, stage_->space.size()), o.energy);
 }
 
@@ -385,15 +385,18 @@ std::optional<StopReport> Attempt::check(Flow::Outcome outcome, const Observatio
         return StopReport{Stop::stationary, t, fmt::format("the energy dissipates at {:.3g} only", o.dissipation), ""};
     if (case_.time.limit && seconds_since(started_) > *case_.time.limit)
         return StopReport{Stop::time_limit, t, fmt::format("time.limit = {} s is used up", *case_.time.limit),
-                          "go on with --resume, or raise time.limit"};
+                          "go on with --resume"};
     if (out_.interrupted()) return StopReport{Stop::interrupted, t, "interrupted by a signal", "go on with --resume"};
     const double hopeless = hopeless_error * summary.reference_energy;
-    if (error_now_ > hopeless)
+    if (error_now_ > hopeless) {
+        const bool asked = !settings_.free_mesh || !settings_.free_time;
         return StopReport{
             Stop::resolution_lost, t,
-            fmt::format("the error of the energy reached {:.2g} of E_ref with the discretisation asked for",
-                        error_now_ / summary.reference_energy),
-            "leave discretisation.elements and discretisation.time_tolerance to the program, or refine them"};
+            fmt::format("the error of the energy reached {:.2g} of E_ref{}", error_now_ / summary.reference_energy,
+                        asked ? " with the discretisation asked for" : ""),
+            asked ? "leave discretisation.elements and discretisation.time_tolerance to the program, or refine them"
+                  : "ask for more accuracy: errors of this start are amplified on the way"};
+    }
     if (o.symbol_3d <= 0 && summary.warnings.empty())
         summary.warnings.push_back(
             fmt::format("from t = {:.6g} on, the flow of the full surface is ill-posed in directions that axisymmetric "
@@ -418,25 +421,26 @@ std::optional<StopReport> Attempt::remesh(double target) {
     const Eigen::VectorXd projected = next->space.prolong(stage_->space, x);
     next->transport.inherit(stage_->transport, x, projected);
     const double dt = first_step_after(x);
+    const Eigen::VectorXd rate =
+        next->space.prolong(stage_->space, Eigen::Map<const Eigen::VectorXd>(flow_->v(), stage_->space.size()));
     use_stage(std::move(next));
     // The profile is the same, but on the new mesh its knots want to move, little and fast. Linearly implicit Euler
-    // damps that, where the integrator would chase it with steps of next to nothing: two steps for that, and a third
-    // whose error is accounted for.
+    // damps that, where the integrator would chase it with steps of next to nothing.
     const Forms& forms = stage_->forms;
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(projected.size());
     Eigen::SparseMatrix<double> matrix = forms.pattern();
     SparseLu lu;
-    std::array<Eigen::VectorXd, 4> states{projected}, rates;
-    for (int k = 1; k <= 3; ++k) {
-        forms.jacobian(states[k - 1].data(), rest.data(), 1 / dt, matrix.valuePtr());
+    Eigen::VectorXd damped = projected, slope;
+    for (int k = 0; k < 3; ++k) {
+        forms.jacobian(damped.data(), rest.data(), 1 / dt, matrix.valuePtr());
         lu.factor(matrix);
-        rates[k] = -lu.solve(forms.gradient(states[k - 1])) / dt;
-        states[k] = states[k - 1] + dt * rates[k];
+        slope = -lu.solve(forms.gradient(damped)) / dt;
+        damped += dt * slope;
     }
-    make_flow(states[3], rates[3], t + 3 * dt, dt);
+    make_flow(damped, slope, t + 3 * dt, dt);
     dissipated_before_ += 3 * dt * o.dissipation;
-    stage_->transport.begin(states[2].data(), rates[2].data());
-    stage_->transport.add_step(dt, states[3].data(), rates[3].data());
+    stage_->transport.begin(projected.data(), rate.data());
+    stage_->transport.add_step(3 * dt, damped.data(), slope.data());
     steps_since_error_ = 1;
     ++summary.meshes;
     return std::nullopt;
@@ -449,8 +453,9 @@ double Attempt::first_step_after(const Eigen::VectorXd& x) const {
     double norm = 0;
     for (int i = 0; i < x.size(); ++i)
         norm += std::pow(acceleration[i] / (settings_.time_tolerance * std::abs(x[i])), 2);
-    const double step = std::min(0.5 * std::sqrt(2 / std::sqrt(norm / x.size())), flow_->step_size());
-    return std::min(step, 0.3 * (outputs_[next_output_] - flow_->time()));
+    const double step = std::min(0.3 * std::sqrt(2 / std::sqrt(norm / x.size())), flow_->step_size());
+    // Not beyond the next output, and not so small that the time would not notice.
+    return std::max(std::min(step, 0.3 * (outputs_[next_output_] - flow_->time())), 1e-12 * flow_->time());
 }
 
 // Names the terms whose derivatives are wrong at the last good state, if any.
@@ -511,7 +516,9 @@ std::optional<StopReport> Attempt::step() {
     good_t_ = t;
     failures_ = 0;
     if (const auto stop = check(outcome, o)) return stop;
-    if (settings_.free_mesh && std::accumulate(defect_.begin(), defect_.end(), 0.0) > settings_.defect) {
+    const bool output_is_near = outputs_[next_output_] - t < 1e-9 * t;
+    if (settings_.free_mesh && !output_is_near &&
+        std::accumulate(defect_.begin(), defect_.end(), 0.0) > settings_.defect) {
         if (estimate_error(o)) return std::nullopt;
         // A shape that keeps sharpening gets more room each time: every remesh restarts the integrator.
         const bool soon = flow_->counters().steps < 50;

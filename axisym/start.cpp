@@ -63,7 +63,8 @@ std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x
             continue;  // a step this long goes nowhere; shorter ones may
         }
         const Eigen::VectorXd ahead = x - lu.solve(force);
-        if (!(forms.observe(ahead.data(), rest.data(), &defect).r_min > 0)) continue;
+        const Observation o = forms.observe(ahead.data(), rest.data(), &defect);
+        if (!(o.r_min > 0 && o.symbol > 0)) continue;  // not where the flow goes
         for (std::size_t e = 0; e < defect.size(); ++e) largest[e] = std::max(largest[e], defect[e]);
     }
     return largest;
@@ -92,7 +93,7 @@ Density wanted_density(const ProfileSpace& space, const std::vector<double>& def
         const double z = space.breaks()[e], h = space.breaks()[e + 1] - z;
         for (int i = 0; i < Density::parts; ++i) {
             d.edges.push_back(z + h * i / Density::parts);
-            d.value.push_back(std::pow(defect[e] + 1e-300, 1.0 / exponent) / h);
+            d.value.push_back(std::pow(std::max(defect[e], 0.0) + 1e-300, 1.0 / exponent) / h);
         }
     }
     d.edges.push_back(space.breaks().back());

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,41 +33,21 @@ struct RunOptions {
     bool resume = false, quiet = false, expect = false, check_derivatives = false;
 };
 
-// Hands a run's rows and frames to the result file and keeps what [expect] will ask for.
+// Hands a run's rows and frames to the result file.
 class Recorder : public axisym::RunObserver {
 public:
     Recorder(const Case& c, ResultWriter& writer, bool quiet, double begin)
-        : writer_(writer), progress_(begin, c.time.end, {.quiet = quiet}) {
-        for (const Expectation& e : c.expect.values)
-            if (e.time) kept_times_.push_back(*e.time);
-    }
-    void row(std::span<const double> values) override {
-        writer_.row(values);
-        last_.assign(values.begin(), values.end());
-        if (std::find(kept_times_.begin(), kept_times_.end(), values[0]) != kept_times_.end()) kept_.push_back(last_);
-    }
+        : writer_(writer), progress_(begin, c.time.end, {.quiet = quiet}) {}
+    void row(std::span<const double> values) override { writer_.row(values); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
     void checkpoint(const Record& state) override { writer_.checkpoint(state); }
-    void discard() override {
-        writer_.discard();
-        kept_.clear();
-    }
+    void discard() override { writer_.discard(); }
     void progress(double time, double energy, double step) override { progress_(time, energy, step); }
     bool interrupted() override { return tubule::interrupted(); }
-
-    // The row at a time, or the last one.
-    const std::vector<double>* row_at(std::optional<double> time) const {
-        if (!time) return last_.empty() ? nullptr : &last_;
-        for (const auto& row : kept_)
-            if (row[0] == *time) return &row;
-        return nullptr;
-    }
 
 private:
     ResultWriter& writer_;
     Progress progress_;
-    std::vector<double> kept_times_, last_;
-    std::vector<std::vector<double>> kept_;
 };
 
 std::filesystem::path result_path(const RunOptions& options, const Case& c) {
@@ -112,28 +93,41 @@ About about_end(const Case& c, const axisym::RunSummary& s, double wall_seconds)
     return about;
 }
 
-// Expectations that were not met, one line each.
-std::vector<std::string> unmet(const Case& c, const axisym::RunSummary& summary, const Recorder& recorder) {
+// Why a result's run ended; nothing if it is unfinished.
+std::optional<Stop> stop_of(const Result& result) {
+    for (const auto& [name, value] : result.about)
+        if (name == "stop") return stop_from_name(std::get<std::string>(value));
+    return std::nullopt;
+}
+
+// Expectations that a complete result does not meet, one line each.
+std::vector<std::string> unmet(const Case& c, const Result& result) {
     std::vector<std::string> lines;
-    const Stop expected = c.expect.stop.value_or(Stop::finished);
-    if (summary.stop.reason != expected)
-        lines.push_back(fmt::format("stop is {}, expected {}", name(summary.stop.reason), name(expected)));
-    const auto names = axisym::series_names(c);
+    const Stop stop = stop_of(result).value(), expected = c.expect.stop.value_or(Stop::finished);
+    if (stop != expected) lines.push_back(fmt::format("stop is {}, expected {}", name(stop), name(expected)));
+    const std::vector<double>& times = result.series.at("time");
     for (const Expectation& e : c.expect.values) {
-        const auto column = std::find(names.begin(), names.end(), e.series) - names.begin();
         const std::string where = e.time ? fmt::format("{} at t = {}", e.series, *e.time) : e.series + " at the end";
-        const std::vector<double>* row = recorder.row_at(e.time);
-        if (!row || column == static_cast<std::ptrdiff_t>(names.size())) {
+        const auto series = result.series.find(e.series);
+        const auto row = e.time ? std::find(times.begin(), times.end(), *e.time) : times.end() - 1;
+        if (series == result.series.end() || row == times.end()) {
             lines.push_back(fmt::format("{} was not computed", where));
             continue;
         }
-        const double found = (*row)[column];
+        const double found = series->second[row - times.begin()];
         const double allowed = std::max(e.abs.value_or(0), e.rel.value_or(0) * std::abs(e.value));
         if (!(std::abs(found - e.value) <= allowed))
             lines.push_back(
                 fmt::format("{} is {:.12g}, expected {:.12g} within {:.3g}", where, found, e.value, allowed));
     }
     return lines;
+}
+
+// Exit status of a result that is to be as expected, which is said where it is not.
+int compare(const Case& c, const std::filesystem::path& file) {
+    const std::vector<std::string> lines = unmet(c, read_result(file));
+    for (const std::string& line : lines) fmt::print(stderr, "{}: not as expected: {}\n", c.path, line);
+    return lines.empty() ? 0 : 1;
 }
 
 void report(const Case& c, const axisym::RunSummary& s, const std::filesystem::path& file, double seconds) {
@@ -155,18 +149,37 @@ bool derivatives_pass(const Case& c) {
     return pass;
 }
 
-// What a result already holds decides whether there is anything to resume.
-std::optional<ResultWriter> resumed(const Case& c, const std::filesystem::path& file) {
+struct Opened {
+    ResultWriter writer;
+    std::optional<Record> restart;
+};
+
+Opened create(const Case& c, const std::filesystem::path& file) {
+    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), axisym::series_names(c)), std::nullopt};
+}
+
+// Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
+std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
     const Result old = read_result(file);
     if (old.case_text.text != c.text || old.case_text.sets != c.sets)
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
                                     file.string(), c.path));
-    for (const auto& [name, value] : old.about)
-        if (name == "stop") {
-            const auto stop = stop_from_name(std::get<std::string>(value));
-            if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
-        }
-    return ResultWriter::resume(file);
+    const auto stop = stop_of(old);
+    if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
+    if (old.frames.empty() && !old.checkpoint) return create(c, file);
+    ResultWriter writer = ResultWriter::resume(file);
+    Record restart = writer.restart_record();
+    return Opened{std::move(writer), std::move(restart)};
+}
+
+// A result that cannot be written or resumed is found before anything is computed: bad input.
+std::optional<Opened> open_result(const Case& c, const std::filesystem::path& file, bool resuming) {
+    try {
+        if (resuming && std::filesystem::exists(file)) return resume(c, file);
+        return create(c, file);
+    } catch (const std::runtime_error& error) {
+        throw CaseError(error.what());
+    }
 }
 
 int run_case(Case c, const RunOptions& options) {
@@ -180,43 +193,48 @@ int run_case(Case c, const RunOptions& options) {
             if (e.time) c.time.output.push_back(*e.time);
 
     const auto started = std::chrono::steady_clock::now();
-    std::optional<ResultWriter> writer;
-    if (options.resume && std::filesystem::exists(file)) {
-        writer = resumed(c, file);
-        if (!writer) {
-            fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
-            return 0;
-        }
+    std::optional<Opened> result = open_result(c, file, options.resume);
+    if (!result) {
+        if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
+        return options.expect ? compare(c, file) : 0;
     }
-    std::optional<Record> restart;
-    if (writer)
-        restart = writer->restart_record();
-    else
-        writer = ResultWriter::create(file, {c.text, c.sets}, about_start(), axisym::series_names(c));
+    auto& [writer, restart] = *result;
     axisym::RunSummary summary;
-    std::vector<std::string> missed;
     {
-        Recorder recorder(c, *writer, options.quiet, restart ? restart->time : 0);
+        Recorder recorder(c, writer, options.quiet, restart ? restart->time : 0);
         summary = axisym::run(c, recorder, restart ? &*restart : nullptr);
-        if (options.expect) missed = unmet(c, summary, recorder);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    writer->finish(about_end(c, summary, seconds));
-    if (!options.quiet || exit_code(summary.stop.reason) != 0) report(c, summary, file, seconds);
-    if (!options.expect) return exit_code(summary.stop.reason);
-    for (const std::string& line : missed) fmt::print(stderr, "{}: not as expected: {}\n", c.path, line);
-    return missed.empty() ? 0 : 1;
+    writer.finish(about_end(c, summary, seconds));
+    const bool compared = options.expect && summary.stop.reason != Stop::interrupted;
+    const int status = compared ? compare(c, file) : exit_code(summary.stop.reason);
+    if (!options.quiet || status != 0) report(c, summary, file, seconds);
+    return status;
 }
 
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
         throw CaseError("-o names one result file, but there are several cases");
     std::vector<Case> cases;  // all are read before any is run: bad input leaves nothing half done
-    for (const std::string& path : options.cases) cases.push_back(read_case(path, options.sets));
+    std::set<std::filesystem::path> files;
+    for (const std::string& path : options.cases) {
+        cases.push_back(read_case(path, options.sets));
+        const auto file = result_path(options, cases.back());
+        if (!files.insert(file).second)
+            throw CaseError(fmt::format("{}: two of the cases would write {}", path, file.string()));
+    }
     catch_interrupts();
     int status = 0;
     for (const Case& c : cases) {
-        const int one = run_case(c, options);
+        int one = 0;
+        try {
+            one = run_case(c, options);
+        } catch (const CaseError&) {
+            throw;
+        } catch (const std::exception& error) {
+            fmt::print(stderr, "{}: {}\n", c.path, error.what());
+            one = exit_code(Stop::solver_failed);
+        }
         if (status == 0) status = one;
         if (one == exit_code(Stop::interrupted)) break;
     }

@@ -1,0 +1,57 @@
+#!/usr/bin/python3
+"""Why each case stops: said alike by its [expect], the exit status, the words and the result.
+
+stops_test.py TUBULE CASES: the program, the folder of the cases.
+"""
+import subprocess
+import sys
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+import h5py
+
+PROGRAM, CASES = sys.argv[1], sorted(Path(sys.argv[2]).glob("*.toml"))
+
+# 0 as asked, 3 the physics ended it, 4 the numerics failed, 5 the time limit.
+STATUS = {
+    "finished": 0,
+    "stationary": 0,
+    "pinch-off": 3,
+    "overhang": 3,
+    "ill-posed": 3,
+    "resolution-lost": 4,
+    "time-limit": 5,
+}
+
+
+class Stops(unittest.TestCase):
+    def test_status_words_and_result_agree(self):
+        reached = set()
+        with tempfile.TemporaryDirectory() as folder:
+            for case in CASES:
+                with self.subTest(case=case.stem):
+                    expect = tomllib.loads(case.read_text())["expect"]
+                    stop = expect.get("stop", "finished")
+                    result = Path(folder, case.stem + ".hdf")
+                    done = subprocess.run(
+                        [PROGRAM, "run", str(case), "-o", str(result)], capture_output=True, text=True, timeout=100
+                    )
+                    self.assertEqual(done.returncode, STATUS[stop], done.stdout + done.stderr)
+                    self.assertIn(f"{case}: {stop} at t = ", done.stdout)
+                    with h5py.File(result) as file:
+                        about = file["about"].attrs
+                        self.assertEqual(about["stop"], stop)
+                        self.assertIn(about["stop_message"], done.stdout)
+                        self.assertIn(about["advice"], done.stdout)
+                        # The end is in the series, and in a state that can be looked at or gone on with.
+                        self.assertEqual(file["series/time"][-1], about["stop_time"])
+                        last = file["checkpoint"] if stop == "time-limit" else file["frames"][max(file["frames"])]
+                        self.assertEqual(last.attrs["time"], about["stop_time"])
+                    reached.add(stop)
+        self.assertEqual(reached, set(STATUS), "a stop reason that no case shows")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,243 @@
+#!/usr/bin/python3
+"""The program `tubule` as its users meet it: exit statuses, messages, files.
+
+command_test.py TUBULE
+"""
+import json
+import sys
+import tomllib
+import unittest
+
+import h5py
+import numpy as np
+
+from program import QUICK, ProgramTest, about, series
+
+EXPECT = """
+[expect]
+energy = {value = 100, abs = 1}
+[[expect.at]]
+time = 0.03
+r_min = {value = 0.9, abs = 0.2}
+energy_42 = {value = -7, abs = 1e-3}
+"""
+
+
+class Run(ProgramTest):
+    def test_result_is_named_after_the_case_and_in_the_current_folder(self):
+        case = self.write("elsewhere/tube.toml", QUICK)
+        out, err = self.tubule("run", case)
+        self.assertEqual(self.files(), {"case.toml", "elsewhere", "tube.hdf"})
+        self.assertIn(f"{case}: finished at t = 0.2: reached time.end", out)
+        self.assertEqual(about(self.folder / "tube.hdf")["stop"], "finished")
+        with h5py.File(self.folder / "tube.hdf") as file:
+            self.assertEqual(file["case"].asstr()[()], QUICK)
+            times = [file["frames"][name].attrs["time"] for name in sorted(file["frames"])]
+        self.assertEqual(times, [0, 0.01, 0.05, 0.2])
+
+    def test_output_names_the_result(self):
+        self.tubule("run", self.case, "-o", "other.hdf")
+        self.assertEqual(self.files(), {"case.toml", "other.hdf"})
+
+    def test_set_changes_the_case_and_is_kept(self):
+        self.tubule("run", self.case, "--set", "energy.k42=0.4", "--set", "time.output=[]")
+        with h5py.File(self.result) as file:
+            self.assertEqual(list(file["case"].attrs["set"]), ["energy.k42=0.4", "time.output=[]"])
+            self.assertEqual(len(file["frames"]), 2)
+        changed = series(self.result)["energy_42"][0]
+        self.tubule("run", self.case)
+        # k42 is a factor of its term; the meshes of both runs hold the start within the asked accuracy, 1e-6 E_ref.
+        self.assertAlmostEqual(changed, 4 * series(self.result)["energy_42"][0], delta=2e-4)
+
+    def test_several_cases(self):
+        second = self.write("second.toml", QUICK)
+        out, _ = self.tubule("run", self.case, second, "--set", "time.end=0.1")
+        self.assertEqual(self.files(), {"case.toml", "second.toml", "case.hdf", "second.hdf"})
+        self.assertEqual(out.count("finished at t = 0.1"), 2)
+
+    def test_status_of_several_cases_is_the_first_that_is_not_0(self):
+        second = self.write("second.toml", QUICK)
+        # It shrinks, and 0.8 counts as a pinch-off.
+        third = self.write("third.toml", QUICK.replace("-1.0", "-2.0").replace("1e-6", "1e-6\nr_min = 0.8"))
+        self.tubule("run", self.case, third, second, "--quiet", status=3)
+        self.assertTrue((self.folder / "second.hdf").exists())
+
+    def test_quiet_is_silent(self):
+        self.assertEqual(self.tubule("run", self.case, "--quiet"), ("", ""))
+        self.write("case.toml", QUICK + EXPECT.replace("100", "0").replace("-7, abs = 1e-3", "0, abs = 1"))
+        self.assertEqual(self.tubule("run", self.case, "--quiet", "--expect"), ("", ""))
+
+    def test_a_result_is_replaced(self):
+        self.tubule("run", self.case)
+        self.tubule("run", self.case, "--set", "time.end=0.1")
+        self.assertEqual(series(self.result)["time"][-1], 0.1)
+
+    def test_check_derivatives(self):
+        out, _ = self.tubule("run", self.case, "--check-derivatives")
+        for term in ("k20", "k42"):
+            self.assertRegex(out, rf"case.toml: {term}\ngradient: right, .*\nHessian : right, ")
+        self.assertNotIn("k40", out)  # not in use
+        self.assertTrue(self.result.exists())
+
+
+class Refused(ProgramTest):
+    """Bad input: exit status 2, and nothing is written."""
+
+    def refused(self, *arguments):
+        before = self.files()
+        out, err = self.tubule(*arguments, status=2)
+        self.assertEqual(self.files(), before)
+        self.assertEqual(out, "")
+        return err
+
+    def test_unknown_key(self):
+        bad = self.write("bad.toml", QUICK.replace("radius", "raduis"))
+        self.assertIn("bad.toml:10:1: unknown key shape.raduis; did you mean 'radius'?", self.refused("run", bad))
+        # The good case before it is not run either.
+        self.refused("run", self.case, bad)
+
+    def test_unknown_key_in_set(self):
+        self.assertIn("k43", self.refused("run", self.case, "--set", "energy.k43=1"))
+
+    def test_impossible_shape(self):
+        self.assertIn("shape", self.refused("run", self.case, "--set", "shape.mode.0.amplitude=1.5"))
+
+    def test_no_case(self):
+        self.assertIn("nowhere.toml", self.refused("run", "nowhere.toml"))
+        self.assertIn("CASE", self.refused("run"))
+
+    def test_no_folder_to_write_to(self):
+        self.assertIn("nowhere/x.hdf", self.refused("run", self.case, "-o", "nowhere/x.hdf"))
+
+    def test_output_that_is_no_result(self):
+        self.assertIn("case.toml", self.refused("run", self.case, "-o", "case.toml"))
+        self.assertEqual(self.case.read_text(), QUICK)
+
+    def test_one_output_for_two_cases(self):
+        second = self.write("second.toml", QUICK)
+        self.assertIn("-o", self.refused("run", self.case, second, "-o", "x.hdf"))
+
+    def test_two_cases_of_one_name(self):
+        second = self.write("elsewhere/case.toml", QUICK)
+        self.assertIn("case.hdf", self.refused("run", self.case, second))
+
+    def test_unknown_subcommand_and_option(self):
+        self.assertIn("walk", self.refused("walk", self.case))
+        self.assertIn("--fast", self.refused("run", self.case, "--fast"))
+
+    def test_results_that_are_none(self):
+        self.assertIn("nowhere.hdf", self.refused("show", "nowhere.hdf"))
+        self.assertIn("case.toml", self.refused("show", "case.toml"))
+        self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
+
+
+class Expect(ProgramTest):
+    def test_what_did_not_come_out_is_named(self):
+        self.write("case.toml", QUICK + EXPECT)
+        out, err = self.tubule("run", self.case, "--expect", status=1)
+        lines = err.splitlines()
+        self.assertEqual(len(lines), 2, err)
+        self.assertRegex(lines[0], r"case.toml: not as expected: energy at the end is .*, expected 100 within 1$")
+        self.assertRegex(lines[1], r"energy_42 at t = 0.03 is .*, expected -7 within 0.001$")
+        self.assertIn("finished", out)
+        self.tubule("run", self.case)  # only asked for, it counts
+
+    def test_wrong_stop(self):
+        self.write("case.toml", QUICK + '[expect]\nstop = "pinch-off"\n')
+        self.assertIn("stop is finished, expected pinch-off", self.tubule("run", self.case, "--expect", status=1)[1])
+
+    def test_a_stop_that_was_expected_is_success(self):
+        self.write("case.toml", QUICK + '[expect]\nstop = "time-limit"\n')
+        self.tubule("run", self.case, "--expect", "--set", "time.limit=1e-9")
+        self.tubule("run", self.case, "--set", "time.limit=1e-9", status=5)
+
+    def test_of_a_complete_result(self):
+        self.write("case.toml", QUICK + EXPECT)
+        self.tubule("run", self.case, "--expect", status=1)
+        _, err = self.tubule("run", self.case, "--expect", "--resume", status=1)
+        self.assertEqual(err.count("not as expected"), 2, err)
+
+
+class Show(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.tubule("run", self.case)
+
+    def test_words(self):
+        out, _ = self.tubule("show", self.result)
+        self.assertRegex(out, r"title +A quick one")
+        self.assertRegex(out, r"stop +finished")
+
+    def test_csv_is_the_series_to_the_last_bit(self):
+        header, rows = self.shown(self.result)
+        values = series(self.result)
+        self.assertEqual(header[0], "time")
+        self.assertEqual(set(header), set(values))
+        self.assertLessEqual({"energy", "energy_20", "energy_40", "energy_42", "r_min", "mode_1", "mode_2"}, set(header))
+        table = np.array(rows, dtype=float)
+        for column, name in enumerate(header):
+            np.testing.assert_array_equal(table[:, column], values[name], name)
+
+    def test_csv_of_a_frame(self):
+        out, _ = self.tubule("show", self.result, "--csv", "--frame", "-1")
+        lines = out.splitlines()
+        self.assertEqual(lines[0], "z,r,H,K,u_n")
+        table = np.array([line.split(",") for line in lines[1:]], dtype=float)
+        with h5py.File(self.result) as file:
+            last = file["frames"][max(file["frames"])]
+            for column, name in enumerate(("z", "r", "H", "K", "u_n")):
+                np.testing.assert_array_equal(table[:, column], last[name][:])
+
+    def test_json_is_the_result(self):
+        data = json.loads(self.tubule("show", self.result, "--json", "--frame", "1")[0])
+        self.assertEqual(data["case"], {"text": QUICK, "set": []})
+        self.assertEqual(data["about"]["stop"], "finished")
+        self.assertEqual({name: list(values) for name, values in series(self.result).items()}, data["series"])
+        self.assertEqual([frame["time"] for frame in data["frames"]], [0, 0.01, 0.05, 0.2])
+        with h5py.File(self.result) as file:
+            self.assertEqual(data["frames"][1]["arrays"]["r"]["data"], list(file["frames/000001/r"][:]))
+        self.assertNotIn("data", data["frames"][2]["arrays"]["r"])
+
+    def test_a_frame_that_is_not_there(self):
+        self.assertIn("0 to 3", self.tubule("show", self.result, "--csv", "--frame", "4", status=2)[1])
+
+
+class Check(ProgramTest):
+    def test_what_a_case_comes_to_is_a_case(self):
+        out, _ = self.tubule("check", self.case, "--set", "energy.k40=0.25")
+        case = tomllib.loads(out)
+        self.assertEqual(case["energy"], {"k20": 0.5, "H0": -1.0, "k40": 0.25, "k42": 0.1})
+        self.assertEqual(case["accuracy"]["r_min"], 1e-3)  # a default
+        again = self.tubule("check", self.write("again.toml", out))[0]
+        self.assertEqual(again.split("\n", 1)[1], out.split("\n", 1)[1])
+        self.assertEqual(self.files(), {"case.toml", "again.toml"})
+
+    def test_all_bad_cases_are_told(self):
+        one = self.write("one.toml", QUICK.replace("kind", "knid"))
+        two = self.write("two.toml", QUICK.replace("0.5", '"much"'))
+        out, err = self.tubule("check", one, self.case, two, status=2)
+        self.assertIn("one.toml:9:1: ", err)
+        self.assertIn("two.toml:5:7: ", err)
+        self.assertIn("# OK", out)
+
+
+class Others(ProgramTest):
+    def test_version(self):
+        out, _ = self.tubule("--version")
+        for name in ("version", "git_hash", "compiler", "sundials", "suitesparse", "hdf5", "blas"):
+            self.assertRegex(out, rf"(?m)^{name} +\S")
+
+    def test_help(self):
+        out, _ = self.tubule("--help")
+        for subcommand in ("run", "check", "show", "plot"):
+            self.assertIn(subcommand, out)
+        self.assertEqual(self.tubule(), (out, ""))
+
+    def test_plot(self):
+        self.tubule("run", self.case)
+        self.tubule("plot", self.result, "-o", "picture.svg")
+        self.assertIn("<svg", (self.folder / "picture.svg").read_text())
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

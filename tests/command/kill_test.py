@@ -1,0 +1,179 @@
+#!/usr/bin/python3
+"""Runs that are interrupted, killed or out of time lose nothing, and --resume ends where they would have ended.
+
+kill_test.py TUBULE. Expected end states are those of an undisturbed run, within the accuracy asked of both.
+"""
+import random
+import shutil
+import signal
+import sys
+import time
+import unittest
+
+import h5py
+
+from program import ACCURACY, E_REF, QUICK, SLOW, ProgramTest, about, series
+
+
+class Kill(ProgramTest):
+    whole = None  # series of the undisturbed run
+
+    def setUp(self):
+        super().setUp()
+        self.write("case.toml", SLOW)
+        if Kill.whole is None:
+            self.tubule("run", self.case)
+            Kill.whole, Kill.frame_times = series(self.result), self.times_of_frames()
+            self.result.unlink()
+
+    def times_of_frames(self):
+        with h5py.File(self.result) as file:
+            return [file["frames"][name].attrs["time"] for name in sorted(file["frames"])]
+
+    def assert_ends_like_the_undisturbed_run(self):
+        ends = series(self.result)
+        self.assertEqual(about(self.result)["stop"], "finished")
+        self.assertEqual(ends["time"][-1], self.whole["time"][-1])
+        for name in ("energy", "energy_20", "energy_42", "identity_defect"):
+            self.assertAlmostEqual(ends[name][-1], self.whole[name][-1], delta=ACCURACY * E_REF)
+        for name in ("r_min", "r_max", "area", "volume", "mode_1"):
+            self.assertAlmostEqual(ends[name][-1], self.whole[name][-1], delta=10 * ACCURACY)
+        self.assertTrue((ends["time"][1:] >= ends["time"][:-1]).all())
+        self.assertEqual(self.times_of_frames(), self.frame_times)
+        self.assertEqual(self.files(), {"case.toml", "case.hdf"})  # no journal is left
+
+    def started(self, *arguments):
+        """A run that has written its first rows."""
+        process = self.start("run", self.case, *arguments)
+        self.addCleanup(process.kill)
+        while not self.result.exists() or not self.shown(self.result)[1]:
+            self.assertIsNone(process.poll(), "the run ended before it could be disturbed")
+        return process
+
+    def interrupted(self, signal_number, *arguments):
+        with self.started(*arguments) as process:
+            process.send_signal(signal_number)
+            out, err = process.communicate()
+        self.assertEqual(process.returncode, 130, out + err)
+        return out
+
+    def test_signals_save_the_state(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(signal=number):
+                out = self.interrupted(number)
+                self.assertRegex(out, "case.toml: interrupted at t = .*\n +go on with --resume")
+                with h5py.File(self.result) as file:
+                    checkpoint = file["checkpoint"].attrs["time"]
+                    self.assertEqual(file["series/time"][-1], checkpoint)
+                self.assertLess(checkpoint, self.whole["time"][-1])
+                self.assertEqual(about(self.result)["stop"], "interrupted")
+                self.assertEqual(self.files(), {"case.toml", "case.hdf"})
+                before = series(self.result)["energy"]
+                self.tubule("run", self.case, "--resume")
+                after = series(self.result)["energy"]
+                self.assertEqual(list(after[: len(before)]), list(before))
+                self.assert_ends_like_the_undisturbed_run()
+                self.result.unlink()
+
+    def test_an_interrupt_ends_the_whole_command(self):
+        second = self.write("second.toml", SLOW)
+        self.interrupted(signal.SIGINT, second)
+        self.assertFalse((self.folder / "second.hdf").exists())
+
+    def test_a_second_run_of_the_same_result_is_refused(self):
+        process = self.started()
+        self.assertIn("case.hdf", self.tubule("run", self.case, status=2)[1])
+        self.assertIn("case.hdf", self.tubule("run", self.case, "--resume", status=2)[1])
+        process.communicate()
+        self.assertEqual(process.returncode, 0)
+        self.assert_ends_like_the_undisturbed_run()
+
+    def test_twenty_kills_lose_nothing(self):
+        pause = random.Random(20)
+        known = []  # rows that must stay
+        for kill in range(20):
+            process = self.start("run", self.case, "--resume", "--quiet")
+            self.addCleanup(process.kill)
+            while True:  # until it has got further than the run before; looked at while it stands still
+                time.sleep(pause.uniform(0.005, 0.03))
+                self.assertIsNone(process.poll(), f"the run ended before kill {kill}")
+                process.send_signal(signal.SIGSTOP)
+                if self.result.exists():
+                    rows = self.shown(self.result)[1]
+                    if len(rows) > len(known) + 20:
+                        break
+                process.send_signal(signal.SIGCONT)
+            process.kill()
+            process.communicate()
+            header, after = self.shown(self.result)
+            self.assertEqual(after, rows)  # to the last digit, and nothing half written
+            self.assertIn("none yet", self.tubule("show", self.result)[0])
+            known = self.rows_that_resume_keeps(header, after)
+        self.tubule("run", self.case, "--resume", "--quiet")
+        header, rows = self.shown(self.result)
+        self.assertEqual(rows[: len(known)], known)
+        self.assert_ends_like_the_undisturbed_run()
+
+    def rows_that_resume_keeps(self, header, rows):
+        """Those up to the newest frame: docs/results.md."""
+        frames = self.tubule("show", self.result)[0].rsplit("\n\n", 1)[1].splitlines()[1:]
+        newest = float(frames[-1].split()[1])
+        kept = [row for row in rows if float(row[header.index("time")]) <= newest * (1 + 1e-6)]
+        return kept[: len(kept) - 1]  # frames are shown with 8 digits
+
+    def test_killed_before_its_first_frame(self):
+        # What the program leaves then: the result without rows, and an empty journal.
+        self.tubule("run", self.case, "--set", "time.end=1e-6", "--set", "time.output=[]")
+        with h5py.File(self.result, "r+") as file:
+            file["case"].attrs.pop("set")
+            file["case"].attrs["set"] = []
+            for name in list(file["frames"]):
+                del file["frames"][name]
+            del file["about"].attrs["stop"]
+        self.tubule("run", self.case, "--resume", "--quiet")
+        self.assert_ends_like_the_undisturbed_run()
+
+    def test_time_limit_resumes(self):
+        self.write("case.toml", SLOW.replace("[time]", "[time]\nlimit = 0.25"))
+        out, _ = self.tubule("run", self.case, status=5)
+        self.assertIn("time-limit at t = ", out)
+        self.assertIn("go on with --resume", out)
+        for _ in range(1000):
+            times = series(self.result)["time"]
+            with self.start("run", self.case, "--resume") as process:
+                process.communicate()
+            self.assertIn(process.returncode, (0, 5))
+            if process.returncode == 0:
+                break
+            self.assertGreater(series(self.result)["time"][-1], times[-1])
+        self.assert_ends_like_the_undisturbed_run()
+
+
+class Resume(ProgramTest):
+    def test_a_complete_result_is_left_alone(self):
+        self.tubule("run", self.case)
+        before = self.result.read_bytes()
+        out, _ = self.tubule("run", self.case, "--resume")
+        self.assertIn("case.hdf is complete, nothing to resume", out)
+        self.assertEqual(self.result.read_bytes(), before)
+
+    def test_another_case_is_refused(self):
+        self.tubule("run", self.case, "--set", "time.limit=1e-9", status=5)
+        before = self.result.read_bytes()
+        self.assertIn("another case or other --set", self.tubule("run", self.case, "--resume", status=2)[1])
+        other = self.write("other.toml", QUICK.replace("0.12", "0.13"))
+        self.assertIn("another case", self.tubule("run", other, "--resume", "-o", "case.hdf", status=2)[1])
+        self.assertEqual(self.result.read_bytes(), before)
+
+    def test_without_a_result_it_begins(self):
+        self.tubule("run", self.case, "--resume")
+        self.assertEqual(about(self.result)["stop"], "finished")
+
+    def test_what_is_no_result_is_refused(self):
+        shutil.copy(self.case, self.result)
+        self.assertIn("case.hdf", self.tubule("run", self.case, "--resume", status=2)[1])
+        self.assertEqual(self.result.read_text(), QUICK)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,94 @@
+"""What the tests of the command share: running it, in a folder of its own, and reading its results."""
+import csv
+import io
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+
+PROGRAM = sys.argv[1]
+
+# A wavy tube without symmetry that is solved in a moment: 0.02 s.
+QUICK = """tier = "axisym"
+[about]
+title = "A quick one"
+[energy]
+k20 = 0.5
+H0 = -1.0
+k42 = 0.1
+[shape]
+kind = "tube"
+radius = 1.0
+length = 3.0
+[[shape.mode]]
+amplitude = 0.12
+n = 1
+phase = 0.3
+[[shape.mode]]
+amplitude = 0.05
+n = 2
+phase = 1.1
+[accuracy]
+energy = 1e-6
+[time]
+end = 0.2
+output = [0.01, 0.05]
+"""
+
+# The same with 10000 steps and more, a second or so, and 400 frames. Explicit settings: it never begins again.
+SLOW = QUICK.replace("[0.01, 0.05]", str([i / 2000 for i in range(1, 400)])) + """
+[discretisation]
+elements = 40
+time_tolerance = 1e-12
+time_order = 2
+"""
+
+ACCURACY, E_REF = 1e-6, 24.5  # E_ref is printed by the program; tests/axisym holds it against its definition
+
+
+def series(result):
+    with h5py.File(result) as file:
+        return {name: data[:] for name, data in file["series"].items()}
+
+
+def about(result):
+    with h5py.File(result) as file:
+        return dict(file["about"].attrs)
+
+
+class ProgramTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.case = self.write("case.toml", QUICK)
+        self.result = self.folder / "case.hdf"
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def files(self):
+        return {path.name for path in self.folder.iterdir()}
+
+    def start(self, *arguments):
+        return subprocess.Popen(
+            [PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def tubule(self, *arguments, status=0):
+        """Runs the program to its end; what it printed on stdout, on stderr."""
+        with self.start(*arguments) as process:
+            out, err = process.communicate()
+        self.assertEqual(process.returncode, status, f"tubule {arguments}\n{out}{err}")
+        return out, err
+
+    def shown(self, result):
+        """The series as `tubule show --csv` gives them, journal included: header, rows of strings."""
+        rows = list(csv.reader(io.StringIO(self.tubule("show", result, "--csv")[0])))
+        return rows[0], rows[1:]
