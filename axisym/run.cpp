@@ -30,7 +30,7 @@ constexpr double error_change = 0.25;             // the logarithm of the dissip
 constexpr int most_attempts = 6;
 constexpr int most_elements = 4000;  // of one cell
 constexpr int fewest_elements = 3;
-constexpr double overhang_steepness = 20;  // see Observation::steepness
+constexpr double overhang_steepness = 30;  // see Observation::steepness
 constexpr double hopeless_error = 0.1;     // of E_ref: explicit settings that lose the shape
 constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
 

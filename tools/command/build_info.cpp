@@ -9,7 +9,6 @@
 #include <sundials/sundials_version.h>
 #include <unistd.h>
 
-#include <Eigen/Core>
 #include <filesystem>
 #include <fstream>
 
@@ -74,13 +73,13 @@ std::string machine() {
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> build_info() {
-    return {{"version", TUBULE_VERSION},
+    return {{"version", TUBULE_VERSION},  //
             {"git_hash", TUBULE_GIT_HASH},
             {"build", TUBULE_BUILD},
             {"compiler", TUBULE_COMPILER},
             {"sundials", sundials()},
             {"suitesparse", suitesparse()},
-            {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+            {"eigen", TUBULE_EIGEN},
             {"hdf5", hdf5()},
             {"gsl", gsl_version},
             {"blas", blas()},
