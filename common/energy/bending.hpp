@@ -76,4 +76,16 @@ struct Bending {
     double H0 = 0;
 };
 
+// The density and its derivatives in H and K, summed over the terms in use.
+template <class T>
+CurvatureJet<T> density(const Bending& bending, const T& H, const T& K) {
+    CurvatureJet<T> h, k, sum;
+    h.f = H, h.H = T(1.0);
+    k.f = K, k.K = T(1.0);
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        if (bending.k[i] != 0) sum = sum + bending.k[i] * term.value(h, k, bending.H0);
+    });
+    return sum;
+}
+
 }  // namespace tubule

@@ -22,6 +22,9 @@ struct Jet {
     std::array<T, N> d{};
     std::array<T, n_second> dd{};
 
+    Jet() = default;
+    Jet(double constant) : v(constant) {}
+
     static Jet variable(const T& value, int i) {
         Jet x;
         x.v = value;
@@ -29,6 +32,15 @@ struct Jet {
         return x;
     }
 };
+
+// The number inside, for decisions that no derivative goes through.
+inline double scalar_part(double x) {
+    return x;
+}
+template <class T, int N, int Order>
+double scalar_part(const Jet<T, N, Order>& x) {
+    return scalar_part(x.v);
+}
 
 // F(a) given F, F', F'' at a.v.
 template <class T, int N, int Order>
@@ -122,6 +134,27 @@ Jet<T, N, O> operator+(Jet<T, N, O> a, double c) {
 }
 
 template <class T, int N, int O>
+Jet<T, N, O> operator-(const Jet<T, N, O>& a) {
+    return (-1.0) * a;
+}
+template <class T, int N, int O>
+Jet<T, N, O> operator+(double c, const Jet<T, N, O>& a) {
+    return a + c;
+}
+template <class T, int N, int O>
+Jet<T, N, O> operator-(const Jet<T, N, O>& a, double c) {
+    return a + (-c);
+}
+template <class T, int N, int O>
+Jet<T, N, O> operator-(double c, const Jet<T, N, O>& a) {
+    return (-1.0) * a + c;
+}
+template <class T, int N, int O>
+Jet<T, N, O>& operator+=(Jet<T, N, O>& a, const Jet<T, N, O>& b) {
+    return a = a + b;
+}
+
+template <class T, int N, int O>
 Jet<T, N, O> inverse(const Jet<T, N, O>& a) {
     const T f = 1.0 / a.v, f1 = -f * f;
     return chain(a, f, f1, T(-2.0 * f * f1));
@@ -142,6 +175,34 @@ template <class T>
 T inverse_sqrt(const T& a) {
     using std::sqrt;
     return 1.0 / sqrt(a);
+}
+
+template <class T, int N, int O>
+Jet<T, N, O> operator/(double c, const Jet<T, N, O>& a) {
+    return c * inverse(a);
+}
+template <class T, int N, int O>
+Jet<T, N, O> operator/(const Jet<T, N, O>& a, const Jet<T, N, O>& b) {
+    return a * inverse(b);
+}
+
+template <class T, int N, int O>
+Jet<T, N, O> sqrt(const Jet<T, N, O>& a) {
+    using std::sqrt;
+    const T f = sqrt(a.v), f1 = 0.5 / f;
+    return chain(a, f, f1, T(-0.5 * f1 / a.v));
+}
+template <class T, int N, int O>
+Jet<T, N, O> sin(const Jet<T, N, O>& a) {
+    using std::cos, std::sin;
+    const T f = sin(a.v);
+    return chain(a, f, T(cos(a.v)), T(-f));
+}
+template <class T, int N, int O>
+Jet<T, N, O> cos(const Jet<T, N, O>& a) {
+    using std::cos, std::sin;
+    const T f = cos(a.v);
+    return chain(a, f, T(-sin(a.v)), T(-f));
 }
 
 }  // namespace tubule

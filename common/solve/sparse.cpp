@@ -1,160 +1,163 @@
 #include "common/solve/sparse.hpp"
 
 #include <fmt/core.h>
-#include <klu.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "common/solve/sparse_engine.hpp"
+
 namespace tubule {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-// Below this the ratio of KLU's pivots is worth the price of a real condition estimate.
-constexpr double suspicious_pivot_ratio = 1e-12;
-// Old pivots are dropped when they let the factors grow this much more than fresh ones did.
-constexpr double tolerated_growth = 100;
+using Matrix = Eigen::SparseMatrix<double>;
 
-bool same_pattern(const Eigen::SparseMatrix<double>& a, const Eigen::SparseMatrix<double>& b) {
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+// Below this the ratio of the pivots is worth the price of a real condition estimate.
+constexpr double suspicious_pivot_ratio = 1e-12;
+
+bool same_pattern(const Matrix& a, const Matrix& b) {
     return a.rows() == b.rows() && a.cols() == b.cols() && a.nonZeros() == b.nonZeros() &&
            std::equal(a.outerIndexPtr(), a.outerIndexPtr() + a.cols() + 1, b.outerIndexPtr()) &&
            std::equal(a.innerIndexPtr(), a.innerIndexPtr() + a.nonZeros(), b.innerIndexPtr());
 }
 
-void require_finite(const Eigen::SparseMatrix<double>& A) {
+void require_finite(const Matrix& A) {
     for (int column = 0; column < A.cols(); ++column)
-        for (Eigen::SparseMatrix<double>::InnerIterator entry(A, column); entry; ++entry)
+        for (Matrix::InnerIterator entry(A, column); entry; ++entry)
             if (!std::isfinite(entry.value()))
                 throw SolveError(fmt::format("matrix entry ({}, {}) is {}", entry.row(), column, entry.value()));
 }
 
+double norm_1(const Matrix& A) {
+    double norm = 0;
+    for (int column = 0; column < A.cols(); ++column) norm = std::max(norm, A.col(column).cwiseAbs().sum());
+    return norm;
+}
+
+// Hager's and Higham's lower bound of |A^-1|_1 (Higham, Accuracy and Stability of Numerical Algorithms,
+// algorithm 15.4): climbs to a local maximum of |A^-1 x|_1 over |x|_1 = 1 and compares with a vector that rules out
+// unlucky zeros.
+double norm_1_of_inverse(SparseEngine& engine, int n) {
+    using Vector = Eigen::VectorXd;
+    const auto solved = [&](Vector x, bool transposed) {
+        engine.solve(x.data(), n, 1, transposed);
+        return x;
+    };
+    const auto signs = [](const Vector& x) -> Vector {
+        return x.unaryExpr([](double v) { return v < 0 ? -1.0 : 1.0; });
+    };
+    Vector y = solved(Vector::Constant(n, 1.0 / n), false);
+    double norm = y.lpNorm<1>();
+    Eigen::Index previous = -1;
+    for (int i = 0; i < 4 && n > 1; ++i) {
+        Eigen::Index steepest;
+        solved(signs(y), true).cwiseAbs().maxCoeff(&steepest);
+        if (steepest == previous) break;
+        previous = steepest;
+        y = solved(Vector::Unit(n, steepest), false);
+        if (!(y.lpNorm<1>() > norm)) break;
+        norm = y.lpNorm<1>();
+    }
+    Vector alternating(n);
+    for (int i = 0; i < n; ++i) alternating[i] = (i % 2 ? -1 : 1) * (1 + double(i) / n);
+    return std::max(norm, 2.0 / (3.0 * n) * solved(alternating, false).lpNorm<1>());
+}
+
 }  // namespace
 
-struct SparseLu::Impl {
-    Eigen::SparseMatrix<double> A;
-    klu_common common{};
-    klu_symbolic* symbolic = nullptr;
-    klu_numeric* numeric = nullptr;
-    bool factored = false;    // `numeric` belongs to A
-    double fresh_growth = 1;  // klu_rgrowth of the last factorisation with fresh pivots
+struct SparseSolver::Impl {
+    const char* name;
+    std::unique_ptr<SparseEngine> engine;
+    Matrix A;
+    bool analysed = false;  // the engine knows the pattern of A
+    bool factored = false;  // the engine has factors of A
     Counters counters;
 
-    Impl() { klu_defaults(&common); }
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { forget(); }
-
-    void forget() {
-        klu_free_numeric(&numeric, &common);
-        klu_free_symbolic(&symbolic, &common);
-    }
-
-    int* columns() { return A.outerIndexPtr(); }
-    int* rows() { return A.innerIndexPtr(); }
-
     void analyse() {
-        forget();
-        symbolic = klu_analyze(static_cast<int>(A.cols()), columns(), rows(), &common);
-        if (!symbolic) fail();
+        analysed = false;
+        engine->analyse(A);
+        analysed = true;
         ++counters.analysed;
     }
 
-    void factor_fresh() {
-        klu_free_numeric(&numeric, &common);
-        numeric = klu_factor(columns(), rows(), A.valuePtr(), symbolic, &common);
-        if (!numeric || common.status != KLU_OK) fail();
-        fresh_growth = growth();
-        ++counters.factored;
+    void factor() {
+        if (engine->refactor(A)) {
+            ++counters.refactored;
+        } else {
+            engine->factor(A);
+            ++counters.factored;
+        }
+        counters.fill = engine->fill();
     }
 
-    // False when the old pivots do not suit the new values.
-    bool factor_again() {
-        if (!numeric) return false;
-        if (!klu_refactor(columns(), rows(), A.valuePtr(), symbolic, numeric, &common) || common.status != KLU_OK ||
-            !(growth() * tolerated_growth >= fresh_growth))
-            return false;
-        ++counters.refactored;
-        return true;
-    }
+    double condition() const { return norm_1(A) * norm_1_of_inverse(*engine, static_cast<int>(A.cols())); }
 
-    double growth() {
-        klu_rgrowth(columns(), rows(), A.valuePtr(), symbolic, numeric, &common);
-        return common.rgrowth;
-    }
-
-    double condition() {
-        klu_condest(columns(), A.valuePtr(), symbolic, numeric, &common);
-        return common.condest;
-    }
-
-    void require_well_conditioned() {
-        klu_rcond(symbolic, numeric, &common);
-        if (common.rcond >= suspicious_pivot_ratio) return;
+    void require_well_conditioned() const {
+        if (engine->pivot_ratio() >= suspicious_pivot_ratio) return;
         const double c = condition();
         if (!(c < 1 / epsilon))
             throw SolveError(
                 fmt::format("matrix of size {} is nearly singular: condition number about {:.1e}", A.cols(), c));
     }
 
-    [[noreturn]] void fail() {
-        if (common.status == KLU_SINGULAR)
-            throw SolveError(
-                fmt::format("matrix of size {} is singular: no pivot in column {}", A.cols(), common.singular_col));
-        if (common.status == KLU_OUT_OF_MEMORY) throw std::bad_alloc();
-        throw SolveError(fmt::format("matrix of size {} is refused by KLU (status {})", A.cols(), common.status));
+    void require_factors(const char* what) const {
+        if (!factored) throw std::logic_error(fmt::format("{}::{} without factors", name, what));
     }
 };
 
-SparseLu::SparseLu() : impl_(std::make_unique<Impl>()) {}
-SparseLu::SparseLu(SparseLu&&) noexcept = default;
-SparseLu& SparseLu::operator=(SparseLu&&) noexcept = default;
-SparseLu::~SparseLu() = default;
+SparseSolver::SparseSolver(const char* name, std::unique_ptr<SparseEngine> engine)
+    : impl_(new Impl{.name = name, .engine = std::move(engine), .A = {}, .counters = {}}) {}
+SparseSolver::SparseSolver(SparseSolver&&) noexcept = default;
+SparseSolver& SparseSolver::operator=(SparseSolver&&) noexcept = default;
+SparseSolver::~SparseSolver() = default;
 
-void SparseLu::factor(const Eigen::SparseMatrix<double>& A) {
+void SparseSolver::factor(const Matrix& A) {
     Impl& s = *impl_;
     s.factored = false;
     if (A.rows() != A.cols() || A.rows() == 0)
-        throw std::invalid_argument(fmt::format("SparseLu wants a square matrix, not {} x {}", A.rows(), A.cols()));
+        throw std::invalid_argument(fmt::format("{} wants a square matrix, not {} x {}", s.name, A.rows(), A.cols()));
     if (!A.isCompressed()) {
-        Eigen::SparseMatrix<double> compressed = A;
+        Matrix compressed = A;
         compressed.makeCompressed();
         return factor(compressed);
     }
     require_finite(A);
-    const bool known = s.symbolic && same_pattern(s.A, A);
+    const bool known = s.analysed && same_pattern(s.A, A);
     s.A = A;
     if (!known) s.analyse();
-    if (!s.factor_again()) s.factor_fresh();
+    s.factor();
     s.require_well_conditioned();
     s.factored = true;
 }
 
-Eigen::VectorXd SparseLu::solve(const Eigen::VectorXd& b, int refinements) const {
-    Impl& s = *impl_;
-    if (!s.factored) throw std::logic_error("SparseLu::solve without factors");
-    if (b.size() != s.A.cols())
+void SparseSolver::solve_in_place(Eigen::Ref<Eigen::MatrixXd> X, int refinements) const {
+    const Impl& s = *impl_;
+    s.require_factors("solve");
+    if (X.rows() != s.A.cols())
         throw std::invalid_argument(
-            fmt::format("right-hand side of size {} for a matrix of size {}", b.size(), s.A.cols()));
-    const auto solve_in_place = [&](Eigen::VectorXd& x) {
-        if (!klu_solve(s.symbolic, s.numeric, static_cast<int>(x.size()), 1, x.data(), &s.common)) s.fail();
-    };
-    Eigen::VectorXd x = b;
-    solve_in_place(x);
+            fmt::format("right-hand side of size {} for a matrix of size {}", X.rows(), s.A.cols()));
+    if (!X.allFinite())
+        throw SolveError(fmt::format("right-hand side for a matrix of size {} is not finite", X.rows()));
+    const int size = static_cast<int>(X.rows()), count = static_cast<int>(X.cols());
+    Eigen::MatrixXd B;
+    if (refinements > 0) B = X;
+    s.engine->solve(X.data(), size, count, false);
     for (int i = 0; i < refinements; ++i) {
-        Eigen::VectorXd correction = b - s.A * x;
-        solve_in_place(correction);
-        x += correction;
+        Eigen::MatrixXd correction = B - s.A * X;
+        s.engine->solve(correction.data(), size, count, false);
+        X += correction;
     }
-    return x;
+    if (!X.allFinite()) throw SolveError(fmt::format("solution of size {} is not finite", X.rows()));
 }
 
-double SparseLu::reciprocal_condition() const {
-    if (!impl_->factored) throw std::logic_error("SparseLu::reciprocal_condition without factors");
+double SparseSolver::reciprocal_condition() const {
+    impl_->require_factors("reciprocal_condition");
     return 1 / impl_->condition();
 }
 
-const SparseLu::Counters& SparseLu::counters() const {
+const SparseSolver::Counters& SparseSolver::counters() const {
     return impl_->counters;
 }
 
