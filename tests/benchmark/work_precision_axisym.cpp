@@ -1,4 +1,4 @@
-// Prints a table for the chart docs/work_precision_axisym.svg: error of the energy relative to E(0) against CPU time
+// Prints a table for the chart docs/work_precision_axisym.svg: error of the energy relative to E_ref against CPU time
 // of whole runs of the figure's case, for accuracies asked of the program and for spline spaces with settings tuned by
 // hand (the fastest of a grid of elements and time tolerances for each error). `tools/figures work-precision-axisym`.
 #include <fmt/core.h>
@@ -31,9 +31,7 @@ Point measure(const Case& c, int repeats) {
         const double begin = cpu_milliseconds();
         const RunSummary summary = run(c, watch);
         times.push_back(cpu_milliseconds() - begin);
-        // Stated relative to E_ref, shown relative to E(0) like the error.
-        const double estimate = summary.estimated_error * summary.reference_energy / reference::figure[1].energy_start;
-        point = {c.accuracy.energy, watch.error, estimate, 0};
+        point = {c.accuracy.energy, watch.error / summary.reference_energy, summary.estimated_error, 0};
         if (summary.stop.reason != Stop::finished) point.error = INFINITY;
     }
     std::nth_element(times.begin(), times.begin() + times.size() / 2, times.end());
