@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/geometry/surface_point.hpp"
+
 namespace tubule {
 
 struct TubeMode {
@@ -33,6 +35,27 @@ T radius_at(const Tube& tube, const T& z) {
         r = r + mode.amplitude * cos(wave_number * z + mode.phase);
     }
     return r;
+}
+
+// The point at the height and on the meridian of p, which may be anything off the axis. S is double or a Jet.
+template <class S>
+Vector3<S> position(const Tube& tube, const Vector3<S>& p) {
+    using std::cos, std::sin;
+    const S inverse_rho = inverse_sqrt(S(p[0] * p[0] + p[1] * p[1]));
+    const S cosine = p[0] * inverse_rho, sine = p[1] * inverse_rho;
+    S r(tube.radius);
+    for (const TubeMode& mode : tube.modes) {
+        const double wave_number = 2 * std::numbers::pi * mode.n / tube.length;
+        S re = cos(wave_number * p[2] + mode.phase), im = sin(wave_number * p[2] + mode.phase);
+        for (int i = 0; i < std::abs(mode.m); ++i) {  // times e^{i theta} or e^{-i theta}
+            const S turn = mode.m > 0 ? sine : -sine;
+            const S next = re * cosine - im * turn;
+            im = re * turn + im * cosine;
+            re = next;
+        }
+        r = r + mode.amplitude * re;
+    }
+    return {r * cosine, r * sine, p[2]};
 }
 
 // The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.

@@ -1,0 +1,48 @@
+// Shape "capsule": a cylinder of length `length` along z, closed by two half spheres of the same radius.
+#pragma once
+
+#include <cmath>
+
+#include "common/geometry/profile_point.hpp"
+#include "common/geometry/surface_point.hpp"
+
+namespace tubule {
+
+struct Capsule {
+    static constexpr const char* kind = "capsule";
+    double radius = 0.5, length = 2;
+};
+
+// The point of the capsule nearest to p, which may be anything off the segment |z| <= length/2 of the axis. The
+// derivatives at the seams |z| = length/2 are those of the cylinder; H and K jump there.
+template <class S>
+Vector3<S> position(const Capsule& capsule, const Vector3<S>& p) {
+    const double z = scalar_part(p[2]), half = capsule.length / 2;
+    Vector3<S> centre(S(0.0), S(0.0), p[2]);
+    if (std::abs(z) > half) centre[2] = S(std::copysign(half, z));
+    const Vector3<S> d = p - centre;
+    return centre + d * S(capsule.radius * inverse_sqrt(S(d.dot(d))));
+}
+
+inline double area(const Capsule& c) {
+    return 2 * pi * c.radius * c.length + 4 * pi * c.radius * c.radius;
+}
+inline double volume(const Capsule& c) {
+    return pi * c.radius * c.radius * (c.length + 4.0 / 3 * c.radius);
+}
+// INT (H - H0)^2 dS: cylinder and sphere.
+inline double integral_H2(const Capsule& c, double H0 = 0) {
+    const double tube = 1 / c.radius + H0, cap = 2 / c.radius + H0;
+    return 2 * pi * c.radius * (c.length * tube * tube + 2 * c.radius * cap * cap);
+}
+inline double integral_K2(const Capsule& c) {
+    return 4 * pi / (c.radius * c.radius);
+}
+
+template <class Keys>
+void keys(Keys& k, Capsule& capsule) {
+    k.number("radius", capsule.radius, {.above = 0}, k.required);
+    k.number("length", capsule.length, {.above = 0}, k.required);
+}
+
+}  // namespace tubule

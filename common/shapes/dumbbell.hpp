@@ -1,0 +1,25 @@
+// Shape "dumbbell": the surface on which the paper validates its curvatures (maths 7): the unit sphere with its
+// parallels scaled by 1/4 + 3/4 z^2.
+#pragma once
+
+#include "common/geometry/surface_point.hpp"
+
+namespace tubule {
+
+struct Dumbbell {
+    static constexpr const char* kind = "dumbbell";
+    static constexpr double exact_area = 5.176926500756, exact_volume = 0.777918180889;
+};
+
+// The image of the point of the unit sphere in the direction of p.
+template <class S>
+Vector3<S> position(const Dumbbell&, const Vector3<S>& p) {
+    const Vector3<S> n = p * inverse_sqrt(S(p.dot(p)));
+    const S scale = 0.75 * (n[2] * n[2]) + 0.25;
+    return {scale * n[0], scale * n[1], n[2]};
+}
+
+template <class Keys>
+void keys(Keys&, Dumbbell&) {}
+
+}  // namespace tubule

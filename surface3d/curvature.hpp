@@ -1,0 +1,78 @@
+// Recovery of normal, shape operator and curvatures as continuous P_k fields from the nodes of a curved mesh: several
+// ways side by side. docs/curvature.md compares them.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "surface3d/surface_space.hpp"
+
+namespace tubule::surface3d {
+
+// Nodal values.
+struct CurvatureField {
+    VectorField normal;    // unit, outward
+    TensorField B;         // shape operator
+    Eigen::VectorXd H, K;  // not in general those of the interpolated B
+};
+
+enum class Recovery {
+    elementwise,  // second derivatives of each element, projected: the paper's
+    normal,       // B = -grad nu of the projected normal, then projected
+    weak,         // (H nu, Z) = -(grad X, grad Z), and B likewise from nu by parts
+    lifted,       // element by element plus the kinks between elements, projected
+    patch_nodal,  // from polynomial graphs through the nodes around each vertex, at the nodes
+    patch         // the same, projected: the default
+};
+
+// All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate.
+CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recovery recovery = Recovery::patch);
+
+// The paper's smoothing: H and K become one implicit step of length eps > 0 of heat flow on the surface.
+void smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field);
+
+// Recovery::patch and patch_nodal, with the neighbourhoods kept for as long as the triangles stay.
+//
+// Nodes lie on the surface to the order k+1 of the elements; derivatives across their boundaries do not. So second
+// derivatives are taken from node positions alone: around each vertex, the graph of a polynomial of degree 2k over the
+// tangent plane is fitted to the nodes of the triangles around it (and of their neighbours, where those are too few),
+// by least squares. At a point of a triangle, curvatures are the means of those of the graphs of its corners, weighted
+// by its barycentric coordinates: continuous, and of order 2k-1 or better, even where P_k is not.
+class PatchRecovery {
+public:
+    explicit PatchRecovery(const CurvedMesh& mesh);
+
+    // `mesh` has the triangles of the constructor's; its nodes may have moved. The projection keeps integrals: energies
+    // are free of the error of interpolation, which has a sign.
+    CurvatureField nodal(const CurvedMesh& mesh) const;
+    CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh) const;
+
+private:
+    struct Member {
+        int node, shift;  // as the vertex sees it
+    };
+    struct Patch {
+        int vertex;
+        std::vector<std::array<int, 2>> corners;  // (cell, corner) of the triangles around
+        std::vector<Member> members;
+    };
+    struct Share {
+        int patch, shift;  // of the node, as the patch sees it
+        double weight;
+    };
+    struct Graph;
+
+    std::vector<Graph> fit(const CurvedMesh& mesh) const;
+    int shift(const CurvedMesh& mesh, int cell, int a) const {
+        return mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + a] : 0;
+    }
+
+    int degree_;
+    Tabulation corner_table_;
+    std::vector<int> patch_of_;  // of each node that is a vertex
+    std::vector<Patch> patches_;
+    std::vector<std::vector<Share>> shares_;  // of each node
+};
+
+}  // namespace tubule::surface3d

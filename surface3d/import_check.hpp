@@ -1,0 +1,36 @@
+// Is a triangle mesh the boundary of one body? Everything that is built on it takes that for granted.
+#pragma once
+
+#include <optional>
+#include <utility>
+
+#include "surface3d/import_mesh.hpp"
+
+namespace tubule::surface3d {
+
+struct MeshReport {
+    std::size_t vertices = 0, edges = 0, triangles = 0;
+    int euler = 0, genus = 0;  // vertices - edges + triangles = 2 - 2 genus
+    double area = 0, volume = 0;
+    double edge_min = 0, edge_max = 0;
+    double angle_min = 0;                         // of a triangle, degrees
+    double kink_max = 0;                          // between the normals of neighbours, degrees
+    std::size_t kink_first = 0, kink_second = 0;  // these neighbours
+};
+
+// Makes sure that the triangles are one closed, oriented surface without self-contact, of triangles with area.
+// Throws MeshError that names the first triangle, edge or vertex where that fails: a vertex out of range or twice in a
+// triangle, no area, the same triangle twice, an open edge, an edge of three or more triangles, an edge along which
+// two triangles run the same way, a vertex where two sheets touch, a second component, two triangles that meet where
+// they should not.
+// Drops vertices that no triangle uses and turns a surface that faces inward; both are told in `notes`, and so is a
+// kink of more than 60 degrees, which no smooth surface resolved by the mesh has.
+MeshReport close_mesh(ImportedMesh& imported);
+
+// The first pair of triangles (a < b, the smallest a, then b) that share a point other than their common vertices or
+// edge. Touching counts; neighbours that fold onto each other (angle below 1e-6) count. Decided by signs of
+// determinants with a bound on their rounding, so that flat neighbours are not mistaken for crossing ones. The mesh is
+// manifold and its triangles have area. Cost ~ n log n.
+std::optional<std::pair<std::size_t, std::size_t>> first_intersection(const TriangleMesh& mesh);
+
+}  // namespace tubule::surface3d

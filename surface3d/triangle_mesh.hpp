@@ -1,0 +1,26 @@
+// A closed (or z-periodic) surface of flat triangles: what curved meshes are made from, and what files hold.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace tubule::surface3d {
+
+struct TriangleMesh {
+    std::vector<Eigen::Vector3d> points;
+    std::vector<std::array<int, 3>> triangles;  // counter-clockwise seen from outside
+
+    // Tubes: the length of a period in z, and by how many periods each triangle sees its corners moved.
+    // 0 and empty on a closed surface.
+    double period = 0;
+    std::vector<std::array<int, 3>> shifts;
+
+    Eigen::Vector3d corner(int triangle, int c) const {
+        Eigen::Vector3d x = points[triangles[triangle][c]];
+        if (period > 0) x.z() += period * shifts[triangle][c];
+        return x;
+    }
+};
+
+}  // namespace tubule::surface3d
