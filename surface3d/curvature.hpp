@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "common/case/surface_choices.hpp"
 #include "surface3d/surface_space.hpp"
 
 namespace tubule::surface3d {
@@ -15,15 +16,6 @@ struct CurvatureField {
     VectorField normal;    // unit, outward
     TensorField B;         // shape operator
     Eigen::VectorXd H, K;  // not in general those of the interpolated B
-};
-
-enum class Recovery {
-    elementwise,  // second derivatives of each element, projected: the paper's
-    normal,       // B = -grad nu of the projected normal, then projected
-    weak,         // (H nu, Z) = -(grad X, grad Z), and B likewise from nu by parts
-    lifted,       // element by element plus the kinks between elements, projected
-    patch_nodal,  // from polynomial graphs through the nodes around each vertex, at the nodes
-    patch         // the same, projected: the default
 };
 
 // All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate.

@@ -6,23 +6,31 @@
 #include <variant>
 #include <vector>
 
+#include "common/case/surface_choices.hpp"
 #include "common/energy/bending.hpp"
+#include "common/shapes/capsule.hpp"
+#include "common/shapes/dumbbell.hpp"
+#include "common/shapes/ellipsoid.hpp"
+#include "common/shapes/mesh_file.hpp"
+#include "common/shapes/result_frame.hpp"
+#include "common/shapes/sphere.hpp"
+#include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule {
 
-enum class Tier { axisym };
+enum class Tier { axisym, surface3d };
 enum class ModelKind { gradient_flow };
 
-using Shape = std::variant<Tube>;
+using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
 
 struct Accuracy {
     double energy = 1e-4;  // asked error of the energy at all times, relative to E_ref
-    double r_min = 1e-3;   // floor of the neck radius: below it the run stops with pinch-off
+    double r_min = 1e-3;   // tier axisym, floor of the neck radius: below it the run stops with pinch-off
 };
 
-// Explicit choices; where absent, the asked accuracy decides.
+// Explicit choices of tier axisym; where absent, the asked accuracy decides.
 struct Discretisation {
     std::optional<int> elements;           // over one period of the tube; switches adaptive refinement off
     int order = 5;                         // polynomial degree of the spline: 3, 5, 7
@@ -32,8 +40,17 @@ struct Discretisation {
     bool symmetry = true;                  // solve one cell of a start that repeats or mirrors itself
 };
 
+// The same of tier surface3d.
+struct SurfaceDiscretisation {
+    std::optional<int> elements;  // about how many triangles
+    int order = 3;                // of the elements: 2, 3, 4
+    MeshKind mesh = MeshKind::uniform;
+    Recovery recovery = Recovery::patch;
+    double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none
+};
+
 struct TimeSpan {
-    double end = 1;
+    double end = 0;                    // 0: none, nothing moves
     std::vector<double> output;        // times of frames; 0 and end are always written
     std::optional<double> stationary;  // stop when the energy could change by less than this * E_ref until end
     std::optional<double> limit;       // wall clock seconds
@@ -62,7 +79,8 @@ struct Case {
     ModelKind model = ModelKind::gradient_flow;
     Shape shape;
     Accuracy accuracy;
-    Discretisation discretisation;
+    Discretisation discretisation;  // of tier axisym
+    SurfaceDiscretisation surface;  // of tier surface3d
     TimeSpan time;
     Expect expect;
 };

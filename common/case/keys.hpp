@@ -1,6 +1,7 @@
 // What a case file may say. Every table describes its keys once, as a template over a visitor `Keys`:
 // Reader (reader.hpp) reads and checks a file with it, Writer (write.cpp) writes one. The verbs:
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
+//   absent     a key that belongs to other cases, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
 //   table, tables (a list of tables), entries (tables under open names)    key, target, description
 //   check      a condition beyond a single key: gives "" or what is wrong, worded to follow the key
@@ -54,7 +55,8 @@ struct OpenNames {
 inline std::vector<std::string> known_series() {
     std::vector<std::string> names{"time", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "energy_error"})
+    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "energy_error",
+                             "integral_H2", "integral_K", "gauss_bonnet_defect", "elements"})
         names.push_back(name);
     names.push_back("mode_<n>");
     return names;
@@ -93,9 +95,12 @@ void keys(Keys& k, Shape& shape) {
 }
 
 template <class Keys>
-void keys(Keys& k, Accuracy& accuracy) {
+void keys(Keys& k, Accuracy& accuracy, Tier tier) {
     k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
-    k.number("r_min", accuracy.r_min, {.above = 0});
+    if (tier == Tier::axisym)
+        k.number("r_min", accuracy.r_min, {.above = 0});
+    else
+        k.absent("r_min", "must be absent: it belongs to tier \"axisym\"");
 }
 
 template <class Keys>
@@ -106,6 +111,22 @@ void keys(Keys& k, Discretisation& d) {
     k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
     k.integer("time_order", d.time_order, {.from = 1, .to = 5});
     k.flag("symmetry", d.symmetry);
+}
+
+template <class Keys>
+void keys(Keys& k, SurfaceDiscretisation& d) {
+    k.integer("elements", d.elements, {.from = 20, .to = 1000000});
+    k.integer("order", d.order, {.from = 2, .to = 4, .step = 1});
+    k.choice("mesh", d.mesh,
+             {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
+    k.choice("recovery", d.recovery,
+             {{"elementwise", Recovery::elementwise},
+              {"normal", Recovery::normal},
+              {"weak", Recovery::weak},
+              {"lifted", Recovery::lifted},
+              {"patch-nodal", Recovery::patch_nodal},
+              {"patch", Recovery::patch}});
+    k.number("smoothing", d.smoothing, {.from = 0});
 }
 
 template <class Keys>
@@ -180,18 +201,19 @@ void keys(Keys& k, Expect& expect, double end) {
         }
 }
 
+// Why a start is not one for tier "axisym": the key to blame, and the words that follow it. Empty if it is one.
+std::pair<std::string, std::string> not_axisymmetric(const Shape& shape);
+
 // What no table can tell alone.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
+    if (c.tier != Tier::axisym) return;
+    const auto [key, complaint] = not_axisymmetric(c.shape);
+    k.check(key, [&] { return complaint; });
     const Tube* tube = std::get_if<Tube>(&c.shape);
-    for (std::size_t i = 0; tube && i < tube->modes.size(); ++i)
-        k.check(fmt::format("shape.mode.{}.m", i), [&, m = tube->modes[i].m]() -> std::string {
-            if (m == 0) return {};
-            return fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no waves around the axis",
-                               m);
-        });
+    if (!tube) return;
     k.check("accuracy.r_min", [&]() -> std::string {
-        const Neck neck = std::visit([](const auto& shape) { return narrowest(shape); }, c.shape);
+        const Neck neck = narrowest(*tube);
         if (c.accuracy.r_min < neck.radius) return {};
         return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}", neck.radius,
                            neck.z, c.accuracy.r_min);
@@ -200,21 +222,33 @@ void check_together(Keys& k, const Case& c) {
 
 template <class Keys>
 void keys(Keys& k, Case& c) {
-    k.choice("tier", c.tier, {{"axisym", Tier::axisym}}, k.required);
+    k.choice("tier", c.tier, {{"axisym", Tier::axisym}, {"surface3d", Tier::surface3d}}, k.required);
+    const bool moves = c.tier == Tier::axisym;
     k.table("about", [&](auto& k) {
         k.text("title", c.title);
         k.text("source", c.source);
     });
     k.table("energy", [&](auto& k) { keys(k, c.energy); });
-    k.table("model", [&](auto& k) {
+    const auto only_axisym = [&](const std::string& key, const auto& describe) {
+        if (moves)
+            k.table(key, describe);
+        else
+            k.absent(key, "must be absent: tier \"surface3d\" does not move surfaces yet");
+    };
+    only_axisym("model", [&](auto& k) {
         k.choice("kind", c.model, {{"gradient-flow", ModelKind::gradient_flow}});
         bool volume_is_free = true;  // the only choice yet, so the case need not remember it
         k.choice("volume", volume_is_free, {{"free", true}});
     });
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
-    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy); });
-    k.table("discretisation", [&](auto& k) { keys(k, c.discretisation); });
-    k.table("time", [&](auto& k) { keys(k, c.time); });
+    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });
+    k.table("discretisation", [&](auto& k) {
+        if (c.tier == Tier::axisym)
+            keys(k, c.discretisation);
+        else
+            keys(k, c.surface);
+    });
+    only_axisym("time", [&](auto& k) { keys(k, c.time); });
     k.table("expect", [&](auto& k) { keys(k, c.expect, c.time.end); });
     check_together(k, c);
 }

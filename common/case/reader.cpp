@@ -97,9 +97,9 @@ void Reader::flag(const std::string& key, bool& target) {
     target = node->as_boolean()->get();
 }
 
-void Reader::text(const std::string& key, std::string& target) {
+void Reader::text(const std::string& key, std::string& target, bool needed) {
     const std::string what = "a string";
-    const toml::node* node = find(key, what, false);
+    const toml::node* node = find(key, what, needed);
     if (!node) return;
     if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
     target = node->as_string()->get();

@@ -51,8 +51,15 @@ public:
     }
 
     void flag(const std::string& key, bool& target);
-    void text(const std::string& key, std::string& target);
+    void text(const std::string& key, std::string& target, bool needed = false);
     void increasing(const std::string& key, std::vector<double>& target, const Range& range);
+
+    void absent(const std::string& key, const std::string& complaint) {
+        if (pass_ == Pass::names)
+            names_.push_back(key);
+        else if (table_.contains(key))
+            refuse(key, complaint);
+    }
 
     // Key "kind": makes the alternative of that name, whose keys belong to the same table.
     template <class... Kinds>

@@ -37,12 +37,14 @@ public:
     }
 
     void flag(const std::string& key, bool value) { line(key, value ? "true" : "false"); }
-    void text(const std::string& key, const std::string& value) {
+    void text(const std::string& key, const std::string& value, bool = false) {
         if (!value.empty()) line(key, toml_string(value));
     }
     void increasing(const std::string& key, const std::vector<double>& values, const Range&) {
         if (!values.empty()) line(key, fmt::format("[{}]", fmt::join(values, ", ")));
     }
+
+    void absent(const std::string&, const std::string&) {}
 
     template <class... Kinds>
     void kind(const std::variant<Kinds...>& value) {

@@ -53,9 +53,24 @@ Neck narrowest(const Tube& tube) {
 }
 
 std::string complaint(const Tube& tube) {
-    const Neck neck = narrowest(tube);
-    if (neck.radius > 0) return {};
-    return fmt::format("must have r0(z) > 0 everywhere, but r0 = {:.6g} at z = {:.6g}", neck.radius, neck.z);
+    int around = 0, along = 0;
+    for (const TubeMode& mode : tube.modes)
+        around = std::max(around, std::abs(mode.m)), along = std::max(along, mode.n);
+    if (around == 0) {
+        const Neck neck = narrowest(tube);
+        if (neck.radius > 0) return {};
+        return fmt::format("must have r0(z) > 0 everywhere, but r0 = {:.6g} at z = {:.6g}", neck.radius, neck.z);
+    }
+    const int columns = 16 * around, rows = 16 * std::max(along, 1);  // sees a radius that is not barely positive
+    for (int i = 0; i < rows; ++i)
+        for (int j = 0; j < columns; ++j) {
+            const double z = tube.length * i / rows, theta = 2 * std::numbers::pi * j / columns;
+            const double r = radius_at(tube, z, theta);
+            if (!(r > 0))
+                return fmt::format("must have r0 > 0 everywhere, but r0 = {:.6g} at z = {:.6g}, theta = {:.6g}", r, z,
+                                   theta);
+        }
+    return {};
 }
 
 double volume(const Tube& tube) {

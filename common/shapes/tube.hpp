@@ -37,6 +37,14 @@ T radius_at(const Tube& tube, const T& z) {
     return r;
 }
 
+// r0 at z on the meridian theta.
+inline double radius_at(const Tube& tube, double z, double theta) {
+    double r = tube.radius;
+    for (const TubeMode& mode : tube.modes)
+        r += mode.amplitude * std::cos(2 * std::numbers::pi * mode.n / tube.length * z + mode.m * theta + mode.phase);
+    return r;
+}
+
 // The point at the height and on the meridian of p, which may be anything off the axis. S is double or a Jet.
 template <class S>
 Vector3<S> position(const Tube& tube, const Vector3<S>& p) {

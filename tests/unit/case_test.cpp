@@ -122,7 +122,8 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
 TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
         "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, "
-        "r_min, r_max, energy_error, mode_<n>";
+        "r_min, r_max, energy_error, "
+        "integral_H2, integral_K, gauss_bonnet_defect, elements, mode_<n>";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
         Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
@@ -137,8 +138,10 @@ TEST(CaseRefusal, UnknownSeries) {
 
 TEST(CaseRefusal, MissingKeys) {
     expect_refused({
-        Edit{"tier = \"axisym\"", "", "1:1: missing key tier: \"axisym\""},
-        Edit{"kind = \"tube\"", "", "9:1: missing key shape.kind: \"tube\""},
+        Edit{"tier = \"axisym\"", "", "1:1: missing key tier: one of \"axisym\", \"surface3d\""},
+        Edit{"kind = \"tube\"", "",
+             "9:1: missing key shape.kind: one of \"tube\", \"sphere\", \"ellipsoid\", \"torus\", "
+             "\"capsule\", \"dumbbell\", \"file\", \"result\""},
         Edit{"radius = 1.0", "", "9:1: missing key shape.radius: a number > 0"},
         Edit{"length = 2.0", "", "9:1: missing key shape.length: a number > 0"},
         Edit{"amplitude = 0.3", "", "13:1: missing key shape.mode.0.amplitude: a finite number"},
@@ -148,12 +151,12 @@ TEST(CaseRefusal, MissingKeys) {
         Edit{"value = 1.0, ", "", "24:10: missing key expect.energy.value: a finite number"},
         Edit{"time = 0.1\n", "", "25:1: missing key expect.at.0.time: a number >= 0 and <= 1.4 (time.end)"},
     });
-    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: \"axisym\"");
+    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: one of \"axisym\", \"surface3d\"");
 }
 
 TEST(CaseRefusal, WrongTypes) {
     expect_refused({
-        Edit{"\"axisym\"", "1", "1:8: tier must be \"axisym\", not 1"},
+        Edit{"\"axisym\"", "1", "1:8: tier must be one of \"axisym\", \"surface3d\", not 1"},
         Edit{"\"test\"", "2024-01-01", "3:9: about.title must be a string, not a date or time"},
         Edit{"title = \"test\"", "source = true", "3:10: about.source must be a string, not true"},
         Edit{"0.06", "\"0.06\"", "6:7: energy.k42 must be a finite number, not the string \"0.06\""},
@@ -183,12 +186,14 @@ TEST(CaseRefusal, UnknownChoices) {
         "\"self-intersection\", \"resolution-lost\", \"mesh-lost\", \"solver-failed\", "
         "\"time-limit\", \"interrupted\"";
     expect_refused({
-        Edit{"\"axisym\"", "\"surface3d\"", "1:8: tier must be \"axisym\", not \"surface3d\""},
-        Edit{"\"axisym\"", "\"Axisim\"", "1:8: tier must be \"axisym\", not \"Axisim\"; did you mean 'axisym'?"},
+        Edit{"\"axisym\"", "\"Axisim\"",
+             "1:8: tier must be one of \"axisym\", \"surface3d\", not \"Axisim\"; did you mean 'axisym'?"},
         Edit{"\"gradient-flow\"", "\"fluid\"", "8:8: model.kind must be \"gradient-flow\", not \"fluid\""},
         Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"fixed\"",
              "9:10: model.volume must be \"free\", not \"fixed\""},
-        Edit{"\"tube\"", "\"sphere\"", "10:8: shape.kind must be \"tube\", not \"sphere\""},
+        Edit{"\"tube\"", "\"cube\"",
+             "10:8: shape.kind must be one of \"tube\", \"sphere\", \"ellipsoid\", \"torus\", "
+             "\"capsule\", \"dumbbell\", \"file\", \"result\", not \"cube\"; did you mean 'tube'?"},
         Edit{"[expect]", "[expect]\nstop = \"pinchoff\"",
              "24:8: expect.stop must be " + stops + ", not \"pinchoff\"; did you mean 'pinch-off'?"},
     });

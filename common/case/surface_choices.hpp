@@ -1,0 +1,23 @@
+// Choices of tier surface3d that a case may make.
+#pragma once
+
+namespace tubule {
+
+// How curvature is recovered from the nodes of curved elements (docs/curvature.md compares them).
+enum class Recovery {
+    elementwise,  // second derivatives of each element, projected: the paper's
+    normal,       // B = -grad nu of the projected normal, then projected
+    weak,         // (H nu, Z) = -(grad X, grad Z), and B likewise from nu by parts
+    lifted,       // element by element plus the kinks between elements, projected
+    patch_nodal,  // from polynomial graphs through the nodes around each vertex, at the nodes
+    patch         // the same, projected: the default
+};
+
+// How a mesh is made for a shape.
+enum class MeshKind {
+    uniform,   // triangles of about equal size
+    graded,    // small where the curvature varies within a short distance
+    irregular  // uniform, then disturbed at random: to see that nothing hangs on regular neighbours
+};
+
+}  // namespace tubule

@@ -1,0 +1,98 @@
+// The shapes a case may begin with: what each tier accepts, what is refused, and that a case reads back as written.
+#include <gtest/gtest.h>
+
+#include "common/case/read.hpp"
+
+namespace tubule {
+namespace {
+
+const std::string energy = "[energy]\nk20 = 1.0\n";             // lines 2, 3
+const std::string surface = "tier = \"surface3d\"\n" + energy;  // line 1 and these
+const std::string axisym = "tier = \"axisym\"\n" + energy;
+const std::string time_span = "[time]\nend = 1.0\n";
+
+std::string refusal(const std::string& text) {
+    try {
+        parse_case(text, {}, "case.toml");
+    } catch (const CaseError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+std::string shape(const std::string& keys) {
+    return "[shape]\n" + keys;  // its keys begin in line 5
+}
+
+TEST(ShapeKeys, EveryShapeReadsBackAsWritten) {
+    const std::vector<std::string> shapes{
+        "kind = \"tube\"\nradius = 1\nlength = 2\n[[shape.mode]]\namplitude = 0.1\nn = 1\nm = -2\nphase = 0.5\n",
+        "kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 0.5\nl = 5\nm = 3\n",
+        "kind = \"ellipsoid\"\na = 1\nb = 1.25\nc = 0.75\n",
+        "kind = \"torus\"\nradius = 2\ntube_radius = 0.5\n",
+        "kind = \"capsule\"\nradius = 0.5\nlength = 2\n",
+        "kind = \"dumbbell\"\n",
+        "kind = \"file\"\npath = \"scan.obj\"\nweld = 1e-6\nsmoothing = 2\n",
+        "kind = \"result\"\npath = \"run.hdf\"\nframe = -2\n"};
+    ASSERT_EQ(shapes.size(), std::variant_size_v<Shape>);
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+        const Case c = parse_case(surface + shape(shapes[i]), {}, "case.toml");
+        EXPECT_EQ(c.shape.index(), i);
+        const std::string written = effective_toml(c);
+        EXPECT_EQ(effective_toml(parse_case(written, {}, "again.toml")), written);
+        for (const char* value : {"1.25", "scan.obj", "-2", "1e-06"})  // not lost on the way
+            if (shapes[i].find(value) != std::string::npos)
+                EXPECT_NE(written.find(value), std::string::npos) << written;
+    }
+}
+
+TEST(ShapeKeys, ChoicesOfTheSurface) {
+    const Case c = parse_case(surface + shape("kind = \"dumbbell\"\n") +
+                                  "[discretisation]\nelements = 500\norder = 4\nmesh = \"graded\"\n"
+                                  "recovery = \"elementwise\"\nsmoothing = 1e-3\n",
+                              {}, "case.toml");
+    EXPECT_EQ(c.surface.elements, 500);
+    EXPECT_EQ(c.surface.order, 4);
+    EXPECT_EQ(c.surface.mesh, MeshKind::graded);
+    EXPECT_EQ(c.surface.recovery, Recovery::elementwise);
+    EXPECT_EQ(c.surface.smoothing, 1e-3);
+    EXPECT_EQ(refusal(surface + shape("kind = \"dumbbell\"\n") + "[discretisation]\norder = 5\n"),
+              "case.toml:7:9: discretisation.order must be one of 2, 3, 4, not 5");
+    EXPECT_EQ(refusal(surface + shape("kind = \"dumbbell\"\n") + "[discretisation]\nsymmetry = true\n"),
+              "case.toml:7:1: unknown key discretisation.symmetry. Allowed here: elements, order, mesh, recovery, "
+              "smoothing");
+}
+
+TEST(ShapeKeys, ImpossibleShapes) {
+    const auto refused = [](const std::string& keys) { return refusal(surface + shape(keys)); };
+    EXPECT_EQ(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 0.1\nl = 2\nm = 3\n"),
+              "case.toml:10:5: shape.mode.0.m must be an integer >= 0 and <= 2 (l), not 3");
+    EXPECT_NE(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 9\nl = 2\nm = 0\n")
+                  .find("case.toml:4:1: shape must have a positive radius everywhere, but it is -"),
+              std::string::npos);
+    EXPECT_EQ(refused("kind = \"torus\"\nradius = 1\ntube_radius = 1\n"),
+              "case.toml:7:15: shape.tube_radius must be below shape.radius: the torus meets itself");
+    EXPECT_EQ(refused("kind = \"file\"\n"), "case.toml:4:1: missing key shape.path: a string");
+    // A wave around the axis that the meridian theta = 0 does not show: r0 = 1 - 1.1 sin(theta).
+    EXPECT_EQ(refused("kind = \"tube\"\nradius = 1\nlength = 2\n[[shape.mode]]\namplitude = 1.1\nn = 0\nm = 1\n"
+                      "phase = 1.5707963267948966\n"),
+              "case.toml:4:1: shape must have r0 > 0 everywhere, but r0 = -0.0162675 at z = 0, theta = 1.1781");
+}
+
+TEST(ShapeKeys, WhatEachTierTakes) {
+    const auto refused = [](const std::string& keys) { return refusal(axisym + shape(keys) + time_span); };
+    EXPECT_EQ(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 0.1\nl = 2\nm = 1\n"),
+              "case.toml:10:5: shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no waves "
+              "around the axis");
+    EXPECT_EQ(refused("kind = \"ellipsoid\"\na = 1\nb = 2\nc = 1\n"),
+              "case.toml:7:5: shape.b must be a = 1, not 2: tier \"axisym\" is axisymmetric about z");
+    EXPECT_EQ(refused("kind = \"file\"\npath = \"scan.obj\"\n"),
+              "case.toml:5:8: shape.kind must not be \"file\": meshes need tier = \"surface3d\"");
+    const auto still = [](const std::string& more) { return refusal(surface + shape("kind = \"dumbbell\"\n") + more); };
+    EXPECT_EQ(still(time_span), "case.toml:6:1: time must be absent: tier \"surface3d\" does not move surfaces yet");
+    EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
+              "case.toml:7:9: accuracy.r_min must be absent: it belongs to tier \"axisym\"");
+}
+
+}  // namespace
+}  // namespace tubule
