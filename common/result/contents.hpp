@@ -19,12 +19,14 @@ struct Contents {
     About about;
     std::vector<std::string> series;  // names
     std::vector<double> rows;         // row-major, series.size() numbers a row
+    std::vector<SurfaceCells> meshes;
     std::vector<Record> frames;
     std::optional<Record> checkpoint;
 
     void add_row(std::span<const double> values) { rows.insert(rows.end(), values.begin(), values.end()); }
     void forget() {
         rows.clear();
+        meshes.clear();
         frames.clear();
         checkpoint.reset();
     }

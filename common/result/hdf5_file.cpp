@@ -7,140 +7,30 @@
 #include <cerrno>
 #include <mutex>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
 #include "common/result/durable_io.hpp"
+#include "common/result/hdf5_objects.hpp"
+#include "common/result/vtk_grid.hpp"
 
 namespace tubule {
+
+using namespace h5;
 
 namespace {
 
 std::mutex library;  // HDF5 may be built without thread safety
 
-// HDF5 prints its errors unless told not to; ours go into exceptions.
-class Quiet {
-public:
-    Quiet() {
-        H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
-        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    }
-    Quiet(const Quiet&) = delete;
-    Quiet& operator=(const Quiet&) = delete;
-    ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
-
-private:
-    H5E_auto2_t print_ = nullptr;
-    void* data_ = nullptr;
-};
-
-// HDF5's own word on its last error: the innermost description.
-std::string last_error() {
-    std::string words;
-    const auto visit = [](unsigned n, const H5E_error2_t* error, void* out) -> herr_t {
-        if (n == 0 && error->desc) *static_cast<std::string*>(out) = error->desc;
-        return 0;
-    };
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &words);
-    return words;
-}
-
-void require(bool done, std::string_view what, std::string_view name) {
-    if (!done) throw std::runtime_error(fmt::format("HDF5 cannot {} {}: {}", what, name, last_error()));
-}
-
-class Handle {
-public:
-    Handle(hid_t id, herr_t (*close)(hid_t), std::string_view what, std::string_view name) : id_(id), close_(close) {
-        require(id >= 0, what, name);
-    }
-    Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
-    Handle(const Handle&) = delete;
-    Handle& operator=(const Handle&) = delete;
-    ~Handle() {
-        if (id_ >= 0) close_(id_);
-    }
-    operator hid_t() const { return id_; }
-
-private:
-    hid_t id_;
-    herr_t (*close_)(hid_t);
-};
-
-Handle property_list(hid_t kind) {
-    return {H5Pcreate(kind), H5Pclose, "make", "a property list"};
-}
-
-Handle text_type() {
-    Handle type(H5Tcopy(H5T_C_S1), H5Tclose, "make", "a string type");
-    H5Tset_size(type, H5T_VARIABLE);
-    H5Tset_cset(type, H5T_CSET_UTF8);
-    return type;
-}
-
-Handle scalar() {
-    return {H5Screate(H5S_SCALAR), H5Sclose, "make", "a dataspace"};
-}
-
-Handle space(const std::vector<std::size_t>& shape) {
-    if (shape.empty()) return scalar();
-    const std::vector<hsize_t> extents(shape.begin(), shape.end());
-    return {H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose, "make",
-            "a dataspace"};
-}
-
 // ---- writing
 
-void put_attribute(hid_t object, const std::string& name, hid_t type, hid_t extent, const void* data) {
-    const Handle attribute(H5Acreate2(object, name.c_str(), type, extent, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
-                           "make attribute", name);
-    const bool empty = H5Sget_simple_extent_npoints(extent) == 0;
-    require(empty || H5Awrite(attribute, type, data) >= 0, "write attribute", name);
-}
-void put_attribute(hid_t object, const std::string& name, double value) {
-    put_attribute(object, name, H5T_NATIVE_DOUBLE, scalar(), &value);
-}
-void put_attribute(hid_t object, const std::string& name, std::int64_t value) {
-    put_attribute(object, name, H5T_NATIVE_INT64, scalar(), &value);
-}
-void put_attribute(hid_t object, const std::string& name, std::uint64_t value) {
-    put_attribute(object, name, H5T_NATIVE_UINT64, scalar(), &value);
-}
-void put_attribute(hid_t object, const std::string& name, const std::string& text) {
-    const char* data = text.c_str();
-    put_attribute(object, name, text_type(), scalar(), &data);
-}
-void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts) {
-    std::vector<const char*> data;
-    for (const std::string& text : texts) data.push_back(text.c_str());
-    put_attribute(object, name, text_type(), space({texts.size()}), data.data());
-}
-
-Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data) {
-    const auto how = property_list(H5P_DATASET_CREATE);
-    H5Pset_obj_track_times(how, false);  // equal contents give equal bytes
-    Handle dataset(H5Dcreate2(parent, name.c_str(), type, extent, H5P_DEFAULT, how, H5P_DEFAULT), H5Dclose, "make",
-                   name);
-    const bool empty = H5Sget_simple_extent_npoints(extent) == 0;
-    require(empty || H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "write", name);
-    return dataset;
-}
-
-// A group that remembers the order in which its attributes and members were made.
-Handle make_group(hid_t parent, const std::string& name) {
-    const auto how = property_list(H5P_GROUP_CREATE);
-    H5Pset_obj_track_times(how, false);
-    H5Pset_link_creation_order(how, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
-    H5Pset_attr_creation_order(how, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
-    // Many attributes in the object's header, rather than in a heap and a tree of several kilobytes a frame.
-    H5Pset_attr_phase_change(how, 256, 0);
-    return {H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, how, H5P_DEFAULT), H5Gclose, "make", name};
-}
-
-void put_record(hid_t parent, const std::string& name, const Record& record) {
+void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes) {
     const auto group = make_group(parent, name);
     put_attribute(group, "time", record.time);
     for (const auto& [key, value] : record.numbers) put_attribute(group, key, value);
+    if (record.mesh) {
+        put_grid(group, record, meshes[*record.mesh]);
+        return;
+    }
     for (const Array& array : record.arrays)
         put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data());
 }
@@ -160,127 +50,39 @@ std::size_t size_estimate(const Contents& contents) {
     std::size_t doubles = contents.rows.size();
     for (const Record& frame : contents.frames)
         for (const Array& array : frame.arrays) doubles += array.data.size();
-    return doubles * sizeof(double) + contents.frames.size() * 4096;
+    std::size_t integers = 0;
+    for (const SurfaceCells& mesh : contents.meshes) integers += 2 * mesh.cells.size();
+    return doubles * sizeof(double) + integers * sizeof(std::int64_t) + contents.frames.size() * 4096;
 }
 
 // ---- reading
 
-bool has(hid_t parent, const std::string& name) {
-    return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0;
+// All attributes of a record are numbers; on a mesh, but for these.
+bool is_of_the_grid(const std::string& attribute) {
+    return std::find(std::begin(grid_attributes), std::end(grid_attributes), attribute) != std::end(grid_attributes);
 }
 
-Handle open_group(hid_t parent, const std::string& name) {
-    return {H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, "open", name};
-}
-
-// In the order of writing, where the group knows it (a copy made by another program may not).
-H5_index_t attribute_index(hid_t group) {
-    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
-    unsigned order = 0;
-    H5Pget_attr_creation_order(how, &order);
-    return (order & H5P_CRT_ORDER_TRACKED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
-}
-H5_index_t member_index(hid_t group) {
-    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
-    unsigned order = 0;
-    H5Pget_link_creation_order(how, &order);
-    return (order & H5P_CRT_ORDER_TRACKED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
-}
-
-// name(buffer, size) fills a buffer and returns the length, as HDF5's functions do.
-template <class Name>
-std::string name_of(const Name& name) {
-    const ssize_t length = name(nullptr, 0);
-    require(length >= 0, "read", "a name");
-    std::string text(static_cast<std::size_t>(length), '\0');
-    name(text.data(), text.size() + 1);
-    return text;
-}
-
-Handle open_attribute(hid_t object, const std::string& name) {
-    return {H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name};
-}
-
-template <class T>
-T get_attribute(hid_t attribute, hid_t type, std::string_view name) {
-    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
-    require(H5Sget_simple_extent_npoints(extent) == 1, "read as one value attribute", name);
-    T value{};
-    require(H5Aread(attribute, type, &value) >= 0, "read attribute", name);
-    return value;
-}
-
-std::vector<std::string> get_texts(hid_t attribute, std::string_view name) {
-    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
-    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
-    if (data.empty()) return {};
-    const auto type = text_type();
-    require(H5Aread(attribute, type, data.data()) >= 0, "read attribute", name);
-    std::vector<std::string> texts;
-    for (const char* text : data) texts.emplace_back(text ? text : "");
-    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
-    return texts;
-}
-
-Value get_value(hid_t attribute, std::string_view name) {
-    const Handle type(H5Aget_type(attribute), H5Tclose, "read attribute", name);
-    switch (H5Tget_class(type)) {
-        case H5T_INTEGER:
-            return get_attribute<std::int64_t>(attribute, H5T_NATIVE_INT64, name);
-        case H5T_FLOAT:
-            return get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, name);
-        default:
-            break;
-    }
-    const auto texts = get_texts(attribute, name);
-    require(texts.size() == 1, "read as one value attribute", name);
-    return texts.front();
-}
-
-// Calls visit(attribute, name) for each attribute of a group.
-template <class Visit>
-void for_each_attribute(hid_t group, const Visit& visit) {
-    H5O_info_t info;
-    require(H5Oget_info2(group, &info, H5O_INFO_NUM_ATTRS) >= 0, "read", "a group");
-    const H5_index_t index = attribute_index(group);
-    for (hsize_t i = 0; i < info.num_attrs; ++i) {
-        const Handle attribute(H5Aopen_by_idx(group, ".", index, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
-                               "open attribute", std::to_string(i));
-        visit(attribute, name_of([&](char* into, std::size_t n) { return H5Aget_name(attribute, n, into); }));
-    }
-}
-
-Array get_array(hid_t parent, const std::string& name) {
-    Array array;
-    array.name = name;
-    const Handle dataset(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, "open dataset", name);
-    const Handle extent(H5Dget_space(dataset), H5Sclose, "read", name);
-    std::vector<hsize_t> extents(static_cast<std::size_t>(H5Sget_simple_extent_ndims(extent)));
-    H5Sget_simple_extent_dims(extent, extents.data(), nullptr);
-    array.shape.assign(extents.begin(), extents.end());
-    array.data.resize(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
-    require(H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data.data()) >= 0, "read", name);
-    return array;
-}
-
-Record get_record(hid_t parent, const std::string& name) {
+Record get_record(hid_t parent, const std::string& name, const std::vector<SurfaceCells>& meshes) {
     Record record;
     const auto group = open_group(parent, name);
-    for_each_attribute(group, [&](hid_t attribute, const std::string& key) {
-        const double value = get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, key);
-        if (key == "time")
-            record.time = value;
+    for (const std::string& key : attribute_names(group)) {
+        const auto attribute = open_attribute(group, key);
+        if (key == "mesh")
+            record.mesh = get_attribute<std::size_t>(attribute, H5T_NATIVE_UINT64, key);
+        else if (is_of_the_grid(key))
+            continue;
+        else if (key == "time")
+            record.time = get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, key);
         else
-            record.numbers.emplace_back(key, value);
-    });
-    H5G_info_t info;
-    require(H5Gget_info(group, &info) >= 0, "read", name);
-    const H5_index_t index = member_index(group);
-    for (hsize_t i = 0; i < info.nlinks; ++i)
-        record.arrays.push_back(get_array(group, name_of([&](char* into, std::size_t n) {
-                                              return H5Lget_name_by_idx(group, ".", index, H5_ITER_INC, i, into, n,
-                                                                        H5P_DEFAULT);
-                                          })));
+            record.numbers.emplace_back(key, get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, key));
+    }
+    if (record.mesh) {
+        if (*record.mesh >= meshes.size())
+            throw std::runtime_error(fmt::format("{} lies on mesh {}, which is missing", name, *record.mesh));
+        record.arrays = get_grid_arrays(group, meshes[*record.mesh]);
+    } else {
+        for (const std::string& key : member_names(group)) record.arrays.push_back(get_array(group, key));
+    }
     return record;
 }
 
@@ -325,15 +127,19 @@ Contents get_contents(hid_t file) {
         get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
     contents.case_text = {get_case_text(text), get_texts(open_attribute(text, "set"), "set")};
-    for_each_attribute(open_group(file, "about"), [&](hid_t attribute, const std::string& name) {
-        contents.about.emplace_back(name, get_value(attribute, name));
-    });
+    const auto about = open_group(file, "about");
+    for (const std::string& name : attribute_names(about))
+        contents.about.emplace_back(name, get_value(open_attribute(about, name), name));
     get_series(file, contents);
+    if (has(file, "meshes")) {
+        const auto meshes = open_group(file, "meshes");
+        for (std::size_t i = member_names(meshes).size(); contents.meshes.size() < i;)
+            contents.meshes.push_back(get_mesh(meshes, fmt::format("{:06}", contents.meshes.size())));
+    }
     const auto frames = open_group(file, "frames");
-    H5G_info_t info;
-    require(H5Gget_info(frames, &info) >= 0, "read", "frames");
-    for (hsize_t i = 0; i < info.nlinks; ++i) contents.frames.push_back(get_record(frames, fmt::format("{:06}", i)));
-    if (has(file, "checkpoint")) contents.checkpoint = get_record(file, "checkpoint");
+    for (std::size_t i = member_names(frames).size(); contents.frames.size() < i;)
+        contents.frames.push_back(get_record(frames, fmt::format("{:06}", contents.frames.size()), contents.meshes));
+    if (has(file, "checkpoint")) contents.checkpoint = get_record(file, "checkpoint", contents.meshes);
     return contents;
 }
 
@@ -364,12 +170,8 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
 std::vector<std::byte> hdf5_image(const Contents& contents) {
     const std::lock_guard lock(library);
     const Quiet quiet;
-    const auto access = property_list(H5P_FILE_ACCESS);
-    // In memory, growing by as much as all of it should take, so that it is moved seldom.
-    H5Pset_fapl_core(access, std::max<std::size_t>(size_estimate(contents), 1 << 16), false);
-    const char* name = "image of a tubule result";  // appears nowhere
-    const Handle file(H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "make", name);
-
+    // Growing by as much as all of it should take, so that it is moved seldom.
+    const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
     put_attribute(file, "id", contents.id);
     put_attribute(file, "sequence", contents.sequence);
     put_attribute(file, "about_begun", contents.about_begun);
@@ -379,17 +181,23 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     for (const auto& [key, value] : contents.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
     put_series(file, contents);
+    const auto meshes = put_meshes(file, contents.meshes);
     const auto frames = make_group(file, "frames");
     for (std::size_t i = 0; i < contents.frames.size(); ++i)
-        put_record(frames, fmt::format("{:06}", i), contents.frames[i]);
-    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint);
+        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes);
+    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes);
+    put_steps(file, contents, meshes);
+    return bytes_of(file);
+}
 
-    require(H5Fflush(file, H5F_SCOPE_LOCAL) >= 0, "flush", name);
-    const ssize_t size = H5Fget_file_image(file, nullptr, 0);
-    require(size > 0, "measure", name);
-    std::vector<std::byte> image(static_cast<std::size_t>(size));
-    require(H5Fget_file_image(file, image.data(), image.size()) == size, "copy", name);
-    return image;
+std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
+    const std::lock_guard lock(library);
+    const Quiet quiet;
+    const auto image = make_image(4096);
+    const std::string target = fmt::format("/frames/{:06}", frame);
+    require(H5Lcreate_external(file.c_str(), target.c_str(), image, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT) >= 0, "link",
+            file);
+    return bytes_of(image);
 }
 
 Contents read_hdf5(const std::filesystem::path& file) {

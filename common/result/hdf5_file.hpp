@@ -1,8 +1,9 @@
-// Contents as HDF5, the layout of docs/results.md. The one place that sees the HDF5 library.
+// Contents as HDF5, the layout of docs/results.md.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "common/result/contents.hpp"
@@ -11,6 +12,9 @@ namespace tubule {
 
 // The bytes of the file, made in memory.
 std::vector<std::byte> hdf5_image(const Contents& contents);
+
+// The bytes of a file in which VTK finds that frame of `file`, a path relative to the folder of the one to be written.
+std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
 
 // Both throw std::runtime_error naming the file, and what it lacks if it is HDF5 but no result.
 Contents read_hdf5(const std::filesystem::path& file);

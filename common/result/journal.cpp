@@ -74,6 +74,7 @@ class Payload {
 public:
     explicit Payload(std::span<const std::byte> bytes) : rest_(bytes) {}
 
+    bool empty() const { return rest_.empty(); }
     std::span<const std::byte> take(std::size_t n) {
         if (n > rest_.size()) throw std::runtime_error("a journal record is shorter than it says");
         const auto taken = rest_.first(n);
@@ -90,9 +91,10 @@ public:
         const auto bytes = take(get<std::uint64_t>());
         return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
     }
-    std::vector<double> doubles(std::size_t n) {
-        const auto bytes = take(n * sizeof(double));
-        std::vector<double> values(n);
+    template <class T>
+    std::vector<T> list(std::size_t n) {
+        const auto bytes = take(n * sizeof(T));
+        std::vector<T> values(n);
         if (n > 0) std::memcpy(values.data(), bytes.data(), bytes.size());
         return values;
     }
@@ -116,6 +118,7 @@ void put(std::vector<std::byte>& out, const Record& record) {
         put(out, std::uint64_t{array.data.size()});
         put(out, std::span<const double>(array.data));
     }
+    if (record.mesh) put(out, std::uint64_t{*record.mesh});
 }
 
 Record get_record(Payload& in) {
@@ -129,17 +132,40 @@ Record get_record(Payload& in) {
         Array array;
         array.name = in.text();
         for (auto rank = in.get<std::uint64_t>(); rank > 0; --rank) array.shape.push_back(in.get<std::uint64_t>());
-        array.data = in.doubles(in.get<std::uint64_t>());
+        array.data = in.list<double>(in.get<std::uint64_t>());
         record.arrays.push_back(std::move(array));
     }
+    if (!in.empty()) record.mesh = in.get<std::uint64_t>();
     return record;
+}
+
+void put(std::vector<std::byte>& out, const std::vector<int>& values) {
+    put(out, std::uint64_t{values.size()});
+    put(out, std::as_bytes(std::span(values)));
+}
+void put(std::vector<std::byte>& out, const SurfaceCells& mesh) {
+    put(out, static_cast<std::uint64_t>(mesh.order));
+    put(out, std::uint64_t{mesh.nodes});
+    put(out, mesh.period);
+    put(out, mesh.cells);
+    put(out, mesh.shifts);
+}
+
+SurfaceCells get_mesh(Payload& in) {
+    SurfaceCells mesh;
+    mesh.order = static_cast<int>(in.get<std::uint64_t>());
+    mesh.nodes = in.get<std::uint64_t>();
+    mesh.period = in.get<double>();
+    mesh.cells = in.list<int>(in.get<std::uint64_t>());
+    mesh.shifts = in.list<int>(in.get<std::uint64_t>());
+    return mesh;
 }
 
 void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
     Payload payload(bytes);
     switch (kind) {
         case Entry::row:
-            contents.add_row(payload.doubles(contents.series.size()));
+            contents.add_row(payload.list<double>(contents.series.size()));
             return;
         case Entry::frame:
             contents.frames.push_back(get_record(payload));
@@ -149,6 +175,9 @@ void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
             return;
         case Entry::discard:
             contents.forget();
+            return;
+        case Entry::mesh:
+            contents.meshes.push_back(get_mesh(payload));
             return;
     }
     throw std::runtime_error(fmt::format("a journal record is of the unknown kind {}", static_cast<unsigned>(kind)));
@@ -265,6 +294,12 @@ void Journal::record(Entry kind, std::uint64_t sequence, const Record& record) {
 
 void Journal::discard(std::uint64_t sequence) {
     begin(Entry::discard);
+    commit(sequence);
+}
+
+void Journal::mesh(std::uint64_t sequence, const SurfaceCells& mesh) {
+    begin(Entry::mesh);
+    put(buffer_, mesh);
     commit(sequence);
 }
 

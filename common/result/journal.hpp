@@ -20,7 +20,7 @@ namespace tubule {
 // The journal may grow by this many bytes beyond the size of the file before it is merged; the tests lower it.
 inline std::size_t journal_slack = std::size_t{4} << 20;
 
-enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard };
+enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh };
 
 // Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
 std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
@@ -43,6 +43,7 @@ public:
     void row(std::uint64_t sequence, std::span<const double> values);
     void record(Entry kind, std::uint64_t sequence, const Record& record);
     void discard(std::uint64_t sequence);
+    void mesh(std::uint64_t sequence, const SurfaceCells& mesh);
 
     std::size_t size() const { return size_; }  // bytes
 

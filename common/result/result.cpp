@@ -14,6 +14,8 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_file.hpp"
 #include "common/result/journal.hpp"
+#include "common/result/view.hpp"
+#include "common/result/vtk_grid.hpp"
 
 namespace tubule {
 
@@ -56,11 +58,45 @@ void check_series(const std::vector<std::string>& series) {
     if (!taken.contains("time")) throw std::invalid_argument("series: there must be one of the name time");
 }
 
-void check_record(const Record& record, const std::string& where) {
+void check_free(const std::string& name, std::span<const char* const> taken, const std::string& where) {
+    if (std::find(taken.begin(), taken.end(), name) != taken.end())
+        throw std::invalid_argument(fmt::format("{}: {} is a name that the format of meshes needs", where, name));
+}
+
+void check_mesh(const SurfaceCells& mesh) {
+    const auto refuse = [](const std::string& why) { throw std::invalid_argument("mesh: " + why); };
+    if (mesh.order < 1 || mesh.order > 4) refuse(fmt::format("its order is {}, not 1 to 4", mesh.order));
+    const int width = (mesh.order + 1) * (mesh.order + 2) / 2;
+    if (mesh.cells.empty() || mesh.cells.size() % static_cast<std::size_t>(width) != 0)
+        refuse(fmt::format("{} node numbers for cells of {}", mesh.cells.size(), width));
+    for (const int node : mesh.cells)
+        if (node < 0 || static_cast<std::size_t>(node) >= mesh.nodes)
+            refuse(fmt::format("a cell has node {}, there are {}", node, mesh.nodes));
+    if (!std::isfinite(mesh.period) || mesh.period < 0) refuse(fmt::format("its period is {}", mesh.period));
+    const std::size_t shifts = mesh.period > 0 ? mesh.cells.size() : 0;
+    if (mesh.shifts.size() != shifts)
+        refuse(fmt::format("{} shifts, where its period {} asks for {}", mesh.shifts.size(), mesh.period, shifts));
+}
+
+// A record on a curved surface.
+void check_grid(const Record& record, const std::vector<SurfaceCells>& meshes, const std::string& where) {
+    const auto refuse = [&](const std::string& why) { throw std::invalid_argument(where + ": " + why); };
+    if (*record.mesh >= meshes.size()) refuse(fmt::format("mesh {}, there are {}", *record.mesh, meshes.size()));
+    const SurfaceCells& mesh = meshes[*record.mesh];
+    const auto points = std::find_if(record.arrays.begin(), record.arrays.end(),
+                                     [](const Array& array) { return array.name == "points"; });
+    if (points == record.arrays.end() || points->shape != std::vector<std::size_t>{mesh.nodes, 3})
+        refuse(fmt::format("on a mesh it must have an array points [{}, 3]", mesh.nodes));
+    for (const Array& array : record.arrays)
+        if (!is_point_data(array, mesh)) check_free(array.name, grid_members, where);
+}
+
+void check_record(const Record& record, const std::vector<SurfaceCells>& meshes, const std::string& where) {
     check_finite(record.time, where, "time");
     std::set<std::string> numbers{"time"};
     for (const auto& [name, value] : record.numbers) {
         check_name(name, where, numbers);
+        check_free(name, grid_attributes, where);
         check_finite(value, where, name);
     }
     std::set<std::string> arrays;
@@ -76,6 +112,7 @@ void check_record(const Record& record, const std::string& where) {
         if (bad != array.data.end())
             check_finite(*bad, where, fmt::format("{}[{}]", array.name, bad - array.data.begin()));
     }
+    if (record.mesh) check_grid(record, meshes, where);
 }
 
 // The result behind a name, whatever the process's directory becomes later; through a symbolic link if it is one.
@@ -127,6 +164,12 @@ Record rewind(Contents& contents) {
     }
     contents.rows.resize(kept);
     std::erase_if(contents.frames, [&](const Record& frame) { return frame.time > record.time; });
+    // From the end only: the numbers of the others stay what they were.
+    std::size_t needed = record.mesh ? *record.mesh + 1 : 0;
+    for (const Record& frame : contents.frames)
+        if (frame.mesh) needed = std::max(needed, *frame.mesh + 1);
+    if (contents.checkpoint && contents.checkpoint->mesh) needed = std::max(needed, *contents.checkpoint->mesh + 1);
+    contents.meshes.resize(needed);
     contents.about.resize(std::min<std::size_t>(contents.about.size(), contents.about_begun));
     return record;
 }
@@ -232,8 +275,22 @@ void ResultWriter::row(std::span<const double> values) {
     impl_->consolidate_if_due();
 }
 
+std::size_t ResultWriter::mesh(const SurfaceCells& cells) {
+    check_mesh(cells);
+    const auto sequence = impl_->next();
+    std::vector<SurfaceCells>& meshes = impl_->contents.meshes;
+    const auto same = std::find(meshes.begin(), meshes.end(), cells);
+    const auto number = static_cast<std::size_t>(same - meshes.begin());
+    if (same != meshes.end()) return number;
+    impl_->journal.mesh(sequence, cells);
+    meshes.push_back(cells);
+    impl_->contents.sequence = sequence;
+    impl_->consolidate_if_due();
+    return number;
+}
+
 void ResultWriter::frame(const Record& frame) {
-    check_record(frame, "frame");
+    check_record(frame, impl_->contents.meshes, "frame");
     const auto sequence = impl_->next();
     impl_->journal.record(Entry::frame, sequence, frame);
     impl_->contents.frames.push_back(frame);
@@ -242,7 +299,7 @@ void ResultWriter::frame(const Record& frame) {
 }
 
 void ResultWriter::checkpoint(const Record& state) {
-    check_record(state, "checkpoint");
+    check_record(state, impl_->contents.meshes, "checkpoint");
     const auto sequence = impl_->next();
     impl_->journal.record(Entry::checkpoint, sequence, state);
     impl_->contents.checkpoint = state;
@@ -270,6 +327,7 @@ void ResultWriter::finish(const About& more) {
             about.emplace_back(name, value);
     }
     durable::replace(impl_->file, hdf5_image(impl_->contents));
+    write_view(impl_->file, impl_->contents);  // before the journal goes: after a kill, repair makes the view whole
     impl_->journal.remove();
     impl_->finished = true;
 }
@@ -286,6 +344,7 @@ Result read_result(const fs::path& file) {
     result.case_text = std::move(contents.case_text);
     result.about = std::move(contents.about);
     result.series_names = std::move(contents.series);
+    result.meshes = std::move(contents.meshes);
     result.frames = std::move(contents.frames);
     result.checkpoint = std::move(contents.checkpoint);
     return result;
@@ -296,7 +355,9 @@ void repair_result(const fs::path& file) {
     require_result(path);
     if (!fs::exists(journal_path(path))) return;
     Journal journal(path);
-    durable::replace(path, hdf5_image(load(path)));
+    const Contents contents = load(path);
+    durable::replace(path, hdf5_image(contents));
+    write_view(path, contents);
     journal.remove();
 }
 

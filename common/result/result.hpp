@@ -20,11 +20,29 @@ struct Array {
     std::vector<double> data;
 };
 
+// The curved cells that frames share until a remesh (/meshes/000000): isoparametric Lagrange triangles, their nodes in
+// VTK's order (surface3d/curved_mesh.hpp).
+struct SurfaceCells {
+    int order = 3;           // k, 1 to 4
+    std::size_t nodes = 0;   // how many
+    std::vector<int> cells;  // node numbers, (k+1)(k+2)/2 for each cell
+
+    // Tubes: the length of a period in z, and for every entry of `cells` the number of periods by which the node is
+    // moved as this cell sees it. 0 and empty on a closed surface.
+    double period = 0;
+    std::vector<int> shifts;
+
+    bool operator==(const SurfaceCells&) const = default;
+};
+
 // A frame (/frames/000123) or a restart record (/checkpoint): a time, named numbers (attributes), named arrays.
 struct Record {
     double time = 0;
     std::vector<std::pair<std::string, double>> numbers;
     std::vector<Array> arrays;
+    // Of a curved surface: the number of its SurfaceCells. Then there must be an array "points" [nodes, 3], and arrays
+    // [nodes], [nodes, 3] and [nodes, 6] are data of the nodes for VTK (but for "restart_...").
+    std::optional<std::size_t> mesh = std::nullopt;
 };
 
 using Value = std::variant<std::int64_t, double, std::string>;
@@ -48,7 +66,7 @@ public:
     static ResultWriter create(const std::filesystem::path& file, const CaseText& c, const About& about,
                                const std::vector<std::string>& series);
     // Goes on with a result from its newest restart record (checkpoint or last frame, whichever is later);
-    // rows and frames later than that are dropped, and what finish() had added to /about.
+    // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
     // restart_record() gives it. Throws std::runtime_error if there is none.
     static ResultWriter resume(const std::filesystem::path& file);
     ResultWriter(ResultWriter&&) noexcept;
@@ -57,9 +75,11 @@ public:
 
     const Record& restart_record() const;      // of a resumed result
     void row(std::span<const double> values);  // one value a series, in the order given to create
+    // Gives the number by which later frames name these cells; that of an equal mesh if there is one.
+    std::size_t mesh(const SurfaceCells& cells);
     void frame(const Record& frame);
     void checkpoint(const Record& state);  // replaces the one before
-    void discard();                        // forgets all rows, frames and the checkpoint: the run begins again
+    void discard();                        // forgets all rows, meshes, frames and the checkpoint: the run begins again
     void finish(const About& more);        // adds to /about, writes NAME.hdf whole, removes the journal
 
 private:
@@ -73,6 +93,7 @@ struct Result {
     About about;
     std::vector<std::string> series_names;  // in order of writing
     std::map<std::string, std::vector<double>> series;
+    std::vector<SurfaceCells> meshes;
     std::vector<Record> frames;
     std::optional<Record> checkpoint;
 };

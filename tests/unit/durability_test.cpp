@@ -41,9 +41,27 @@ Record make_record(double time, std::size_t size) {
     return record;
 }
 
+// A tube of 1250 and a closed surface of 2 cells; the frames on them.
+SurfaceCells make_mesh(bool tube) {
+    SurfaceCells mesh{tube ? 3 : 2, 7, {}, tube ? 2.5 : 0.0, {}};
+    for (int i = 0; i < (tube ? 12500 : 12); ++i) {
+        mesh.cells.push_back(i * i % 7);
+        if (tube) mesh.shifts.push_back(i % 3 - 1);
+    }
+    return mesh;
+}
+Record make_surface_record(double time, std::size_t mesh) {
+    Record record = make_record(time, 4);
+    record.mesh = mesh;
+    record.arrays.push_back({"points", {7, 3}, std::vector<double>(21, 0.1 + time)});
+    record.arrays.push_back({"H", {7}, {-0.0, 1.0 / 3, 2, 3, 4, 5, time}});
+    return record;
+}
+
 // What a result means, in plain vectors.
 struct Model {
     std::string text;
+    std::vector<SurfaceCells> meshes;
     std::vector<std::vector<double>> rows;
     std::vector<Record> frames;
     std::optional<Record> checkpoint;
@@ -57,6 +75,10 @@ struct Model {
         const double time = restart()->time;
         std::erase_if(rows, [&](const auto& row) { return row[0] > time; });
         std::erase_if(frames, [&](const Record& frame) { return frame.time > time; });
+        std::size_t needed = 0;
+        for (const Record& frame : frames) needed = std::max(needed, frame.mesh ? *frame.mesh + 1 : 0);
+        if (checkpoint && checkpoint->mesh) needed = std::max(needed, *checkpoint->mesh + 1);
+        meshes.resize(needed);
         stop.reset();
     }
 };
@@ -66,7 +88,8 @@ bool same(double a, double b) {
 }
 
 bool same(const Record& a, const Record& b) {
-    bool equal = same(a.time, b.time) && a.numbers.size() == b.numbers.size() && a.arrays.size() == b.arrays.size();
+    bool equal = same(a.time, b.time) && a.mesh == b.mesh && a.numbers.size() == b.numbers.size() &&
+                 a.arrays.size() == b.arrays.size();
     for (std::size_t i = 0; equal && i < a.numbers.size(); ++i)
         equal = a.numbers[i].first == b.numbers[i].first && same(a.numbers[i].second, b.numbers[i].second);
     for (std::size_t i = 0; equal && i < a.arrays.size(); ++i) {
@@ -84,7 +107,7 @@ bool same(const Result& result, const Model& model) {
         if (name == "stop") stop = std::get<std::string>(value);
     bool equal = result.case_text.text == model.text && result.series_names == series && stop == model.stop &&
                  result.series.at("time").size() == model.rows.size() && result.frames.size() == model.frames.size() &&
-                 result.checkpoint.has_value() == model.checkpoint.has_value();
+                 result.checkpoint.has_value() == model.checkpoint.has_value() && result.meshes == model.meshes;
     for (std::size_t i = 0; equal && i < model.rows.size(); ++i)
         equal = same(result.series.at("time")[i], model.rows[i][0]) &&
                 same(result.series.at("energy")[i], model.rows[i][1]);
@@ -104,9 +127,7 @@ Step create(const std::string& text) {
             [=](auto& writer, const fs::path& file) {
                 writer = ResultWriter::create(file, {text, {"a=1"}}, {{"version", "0"}}, series);
             },
-            [=](Model& m) {
-                m = Model{text, {}, {}, {}, {}};
-            }};
+            [=](Model& m) { m = Model{text, {}, {}, {}, {}, {}}; }};
 }
 Step row(double time) {
     const std::vector<double> values = {time, 1 / (1 + time)};
@@ -123,9 +144,19 @@ Step checkpoint(double time) {
     return {"checkpoint", [=](auto& writer, const fs::path&) { writer->checkpoint(record); },
             [=](Model& m) { m.checkpoint = record; }};
 }
+Step mesh(bool tube) {
+    return {"mesh", [=](auto& writer, const fs::path&) { writer->mesh(make_mesh(tube)); },
+            [=](Model& m) { m.meshes.push_back(make_mesh(tube)); }};
+}
+Step surface_frame(double time, std::size_t mesh) {
+    const Record record = make_surface_record(time, mesh);
+    return {"frame", [=](auto& writer, const fs::path&) { writer->frame(record); },
+            [=](Model& m) { m.frames.push_back(record); }};
+}
 Step discard() {
     return {"discard", [](auto& writer, const fs::path&) { writer->discard(); },
             [](Model& m) {
+                m.meshes.clear();
                 m.rows.clear();
                 m.frames.clear();
                 m.checkpoint.reset();
@@ -161,6 +192,7 @@ const std::vector<Step> run = {create(case_text),
                                frame(1, 6000),
                                row(2),
                                checkpoint(2),
+                               mesh(false),
                                discard(),
                                row(0),
                                frame(0),
@@ -174,6 +206,10 @@ const std::vector<Step> run = {create(case_text),
                                row(3),
                                checkpoint(3),
                                frame(3),
+                               mesh(false),
+                               surface_frame(3.5, 0),
+                               mesh(true),
+                               surface_frame(4, 1),
                                row(4),
                                abandon(),
                                repair(),
@@ -201,7 +237,7 @@ protected:
     }
     void clear() {
         for (const auto& entry : fs::directory_iterator(directory))
-            if (entry.is_regular_file()) fs::remove(entry.path());
+            if (entry.path() != directory / "kept") fs::remove_all(entry.path());
     }
 
     static void take(const std::vector<Step>& steps, const fs::path& file) {
@@ -285,6 +321,10 @@ void expect_resumable(const fs::path& file, Model model) {
         EXPECT_TRUE(same(read_result(file), model)) << "after " << step.name;
     }
     EXPECT_FALSE(fs::exists(journal_path(file)));
+    for (std::size_t i = 0; i < model.frames.size(); ++i) {
+        const fs::path view = file.parent_path() / "view" / ("run_00000" + std::to_string(i) + ".hdf");
+        EXPECT_EQ(fs::exists(view), model.frames[i].mesh.has_value()) << view;
+    }
 }
 
 TEST_F(Durability, KilledAtEveryOperationOfARun) {
@@ -415,7 +455,7 @@ TEST_F(Durability, TwentyKillsAtRandomMomentsOfManyFrames) {
         const auto calls = result.frames.size() + result.series.at("time").size();
         ASSERT_GE(calls, static_cast<std::size_t>(child.reported));
         ASSERT_LE(calls, static_cast<std::size_t>(child.reported) + 1);
-        Model model{case_text, {}, {}, {}, {}};
+        Model model{case_text, {}, {}, {}, {}, {}};
         for (int i = 0; i < static_cast<int>(calls); ++i) {
             if (i % 2)
                 model.frames.push_back(make_record(i, 100));

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -36,8 +37,38 @@ Record record_at(double time) {
             {{"z", {3}, {0, 1.0 / 3, -0.0}}, {"X", {2, 3}, {1, 2, 3, 4, 5, 6 + time}}, {"A", {0}, {}}}};
 }
 
+// Two quadratic triangles that share an edge; nothing here asks whether a surface is closed.
+SurfaceCells two_cells() {
+    return {2, 9, {0, 1, 2, 4, 5, 6, 2, 1, 3, 5, 7, 8}, 0, {}};
+}
+// The same as a tube's: the second cell sees nodes 2, 3 and 8 moved by one period, node 1 by two, and the first cell
+// sees node 2 moved down.
+SurfaceCells two_shifted_cells() {
+    return {2, 9, {0, 1, 2, 4, 5, 6, 2, 1, 3, 5, 7, 8}, 2.5, {0, 0, -1, 0, 0, 0, 1, 2, 1, 0, 0, 1}};
+}
+
+// A frame on one of them: point data of each kind, and state of the run that is none.
+Record surface_record_at(double time, std::size_t mesh) {
+    Record record{time, {{"energy", -1.0 / 3}}, {}, mesh};
+    const auto add = [&](const std::string& name, std::vector<std::size_t> shape, std::size_t size) {
+        record.arrays.push_back({name, std::move(shape), {}});
+        for (std::size_t i = 0; i < size; ++i)
+            record.arrays.back().data.push_back(time / 7 - static_cast<double>(i) / 3);
+    };
+    add("restart_state", {9, 3}, 27);
+    add("H", {9}, 9);
+    add("points", {9, 3}, 27);
+    add("B", {9, 6}, 54);
+    add("history", {9, 2}, 18);
+    add("normal", {9, 3}, 27);
+    add("nothing", {0}, 0);
+    record.arrays[1].data[4] = -0.0;
+    return record;
+}
+
 void expect_same(const Record& a, const Record& b) {
     EXPECT_EQ(a.time, b.time);
+    EXPECT_EQ(a.mesh, b.mesh);
     EXPECT_EQ(a.numbers, b.numbers);
     ASSERT_EQ(a.arrays.size(), b.arrays.size());
     for (std::size_t i = 0; i < a.arrays.size(); ++i) {
@@ -208,6 +239,196 @@ TEST_F(ResultFile, ALinkStaysALink) {
     create().finish({});
     EXPECT_TRUE(fs::is_symlink(file));
     EXPECT_EQ(read_result(target).case_text.text, "x = 1\n");
+}
+
+// ---- curved surfaces
+
+TEST_F(ResultFile, FramesOnMeshesRoundTrip) {
+    auto writer = create();
+    EXPECT_EQ(writer.mesh(two_cells()), 0u);
+    writer.frame(surface_record_at(0, 0));
+    EXPECT_EQ(writer.mesh(two_shifted_cells()), 1u);
+    EXPECT_EQ(writer.mesh(two_cells()), 0u);  // known
+    writer.frame(record_at(0.5));             // frames of both kinds may follow each other
+    writer.frame(surface_record_at(1, 1));
+    writer.frame(surface_record_at(2, 1));
+    writer.checkpoint(surface_record_at(2.5, 0));
+    for (const bool finished : {false, true}) {
+        SCOPED_TRACE(finished);
+        if (finished) writer.finish({});
+        const Result result = read_result(file);
+        ASSERT_EQ(result.meshes.size(), 2u);
+        EXPECT_EQ(result.meshes[0], two_cells());
+        EXPECT_EQ(result.meshes[1], two_shifted_cells());
+        ASSERT_EQ(result.frames.size(), 4u);
+        expect_same(result.frames[0], surface_record_at(0, 0));
+        expect_same(result.frames[1], record_at(0.5));
+        expect_same(result.frames[2], surface_record_at(1, 1));
+        expect_same(result.frames[3], surface_record_at(2, 1));
+        expect_same(*result.checkpoint, surface_record_at(2.5, 0));
+    }
+}
+
+TEST_F(ResultFile, DiscardForgetsMeshes) {
+    auto writer = create();
+    writer.mesh(two_cells());
+    writer.frame(surface_record_at(0, 0));
+    writer.discard();
+    EXPECT_THROW(writer.frame(surface_record_at(0, 0)), std::invalid_argument);
+    EXPECT_EQ(writer.mesh(two_shifted_cells()), 0u);
+    writer.frame(surface_record_at(1, 0));
+    writer.finish({});
+    ASSERT_EQ(read_result(file).meshes.size(), 1u);
+    EXPECT_EQ(read_result(file).meshes[0], two_shifted_cells());
+}
+
+TEST_F(ResultFile, ResumeKeepsTheMeshesThatAreNeeded) {
+    SurfaceCells third = two_cells();
+    std::swap(third.cells[0], third.cells[1]);
+    {
+        auto writer = create();
+        for (const SurfaceCells& mesh : {two_cells(), two_shifted_cells(), third}) writer.mesh(mesh);
+        writer.frame(surface_record_at(0, 1));
+    }
+    auto writer = ResultWriter::resume(file);
+    expect_same(writer.restart_record(), surface_record_at(0, 1));
+    // The first is needed by nothing, but the number of the second is in the frame.
+    ASSERT_EQ(read_result(file).meshes.size(), 2u);
+    EXPECT_EQ(writer.mesh(third), 2u);
+    writer.checkpoint(surface_record_at(1, 2));
+    writer.finish({});
+    EXPECT_EQ(ResultWriter::resume(file).restart_record().mesh, 2u);
+    EXPECT_EQ(read_result(file).meshes.size(), 3u);
+}
+
+TEST_F(ResultFile, MalformedMeshesAndFramesOnThemAreRefused) {
+    auto writer = create();
+    const auto refused = [&](const std::function<void(SurfaceCells&)>& spoil) {
+        SurfaceCells mesh = two_shifted_cells();
+        spoil(mesh);
+        return message_of([&] { writer.mesh(mesh); });
+    };
+    EXPECT_CONTAINS(refused([](auto& m) { m.order = 5; }), "mesh: its order is 5, not 1 to 4");
+    EXPECT_CONTAINS(refused([](auto& m) { m.order = 3; }), "mesh: 12 node numbers for cells of 10");
+    EXPECT_CONTAINS(refused([](auto& m) { m.cells.clear(); }), "mesh: 0 node numbers for cells of 6");
+    EXPECT_CONTAINS(refused([](auto& m) { m.nodes = 8; }), "mesh: a cell has node 8, there are 8");
+    EXPECT_CONTAINS(refused([](auto& m) { m.cells[3] = -1; }), "mesh: a cell has node -1, there are 9");
+    EXPECT_CONTAINS(refused([](auto& m) { m.period = nan; }), "mesh: its period is nan");
+    EXPECT_CONTAINS(refused([](auto& m) { m.period = 0; }), "mesh: 12 shifts, where its period 0 asks for 0");
+    EXPECT_CONTAINS(refused([](auto& m) { m.shifts.clear(); }), "mesh: 0 shifts, where its period 2.5 asks for 12");
+
+    EXPECT_CONTAINS(message_of([&] { writer.frame(surface_record_at(0, 0)); }), "frame: mesh 0, there are 0");
+    writer.mesh(two_cells());
+    const auto refused_frame = [&](const std::function<void(Record&)>& spoil) {
+        Record record = surface_record_at(0, 0);
+        spoil(record);
+        return message_of([&] { writer.checkpoint(record); });
+    };
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.mesh = 1; }), "checkpoint: mesh 1, there are 1");
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays.erase(r.arrays.begin() + 2); }),
+                    "checkpoint: on a mesh it must have an array points [9, 3]");
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays[2].shape = {27}; }), "must have an array points [9, 3]");
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays[4].name = "Offsets"; }),
+                    "checkpoint: Offsets is a name that the format of meshes needs");
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.numbers.push_back({"Type", 1}); }), "checkpoint: Type is a name");
+    EXPECT_EQ(message_of([&] {
+                  Record record = surface_record_at(0, 0);
+                  record.arrays[1].name = "Offsets";  // point data are in a group of their own
+                  writer.frame(record);
+              }),
+              "no error");
+    EXPECT_EQ(read_result(file).frames.size(), 1u);
+}
+
+TEST_F(ResultFile, ADamagedSurfaceNamesItsLack) {
+    const auto damaged = [&](const std::string& damage) {
+        {
+            auto writer = create();
+            writer.mesh(two_shifted_cells());
+            writer.frame(surface_record_at(0, 0));
+            writer.finish({});
+        }
+        python("f = h5py.File(name, 'a')\n" + damage);
+        const std::string message = message_of([&] { read_result(file); });
+        fs::remove(file);
+        return message;
+    };
+    EXPECT_CONTAINS(damaged("del f['meshes']"), "000000 lies on mesh 0, which is missing");
+    EXPECT_CONTAINS(damaged("del f['meshes/000000/point_shift']"), "point_shift");
+    EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"), "a cell has point 99, which it lacks");
+    EXPECT_CONTAINS(damaged("g = f['frames/000000']; del g['Points']; g['Points'] = np.zeros((3, 3))"),
+                    "Points has fewer rows than its mesh has nodes");
+}
+
+// What VTK's own reader makes of it: tests/tools/vtk_test.py.
+TEST_F(ResultFile, H5pyFindsPointsOfPeriodsAndAllFramesInOne) {
+    auto writer = create();
+    writer.mesh(two_cells());
+    writer.mesh(two_shifted_cells());
+    writer.frame(surface_record_at(0, 0));
+    writer.frame(surface_record_at(1, 1));
+    writer.frame(surface_record_at(2, 1));
+    writer.finish({});
+    // Five points more than nodes: (2, -1), (2, 1), (1, 2), (3, 1), (8, 1), in the order in which cells name them.
+    EXPECT_EQ(python(R"(f = h5py.File(name)
+m, a = f['meshes/000001'], f['frames/000001']
+print(list(f), a['Connectivity'] == m['Connectivity'], a['Types'] == m['Types'])
+print(m['point_node'][9:], m['point_shift'][9:], m['Connectivity'][:], m['Offsets'][:], m['Types'][:])
+print(np.all(a['Points'][9:] == a['Points'][:][m['point_node'][9:]] + np.outer(m['point_shift'][9:], [0, 0, 2.5])))
+print(np.all(a['PointData/B'][9:] == a['PointData/B'][:][m['point_node'][9:]]), list(a['PointData']))
+t = f['VTKHDF']
+for s in range(3):
+    frame, step = f['frames'][f'{s:06d}'], {key: t['Steps'][key][s] for key in t['Steps'] if key != 'PointDataOffsets'}
+    part, point = step['PartOffsets'], step['PointOffsets']
+    points, cells, ids = (t[key][part] for key in ('NumberOfPoints', 'NumberOfCells', 'NumberOfConnectivityIds'))
+    cell, first = step['CellOffsets'][0], step['ConnectivityIdOffsets'][0]
+    print(step['Values'], part, points, cells, ids,
+          np.array_equal(t['Points'][point:point + points], frame['Points']),
+          np.array_equal(t['PointData/normal'][point:point + points], frame['PointData/normal']),
+          np.array_equal(t['Connectivity'][first:first + ids], frame['Connectivity']),
+          np.array_equal(t['Offsets'][cell + part:cell + part + cells + 1], frame['Offsets']),
+          t['Steps/PointDataOffsets/H'][s] == point)
+print(t.attrs['Version'], t.attrs['Type'], f['frames/000000'].attrs['Version'], t['Steps'].attrs['NSteps'])
+)"),
+              "['VTKHDF', 'about', 'case', 'frames', 'meshes', 'series'] True True\n"
+              "[2 2 1 3 8] [-1  1  2  1  1] [ 0  1  9  4  5  6 10 11 12  5  7 13] [ 0  6 12] [69 69]\n"
+              "True\n"
+              "True ['H', 'B', 'normal']\n"
+              "0.0 0 9 2 12 True True True True True\n"
+              "1.0 1 14 2 12 True True True True True\n"
+              "2.0 1 14 2 12 True True True True True\n"
+              "[2 0] b'UnstructuredGrid' [1 0] 3\n");
+}
+
+TEST_F(ResultFile, TheViewFollowsTheFrames) {
+    const auto view = [&] {
+        std::vector<std::string> names;
+        if (fs::exists(directory / "view"))
+            for (const auto& entry : fs::directory_iterator(directory / "view"))
+                names.push_back(entry.path().filename().string());
+        std::sort(names.begin(), names.end());
+        return names;
+    };
+    auto writer = create();
+    writer.mesh(two_cells());
+    for (const double time : {0.0, 0.1, 2.0}) writer.frame(surface_record_at(time, 0));
+    EXPECT_TRUE(view().empty());
+    writer.finish({});
+    EXPECT_EQ(view(),
+              (std::vector<std::string>{"run.hdf.series", "run_000000.hdf", "run_000001.hdf", "run_000002.hdf"}));
+    std::stringstream series;
+    series << std::ifstream(directory / "view" / "run.hdf.series").rdbuf();
+    EXPECT_CONTAINS(series.str(), "{\"name\": \"run_000001.hdf\", \"time\": 0.1},\n");
+    EXPECT_EQ(python("import json, os\nfolder = os.path.join(os.path.dirname(name), 'view')\n"
+                     "for entry in json.load(open(os.path.join(folder, 'run.hdf.series')))['files']:\n"
+                     "    f = h5py.File(os.path.join(folder, entry['name']))\n"
+                     "    print(f['VTKHDF'].attrs['time'] == entry['time'], f['VTKHDF/Points'].shape)\n"),
+              "True (9, 3)\nTrue (9, 3)\nTrue (9, 3)\n");
+
+    // A result without surfaces takes its place; others in the folder stay.
+    std::ofstream(directory / "view" / "run_notes.hdf") << "mine";
+    create().finish({});
+    EXPECT_EQ(view(), std::vector<std::string>{"run_notes.hdf"});
 }
 
 // ---- resuming

@@ -1,0 +1,228 @@
+#include "common/result/hdf5_objects.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+namespace tubule::h5 {
+
+namespace {
+
+// HDF5's own word on its last error: the innermost description.
+std::string last_error() {
+    std::string words;
+    const auto visit = [](unsigned n, const H5E_error2_t* error, void* out) -> herr_t {
+        if (n == 0 && error->desc) *static_cast<std::string*>(out) = error->desc;
+        return 0;
+    };
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &words);
+    return words;
+}
+
+// name(buffer, size) fills a buffer and returns the length, as HDF5's functions do.
+template <class Name>
+std::string name_of(const Name& name) {
+    const ssize_t length = name(nullptr, 0);
+    require(length >= 0, "read", "a name");
+    std::string text(static_cast<std::size_t>(length), '\0');
+    name(text.data(), text.size() + 1);
+    return text;
+}
+
+H5_index_t index_of(unsigned order) {
+    return (order & H5P_CRT_ORDER_TRACKED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
+}
+
+// A dataset to read, and its extent.
+struct Opened {
+    Handle dataset, extent;
+    Opened(hid_t parent, const std::string& name)
+        : dataset(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, "open dataset", name),
+          extent(H5Dget_space(dataset), H5Sclose, "read", name) {}
+    std::size_t size() const { return static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)); }
+    void read(hid_t type, void* into, const std::string& name) const {
+        require(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, into) >= 0, "read", name);
+    }
+};
+
+}  // namespace
+
+void require(bool done, std::string_view what, std::string_view name) {
+    if (!done) throw std::runtime_error(fmt::format("HDF5 cannot {} {}: {}", what, name, last_error()));
+}
+
+Handle property_list(hid_t kind) {
+    return {H5Pcreate(kind), H5Pclose, "make", "a property list"};
+}
+
+Handle text_type() {
+    Handle type(H5Tcopy(H5T_C_S1), H5Tclose, "make", "a string type");
+    H5Tset_size(type, H5T_VARIABLE);
+    H5Tset_cset(type, H5T_CSET_UTF8);
+    return type;
+}
+
+Handle scalar() {
+    return {H5Screate(H5S_SCALAR), H5Sclose, "make", "a dataspace"};
+}
+
+Handle space(const std::vector<std::size_t>& shape) {
+    if (shape.empty()) return scalar();
+    const std::vector<hsize_t> extents(shape.begin(), shape.end());
+    return {H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose, "make",
+            "a dataspace"};
+}
+
+// ---- writing
+
+Handle make_image(std::size_t step) {
+    const auto access = property_list(H5P_FILE_ACCESS);
+    H5Pset_fapl_core(access, step, false);
+    const char* name = "image of a tubule result";  // appears nowhere
+    return {H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "make", name};
+}
+
+std::vector<std::byte> bytes_of(hid_t image) {
+    require(H5Fflush(image, H5F_SCOPE_LOCAL) >= 0, "flush", "a file in memory");
+    const ssize_t size = H5Fget_file_image(image, nullptr, 0);
+    require(size > 0, "measure", "a file in memory");
+    std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+    require(H5Fget_file_image(image, bytes.data(), bytes.size()) == size, "copy", "a file in memory");
+    return bytes;
+}
+
+void put_attribute(hid_t object, const std::string& name, hid_t type, hid_t extent, const void* data) {
+    const Handle attribute(H5Acreate2(object, name.c_str(), type, extent, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+                           "make attribute", name);
+    const bool empty = H5Sget_simple_extent_npoints(extent) == 0;
+    require(empty || H5Awrite(attribute, type, data) >= 0, "write attribute", name);
+}
+void put_attribute(hid_t object, const std::string& name, double value) {
+    put_attribute(object, name, H5T_NATIVE_DOUBLE, scalar(), &value);
+}
+void put_attribute(hid_t object, const std::string& name, std::int64_t value) {
+    put_attribute(object, name, H5T_NATIVE_INT64, scalar(), &value);
+}
+void put_attribute(hid_t object, const std::string& name, std::uint64_t value) {
+    put_attribute(object, name, H5T_NATIVE_UINT64, scalar(), &value);
+}
+void put_attribute(hid_t object, const std::string& name, const std::string& text) {
+    const char* data = text.c_str();
+    put_attribute(object, name, text_type(), scalar(), &data);
+}
+void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts) {
+    std::vector<const char*> data;
+    for (const std::string& text : texts) data.push_back(text.c_str());
+    put_attribute(object, name, text_type(), space({texts.size()}), data.data());
+}
+
+Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data) {
+    const auto how = property_list(H5P_DATASET_CREATE);
+    H5Pset_obj_track_times(how, false);  // equal contents give equal bytes
+    Handle dataset(H5Dcreate2(parent, name.c_str(), type, extent, H5P_DEFAULT, how, H5P_DEFAULT), H5Dclose, "make",
+                   name);
+    const bool empty = H5Sget_simple_extent_npoints(extent) == 0;
+    require(empty || H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "write", name);
+    return dataset;
+}
+
+void put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values) {
+    put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size()}), values.data());
+}
+
+Handle make_group(hid_t parent, const std::string& name) {
+    const auto how = property_list(H5P_GROUP_CREATE);
+    H5Pset_obj_track_times(how, false);
+    H5Pset_link_creation_order(how, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+    H5Pset_attr_creation_order(how, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+    // Many attributes in the object's header, rather than in a heap and a tree of several kilobytes a frame.
+    H5Pset_attr_phase_change(how, 256, 0);
+    return {H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, how, H5P_DEFAULT), H5Gclose, "make", name};
+}
+
+// ---- reading
+
+bool has(hid_t parent, const std::string& name) {
+    return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0;
+}
+
+Handle open_group(hid_t parent, const std::string& name) {
+    return {H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, "open", name};
+}
+
+Handle open_attribute(hid_t object, const std::string& name) {
+    return {H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name};
+}
+
+std::vector<std::string> get_texts(hid_t attribute, std::string_view name) {
+    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
+    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
+    if (data.empty()) return {};
+    const auto type = text_type();
+    require(H5Aread(attribute, type, data.data()) >= 0, "read attribute", name);
+    std::vector<std::string> texts;
+    for (const char* text : data) texts.emplace_back(text ? text : "");
+    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
+    return texts;
+}
+
+Value get_value(hid_t attribute, std::string_view name) {
+    const Handle type(H5Aget_type(attribute), H5Tclose, "read attribute", name);
+    switch (H5Tget_class(type)) {
+        case H5T_INTEGER:
+            return get_attribute<std::int64_t>(attribute, H5T_NATIVE_INT64, name);
+        case H5T_FLOAT:
+            return get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, name);
+        default:
+            break;
+    }
+    const auto texts = get_texts(attribute, name);
+    require(texts.size() == 1, "read as one value attribute", name);
+    return texts.front();
+}
+
+std::vector<std::string> attribute_names(hid_t group) {
+    H5O_info_t info;
+    require(H5Oget_info2(group, &info, H5O_INFO_NUM_ATTRS) >= 0, "read", "a group");
+    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
+    unsigned order = 0;
+    H5Pget_attr_creation_order(how, &order);
+    std::vector<std::string> names;
+    for (hsize_t i = 0; i < info.num_attrs; ++i)
+        names.push_back(name_of([&](char* into, std::size_t n) {
+            return H5Aget_name_by_idx(group, ".", index_of(order), H5_ITER_INC, i, into, n, H5P_DEFAULT);
+        }));
+    return names;
+}
+
+std::vector<std::string> member_names(hid_t group) {
+    H5G_info_t info;
+    require(H5Gget_info(group, &info) >= 0, "read", "a group");
+    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
+    unsigned order = 0;
+    H5Pget_link_creation_order(how, &order);
+    std::vector<std::string> names;
+    for (hsize_t i = 0; i < info.nlinks; ++i)
+        names.push_back(name_of([&](char* into, std::size_t n) {
+            return H5Lget_name_by_idx(group, ".", index_of(order), H5_ITER_INC, i, into, n, H5P_DEFAULT);
+        }));
+    return names;
+}
+
+Array get_array(hid_t parent, const std::string& name) {
+    const Opened opened(parent, name);
+    std::vector<hsize_t> extents(static_cast<std::size_t>(H5Sget_simple_extent_ndims(opened.extent)));
+    H5Sget_simple_extent_dims(opened.extent, extents.data(), nullptr);
+    Array array{name, {extents.begin(), extents.end()}, std::vector<double>(opened.size())};
+    opened.read(H5T_NATIVE_DOUBLE, array.data.data(), name);
+    return array;
+}
+
+std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name) {
+    const Opened opened(parent, name);
+    std::vector<std::int64_t> values(opened.size());
+    opened.read(H5T_NATIVE_INT64, values.data(), name);
+    return values;
+}
+
+}  // namespace tubule::h5

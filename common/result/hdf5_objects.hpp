@@ -1,0 +1,103 @@
+// Handles, attributes, datasets and groups of the HDF5 library, with errors as exceptions: for the files of this folder
+// that write and read HDF5. All throw std::runtime_error with HDF5's own words.
+#pragma once
+
+#include <hdf5.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule::h5 {
+
+// HDF5 prints its errors unless told not to; ours go into exceptions.
+class Quiet {
+public:
+    Quiet() {
+        H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    }
+    Quiet(const Quiet&) = delete;
+    Quiet& operator=(const Quiet&) = delete;
+    ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+
+private:
+    H5E_auto2_t print_ = nullptr;
+    void* data_ = nullptr;
+};
+
+void require(bool done, std::string_view what, std::string_view name);
+
+class Handle {
+public:
+    Handle(hid_t id, herr_t (*close)(hid_t), std::string_view what, std::string_view name) : id_(id), close_(close) {
+        require(id >= 0, what, name);
+    }
+    Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
+    Handle(const Handle&) = delete;
+    Handle& operator=(const Handle&) = delete;
+    ~Handle() {
+        if (id_ >= 0) close_(id_);
+    }
+    operator hid_t() const { return id_; }
+
+private:
+    hid_t id_;
+    herr_t (*close_)(hid_t);
+};
+
+Handle property_list(hid_t kind);
+Handle text_type();
+Handle scalar();
+Handle space(const std::vector<std::size_t>& shape);
+
+// ---- writing
+
+// A file in memory, growing in steps of `step` bytes, and its bytes in the end.
+Handle make_image(std::size_t step);
+std::vector<std::byte> bytes_of(hid_t image);
+
+void put_attribute(hid_t object, const std::string& name, hid_t type, hid_t extent, const void* data);
+void put_attribute(hid_t object, const std::string& name, double value);
+void put_attribute(hid_t object, const std::string& name, std::int64_t value);
+void put_attribute(hid_t object, const std::string& name, std::uint64_t value);
+void put_attribute(hid_t object, const std::string& name, const std::string& text);
+void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts);
+
+Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data);
+void put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values);
+
+// A group that remembers the order in which its attributes and members were made.
+Handle make_group(hid_t parent, const std::string& name);
+
+// ---- reading
+
+bool has(hid_t parent, const std::string& name);
+Handle open_group(hid_t parent, const std::string& name);
+Handle open_attribute(hid_t object, const std::string& name);
+
+template <class T>
+T get_attribute(hid_t attribute, hid_t type, std::string_view name) {
+    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
+    require(H5Sget_simple_extent_npoints(extent) == 1, "read as one value attribute", name);
+    T value{};
+    require(H5Aread(attribute, type, &value) >= 0, "read attribute", name);
+    return value;
+}
+
+std::vector<std::string> get_texts(hid_t attribute, std::string_view name);
+Value get_value(hid_t attribute, std::string_view name);
+
+// In the order of writing, where the group knows it (a copy made by another program may not).
+std::vector<std::string> attribute_names(hid_t group);
+std::vector<std::string> member_names(hid_t group);
+
+Array get_array(hid_t parent, const std::string& name);
+std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name);
+
+}  // namespace tubule::h5
