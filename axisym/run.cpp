@@ -583,6 +583,21 @@ Settings tightened(Settings s, const ErrorTransport::EnergyError& error, double 
     return s;
 }
 
+void describe_effort(RunSummary& s) {
+    const FlowCounters& n = s.counters;
+    s.effort = fmt::format("{} steps, {} elements", n.steps, s.elements);
+    s.details = {{"attempts", std::int64_t{s.attempts}},
+                 {"meshes", std::int64_t{s.meshes}},
+                 {"elements", std::int64_t{s.elements}},
+                 {"time_tolerance", s.time_tolerance},
+                 {"steps", std::int64_t{n.steps}},
+                 {"residuals", std::int64_t{n.residuals}},
+                 {"jacobians", std::int64_t{n.jacobians}},
+                 {"newton_iterations", std::int64_t{n.newton_iterations}},
+                 {"error_test_failures", std::int64_t{n.error_failures}},
+                 {"newton_failures", std::int64_t{n.newton_failures}}};
+}
+
 RunSummary run(const Case& c, RunObserver& observer, const Record* restart) {
     const auto started = std::chrono::steady_clock::now();
     const double asked = c.accuracy.energy;
@@ -602,6 +617,7 @@ RunSummary run(const Case& c, RunObserver& observer, const Record* restart) {
             summary.attempts = count;
             summary.as_accurate_as_asked = summary.estimated_error <= asked;
             if (!summary.as_accurate_as_asked && summary.stop.reason == Stop::finished) accuracy_missed(c, summary);
+            describe_effort(summary);
             return summary;
         }
         settings =

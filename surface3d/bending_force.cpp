@@ -10,7 +10,7 @@ namespace tubule::surface3d {
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
                     const Bending& bending) {
     // Summed up cell by cell, so that the answer does not depend on the number of threads.
-    constexpr int n = static_cast<int>(n_bending_terms) + 4;
+    constexpr int n = static_cast<int>(n_bending_terms) + 5;
     Eigen::Matrix<double, n, Eigen::Dynamic> of_cell(n, space.cells());
     const Tabulation& table = space.tabulation();
     space.for_each_cell([&](int cell) {
@@ -20,17 +20,22 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
             const double dS = table.weight[q] * p.area, h = H.dot(table.value.col(q)), k = K.dot(table.value.col(q));
-            for_each_bending_term(
-                [&](std::size_t i, const auto& term) { sum[i] += dS * bending.k[i] * term.value(h, k, bending.H0); });
+            double magnitude = 0;
+            for_each_bending_term([&](std::size_t i, const auto& term) {
+                sum[i] += dS * bending.k[i] * term.value(h, k, bending.H0);
+                magnitude += std::abs(bending.k[i]) * term.magnitude(h, k, bending.H0);
+            });
             // The flux of (x, y, 0)/2, which also holds for a period of a tube.
-            sum.template tail<4>() += dS * Eigen::Vector4d(1, p.x.head<2>().dot(p.normal.head<2>()) / 2, h * h, k);
+            const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
+            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude);
         }
         of_cell.col(cell) = sum;
     });
     const Eigen::Matrix<double, n, 1> total = of_cell.rowwise().sum();
     Observables o;
     for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = total[i];
-    o.area = total[n - 4], o.volume = total[n - 3], o.integral_H2 = total[n - 2], o.integral_K = total[n - 1];
+    o.area = total[n - 5], o.volume = total[n - 4], o.integral_H2 = total[n - 3], o.integral_K = total[n - 2];
+    o.magnitude = total[n - 1];
     return o;
 }
 

@@ -13,6 +13,7 @@ struct Observables {
     std::array<double, n_bending_terms> energy_term{};
     double energy = 0, area = 0, volume = 0;
     double integral_H2 = 0, integral_K = 0;
+    double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this
 };
 
 // The energy is INT f(H, K) dS with the recovered fields H, K.

@@ -57,4 +57,39 @@ CurvedMesh flat_mesh(const TriangleMesh& base, int order) {
     return mesh;
 }
 
+CurvedMesh with_order(const CurvedMesh& mesh, int order) {
+    TriangleMesh corners{.points = {}, .triangles = {}, .period = mesh.period, .shifts = {}};
+    std::vector<int> number(mesh.size(), -1);
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        std::array<int, 3> triangle, shifts;
+        for (int c = 0; c < 3; ++c) {
+            const int node = mesh.node(cell, c);
+            if (number[node] < 0) {
+                number[node] = static_cast<int>(corners.points.size());
+                corners.points.push_back(mesh.nodes[node]);
+            }
+            triangle[c] = number[node];
+            shifts[c] = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + c] : 0;
+        }
+        corners.triangles.push_back(triangle);
+        if (mesh.period > 0) corners.shifts.push_back(shifts);
+    }
+
+    CurvedMesh out = flat_mesh(corners, order);
+    std::vector<QuadraturePoint> points;
+    for (const auto& [i, j, l] : lattice(order))
+        points.push_back({static_cast<double>(j) / order, static_cast<double>(l) / order, 0});
+    const Tabulation table(mesh.order, points);
+    for (int cell = 0; cell < out.triangles(); ++cell) {
+        Eigen::Matrix3Xd X(3, mesh.nodes_per_cell());
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a) X.col(a) = mesh.position(cell, a);
+        for (int a = 0; a < out.nodes_per_cell(); ++a) {
+            Eigen::Vector3d x = X * table.value.col(a);
+            if (out.period > 0) x.z() -= out.period * out.shifts[cell * out.nodes_per_cell() + a];
+            out.nodes[out.node(cell, a)] = x;
+        }
+    }
+    return out;
+}
+
 }  // namespace tubule::surface3d

@@ -2,6 +2,7 @@
 #include "axisym/run.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -20,6 +21,7 @@
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/progress.hpp"
+#include "surface3d/run.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 
@@ -34,11 +36,12 @@ struct RunOptions {
 };
 
 // Hands a run's rows and frames to the result file.
-class Recorder : public axisym::RunObserver {
+class Recorder : public RunObserver {
 public:
     Recorder(const Case& c, ResultWriter& writer, bool quiet, double begin)
         : writer_(writer), progress_(begin, c.time.end, {.quiet = quiet}) {}
     void row(std::span<const double> values) override { writer_.row(values); }
+    std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
     void checkpoint(const Record& state) override { writer_.checkpoint(state); }
     void discard() override { writer_.discard(); }
@@ -67,8 +70,7 @@ About about_start() {
     return about;
 }
 
-About about_end(const Case& c, const axisym::RunSummary& s, double wall_seconds) {
-    const auto& n = s.counters;
+About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
     About about{{"stop", std::string(name(s.stop.reason))},
                 {"stop_time", s.stop.time},
                 {"stop_message", s.stop.message},
@@ -76,21 +78,19 @@ About about_end(const Case& c, const axisym::RunSummary& s, double wall_seconds)
                 {"asked_accuracy", c.accuracy.energy},
                 {"estimated_error", s.estimated_error},
                 {"E_ref", s.reference_energy},
-                {"wall_seconds", wall_seconds},
-                {"attempts", std::int64_t{s.attempts}},
-                {"meshes", std::int64_t{s.meshes}},
-                {"elements", std::int64_t{s.elements}},
-                {"time_tolerance", s.time_tolerance},
-                {"steps", std::int64_t{n.steps}},
-                {"residuals", std::int64_t{n.residuals}},
-                {"jacobians", std::int64_t{n.jacobians}},
-                {"newton_iterations", std::int64_t{n.newton_iterations}},
-                {"error_test_failures", std::int64_t{n.error_failures}},
-                {"newton_failures", std::int64_t{n.newton_failures}}};
-    std::string warnings;
-    for (const std::string& w : s.warnings) warnings += (warnings.empty() ? "" : "\n") + w;
-    about.emplace_back("warnings", warnings);
+                {"wall_seconds", wall_seconds}};
+    about.insert(about.end(), s.details.begin(), s.details.end());
+    about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
     return about;
+}
+
+// Both tiers, by the case.
+std::vector<std::string> series_names(const Case& c) {
+    return c.tier == Tier::axisym ? axisym::series_names(c) : surface3d::series_names(c);
+}
+RunSummary run_tier(const Case& c, RunObserver& observer, const Record* restart) {
+    if (c.tier == Tier::axisym) return axisym::run(c, observer, restart);
+    return surface3d::run(c, observer);
 }
 
 // Why a result's run ended; nothing if it is unfinished.
@@ -130,13 +130,14 @@ int compare(const Case& c, const std::filesystem::path& file) {
     return lines.empty() ? 0 : 1;
 }
 
-void report(const Case& c, const axisym::RunSummary& s, const std::filesystem::path& file, double seconds) {
+void report(const Case& c, const RunSummary& s, const std::filesystem::path& file, double seconds) {
     fmt::print("{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
     if (!s.stop.advice.empty()) fmt::print("    {}\n", s.stop.advice);
     for (const std::string& warning : s.warnings) fmt::print("    warning: {}\n", warning);
-    fmt::print("    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
-               s.estimated_error, s.reference_energy, c.accuracy.energy);
-    fmt::print("    {} steps, {} elements, {:.3g} s; {}\n", s.counters.steps, s.elements, seconds, file.string());
+    if (s.reference_energy > 0)
+        fmt::print("    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
+                   s.estimated_error, s.reference_energy, c.accuracy.energy);
+    fmt::print("    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
 }
 
 // Prints the Taylor slopes of every term at the start; whether all are as they should be.
@@ -155,7 +156,7 @@ struct Opened {
 };
 
 Opened create(const Case& c, const std::filesystem::path& file) {
-    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), axisym::series_names(c)), std::nullopt};
+    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), series_names(c)), std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
@@ -193,16 +194,17 @@ int run_case(Case c, const RunOptions& options) {
             if (e.time) c.time.output.push_back(*e.time);
 
     const auto started = std::chrono::steady_clock::now();
+    if (c.tier == Tier::surface3d) surface3d::check_start(c);
     std::optional<Opened> result = open_result(c, file, options.resume);
     if (!result) {
         if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
     auto& [writer, restart] = *result;
-    axisym::RunSummary summary;
+    RunSummary summary;
     {
         Recorder recorder(c, writer, options.quiet, restart ? restart->time : 0);
-        summary = axisym::run(c, recorder, restart ? &*restart : nullptr);
+        summary = run_tier(c, recorder, restart ? &*restart : nullptr);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     writer.finish(about_end(c, summary, seconds));

@@ -1,0 +1,38 @@
+// What a run of either tier hands over: rows and frames as it goes, a summary at its end.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/result/result.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule {
+
+// Who watches a run. Rows hold one value for each series of the tier; a frame is made when asked for.
+struct RunObserver {
+    virtual ~RunObserver() = default;
+    virtual void row(std::span<const double>) {}
+    virtual std::size_t mesh(const SurfaceCells&) { return 0; }  // the number by which frames name it
+    virtual void frame(const std::function<Record()>& /*make*/) {}
+    virtual void checkpoint(const Record&) {}
+    virtual void discard() {}  // the run begins again with finer settings: forget all rows and frames
+    virtual void progress(double /*time*/, double /*energy*/, double /*step*/) {}
+    virtual bool interrupted() { return false; }
+};
+
+struct RunSummary {
+    StopReport stop;
+    double energy = 0;            // at the stop
+    double reference_energy = 0;  // E_ref (design): asked and estimated errors are relative to it
+    double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref
+    bool as_accurate_as_asked = true;
+    int elements = 0;  // at the stop; of a tube over one period
+    std::vector<std::string> warnings;
+    std::string effort;  // in words, such as "85 steps, 96 elements"
+    About details;       // more of it, by name
+};
+
+}  // namespace tubule

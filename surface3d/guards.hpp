@@ -1,0 +1,18 @@
+// Signs that a discrete surface is none, or that its curvatures do not belong to it.
+#pragma once
+
+#include <optional>
+
+#include "common/solve/stop.hpp"
+#include "surface3d/bending_force.hpp"
+
+namespace tubule::surface3d {
+
+// A cell that folds: at a quadrature point its normal is turned by 90 degrees or more from that at its centre.
+std::optional<StopReport> find_fold(const SurfaceSpace& space, const CurvedMesh& mesh);
+
+// Closed surfaces have INT H^2 >= 16 pi (Willmore), and INT K is 2 pi times the Euler characteristic (Gauss-Bonnet):
+// a report where one of them is missed by more than 1 % of 16 pi or 4 pi.
+std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh);
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,175 @@
+#include "surface3d/start.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/result/result.hpp"
+#include "common/shapes/revolution.hpp"
+#include "surface3d/graded_mesh.hpp"
+#include "surface3d/import_fit.hpp"
+#include "surface3d/mapped_mesh.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+// Irregular meshes: how far points move, of their shortest edge; any seed would do.
+constexpr double jitter = 0.2;
+constexpr unsigned seed = 1;
+
+int even(double n, int least) {
+    return std::max(2 * static_cast<int>(std::lround(n / 2)), least);
+}
+
+// About so many equal triangles on the shape's base surface.
+TriangleMesh uniform_sphere(int triangles) {
+    return icosphere(std::max(static_cast<int>(std::lround(std::sqrt(triangles / 20.0))), 1));
+}
+TriangleMesh uniform_torus(const Torus& torus, int triangles) {
+    const double aspect = torus.radius / torus.tube_radius;
+    return torus_grid(torus, even(std::sqrt(triangles / 2.0 * aspect), 4),
+                      even(std::sqrt(triangles / 2.0 / aspect), 4));
+}
+// Rings half a spacing out of step make equilateral triangles where the height of a row is sqrt(3)/2 of the spacing.
+TriangleMesh uniform_tube(double radius, double length, int triangles) {
+    const double around = 2 * pi * radius, side = std::sqrt(around * length / triangles * 4 / std::sqrt(3.0));
+    return tube_rings(radius, length, even(length / (std::sqrt(0.75) * side), 2),
+                      std::max(static_cast<int>(std::lround(around / side)), 3));
+}
+
+// The shape `map` over the profile's surface, in the kind of mesh that the case asks for.
+template <class Map, class Uniform>
+StartMesh meshed(const Case& c, int triangles, const Map& map, const Profile& profile, const Uniform& uniform) {
+    const int order = c.surface.order;
+    const auto base = [&] {
+        switch (c.surface.mesh) {
+            case MeshKind::graded:
+                return graded_rings(resolution_of(map, profile, order), profile, triangles);
+            case MeshKind::irregular:
+                return jittered(uniform(), jitter, seed);
+            default:
+                return uniform();
+        }
+    };
+    return {mapped_mesh(base(), order, map), true, {}};
+}
+
+std::filesystem::path beside(const Case& c, const std::string& path) {
+    return std::filesystem::path(c.path).parent_path() / path;
+}
+
+[[noreturn]] void refuse(const Case& c, const std::string& what) {
+    throw CaseError(fmt::format("{}: {}", c.path, what));
+}
+
+Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
+    try {
+        result = read_result(beside(c, from.path));
+    } catch (const std::runtime_error& error) {
+        refuse(c, fmt::format("shape.path: {}", error.what()));
+    }
+    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
+    if (number < 0 || number >= count)
+        refuse(c, fmt::format("shape.frame must be one of the {} frames of {}, not {}", count, from.path, from.frame));
+    return result.frames[number];
+}
+
+const Array* find_array(const Record& record, const std::string& name) {
+    for (const Array& array : record.arrays)
+        if (array.name == name) return &array;
+    return nullptr;
+}
+
+double number(const Record& record, const std::string& name) {
+    for (const auto& [key, value] : record.numbers)
+        if (key == name) return value;
+    return 0;
+}
+
+CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points) {
+    CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
+    for (std::size_t i = 0; i < cells.nodes; ++i)
+        mesh.nodes.emplace_back(points.data[3 * i], points.data[3 * i + 1], points.data[3 * i + 2]);
+    return mesh;
+}
+
+struct MakeStart {
+    const Case& c;
+    int triangles;
+
+    void refuse_choice_of_triangles() const {
+        if (c.surface.mesh != MeshKind::uniform || c.surface.elements)
+            refuse(c, "discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+    }
+
+    template <class SphereLike>
+    StartMesh operator()(const SphereLike& shape) const {
+        return meshed(
+            c, triangles, [&](const auto& p) { return position(shape, p); }, sphere_profile(),
+            [&] { return uniform_sphere(triangles); });
+    }
+    StartMesh operator()(const Tube& tube) const {
+        return meshed(
+            c, triangles, [&](const auto& p) { return position(tube, p); }, tube_profile(tube.radius, tube.length),
+            [&] { return uniform_tube(tube.radius, tube.length, triangles); });
+    }
+    StartMesh operator()(const Capsule& capsule) const {
+        const auto map = [&](const auto& p) { return position(capsule, p); };
+        const Profile profile = capsule_profile(capsule);
+        return meshed(c, triangles, map, profile,
+                      [&] { return uniform_rings(resolution_of(map, profile, c.surface.order), profile, triangles); });
+    }
+    StartMesh operator()(const Torus& torus) const {
+        if (c.surface.mesh == MeshKind::graded)
+            refuse(c, "discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
+        const auto map = [&](const auto& p) { return position(torus, p); };
+        const TriangleMesh base = uniform_torus(torus, triangles);
+        return {mapped_mesh(c.surface.mesh == MeshKind::irregular ? jittered(base, jitter, seed) : base,
+                            c.surface.order, map),
+                true,
+                {}};
+    }
+    StartMesh operator()(const MeshFile& file) const {
+        refuse_choice_of_triangles();
+        try {
+            ImportedMesh imported = read_mesh(beside(c, file.path), file.weld);
+            close_mesh(imported);
+            Fit fit = fit_surface(imported, {.order = c.surface.order, .smoothing = file.smoothing});
+            std::vector<std::string> notes = imported.notes;
+            notes.insert(notes.end(), fit.report.notes.begin(), fit.report.notes.end());
+            return {std::move(fit.surface), false, notes};
+        } catch (const MeshError& error) {
+            refuse(c, fmt::format("shape.path: {}", error.what()));
+        }
+    }
+    StartMesh operator()(const ResultFrame& from) const {
+        Result result;
+        const Record frame = frame_of(c, from, result);
+        if (frame.mesh) {
+            refuse_choice_of_triangles();
+            const CurvedMesh mesh = curved_mesh(result.meshes.at(*frame.mesh), *find_array(frame, "points"));
+            return {mesh.order == c.surface.order ? mesh : with_order(mesh, c.surface.order), false, {}};
+        }
+        const Array *knots = find_array(frame, "knots"), *coefficients = find_array(frame, "coefficients");
+        if (!knots || !coefficients || !(number(frame, "length") > 0))
+            refuse(c, fmt::format("shape.path: {} holds no shape of a tube or surface", from.path));
+        const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data,
+                              coefficients->data};
+        double radius = 0;
+        for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
+        return meshed(
+            c, triangles, [&](const auto& p) { return position(tube, p); }, tube_profile(radius, tube.length),
+            [&] { return uniform_tube(radius, tube.length, triangles); });
+    }
+};
+
+}  // namespace
+
+StartMesh start_mesh(const Case& c, int triangles) {
+    return std::visit(MakeStart{c, triangles}, c.shape);
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,94 @@
+#!/usr/bin/python3
+"""Tier surface3d through the program: results of either tier as starts, and both tiers agreeing on one shape.
+
+Arguments: the program, the directory of the cases.
+"""
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+
+PROGRAM, CASES = (Path(argument).resolve() for argument in sys.argv[1:3])
+
+SHAPE_FROM = """
+tier = "surface3d"
+[energy]
+k20 = 0.2
+k42 = 0.06
+H0 = -2.0
+[shape]
+kind = "result"
+path = "{path}"
+frame = {frame}
+[accuracy]
+energy = {accuracy}
+"""
+
+
+def run(directory, *arguments):
+    return subprocess.run([PROGRAM, "run", "--quiet", *map(str, arguments)], cwd=directory, capture_output=True, text=True)
+
+
+def last(path, series):
+    with h5py.File(path) as f:
+        return f["series"][series][-1]
+
+
+class Surface(unittest.TestCase):
+    def setUp(self):
+        self.kept = tempfile.TemporaryDirectory()
+        self.directory = Path(self.kept.name)
+        self.addCleanup(self.kept.cleanup)
+
+    def case(self, name, **values):
+        path = self.directory / name
+        path.write_text(SHAPE_FROM.format(**values))
+        return path
+
+    def test_tiers_agree_on_a_frame(self):
+        """Energies of a tier-1 frame, computed by the 3D tier: within what both state."""
+        done = run(self.directory, CASES / "figure_k42_006.toml", "-o", "tube.hdf")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run(self.directory, self.case("surface.toml", path="tube.hdf", frame=2, accuracy=1e-5))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with h5py.File(self.directory / "tube.hdf") as f:
+            expected = f["frames/000002"].attrs["energy"]
+            time, volumes = f["frames/000002"].attrs["time"], f["series/volume"][:]
+            volume = volumes[list(f["series/time"][:]).index(time)]
+        self.assertAlmostEqual(last(self.directory / "surface.hdf", "energy") / expected, 1, delta=2e-5)
+        self.assertAlmostEqual(last(self.directory / "surface.hdf", "volume") / volume, 1, delta=1e-5)
+
+    def test_a_surface_begins_where_another_ended(self):
+        """A frame of tier surface3d as a start is the same mesh: the same energies to rounding."""
+        done = run(self.directory, CASES / "surface_tube_modes.toml", "-o", "tube.hdf", "--set", "energy.H0=-2.0",
+                   "--set", "energy.k20=0.2", "--set", "energy.k42=0.06")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run(self.directory, self.case("again.toml", path="tube.hdf", frame=-1, accuracy=0.01))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for series in ("energy", "area", "volume", "elements"):
+            before, again = last(self.directory / "tube.hdf", series), last(self.directory / "again.hdf", series)
+            self.assertAlmostEqual(again / before, 1, delta=1e-12, msg=series)
+
+    def test_refused_frames(self):
+        run(self.directory, CASES / "surface_ellipsoid.toml", "-o", "ellipsoid.hdf")
+        done = run(self.directory, self.case("none.toml", path="ellipsoid.hdf", frame=3, accuracy=0.01))
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("none.toml: shape.frame must be one of the 1 frames of ellipsoid.hdf, not 3", done.stderr)
+        self.assertFalse((self.directory / "none.hdf").exists())
+        done = run(self.directory, self.case("gone.toml", path="gone.hdf", frame=0, accuracy=0.01))
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("gone.toml: shape.path: cannot open", done.stderr)
+
+    def test_folded_mesh_is_kept_to_be_looked_at(self):
+        done = run(self.directory, CASES / "surface_folded.toml", "-o", "folded.hdf")
+        self.assertEqual(done.returncode, 4, done.stderr)
+        with h5py.File(self.directory / "folded.hdf") as f:
+            self.assertEqual(f["about"].attrs["stop"], "mesh-lost")
+            self.assertEqual(f["frames/000000/Points"].shape, (362, 3))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,129 @@
+// Cases of tier surface3d: energies of exactly known shapes as accurate as asked and as stated, on every kind of mesh;
+// guards; refusals.
+#include "surface3d/run.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+struct Watch : RunObserver {
+    std::vector<double> values;
+    std::vector<Record> frames;
+    std::vector<SurfaceCells> meshes;
+    void row(std::span<const double> row) override { values.assign(row.begin(), row.end()); }
+    std::size_t mesh(const SurfaceCells& cells) override {
+        meshes.push_back(cells);
+        return meshes.size() - 1;
+    }
+    void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
+};
+
+struct Outcome {
+    Case c;
+    Watch watch;
+    RunSummary summary;
+    double at(const std::string& series) const {
+        const std::vector<std::string> names = series_names(c);
+        return watch.values.at(std::find(names.begin(), names.end(), series) - names.begin());
+    }
+};
+
+Outcome run_case(const std::string& shape, const std::vector<std::string>& sets = {}) {
+    Outcome out{parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\n" + shape, sets, "case.toml"), {}, {}};
+    out.summary = run(out.c, out.watch);
+    return out;
+}
+
+const std::string perturbed = "kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 0.5, l = 5, m = 3}]\n";
+
+// The energy is off by no more than stated, and what is stated is no more than asked; nor is it idle talk.
+void expect_honest(const Outcome& o, double exact) {
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double error = std::abs(o.summary.energy - exact) / o.summary.reference_energy;
+    EXPECT_LE(error, o.summary.estimated_error + 1e-14);
+    EXPECT_LE(o.summary.estimated_error, o.c.accuracy.energy);
+    EXPECT_TRUE(o.summary.as_accurate_as_asked);
+}
+
+TEST(SurfaceRun, EnergiesAreAsAccurateAsAsked) {
+    // Exact values: maths 7.
+    expect_honest(run_case(perturbed), 135.8066231985);
+    expect_honest(run_case(perturbed, {"energy.k20=0", "energy.k42=1"}), 160.529992807);
+    expect_honest(run_case("kind = \"torus\"\nradius = 1.5\ntube_radius = 0.5\n"), integral_H2(Torus{1.5, 0.5}));
+    expect_honest(run_case("kind = \"ellipsoid\"\na = 1\nb = 1.3\nc = 0.7\n",
+                           {"energy.k20=0", "energy.k42=1", "accuracy.energy=1e-6"}),
+                  integral_K2(Ellipsoid{1, 1.3, 0.7}));
+    expect_honest(run_case("kind = \"tube\"\nradius = 0.5\nlength = 2\n", {"accuracy.energy=1e-7"}), 2 * pi * 2 / 0.5);
+}
+
+TEST(SurfaceRun, AreaAndVolume) {
+    const Outcome o = run_case("kind = \"dumbbell\"\n", {"accuracy.energy=1e-5"});
+    EXPECT_NEAR(o.at("area"), 5.176926500756, 2e-5);  // maths 7
+    EXPECT_NEAR(o.at("volume"), 0.777918180889, 1e-5);
+    EXPECT_NEAR(o.at("integral_K"), 4 * pi, 1e-4);
+    EXPECT_EQ(o.at("elements"), o.summary.elements);
+}
+
+TEST(SurfaceRun, EveryKindOfMesh) {
+    for (const char* kind : {"uniform", "graded", "irregular"}) {
+        const Outcome o = run_case("kind = \"ellipsoid\"\na = 1\nb = 1.3\nc = 0.7\n",
+                                   {"energy.k20=0", "energy.k42=1", "discretisation.elements=1500",
+                                    std::string("discretisation.mesh=") + kind});
+        SCOPED_TRACE(kind);
+        EXPECT_NEAR(o.summary.elements, 1500, 150);
+        expect_honest(o, integral_K2(Ellipsoid{1, 1.3, 0.7}));
+    }
+}
+
+TEST(SurfaceRun, FrameIsTheSurface) {
+    const Outcome o = run_case("kind = \"sphere\"\nradius = 2\n", {"discretisation.elements=320"});
+    ASSERT_EQ(o.watch.frames.size(), 1u);
+    const Record& frame = o.watch.frames[0];
+    ASSERT_EQ(frame.mesh, 0u);
+    const std::size_t nodes = o.watch.meshes.at(0).nodes;
+    for (const Array& array : frame.arrays) EXPECT_EQ(array.shape[0], nodes) << array.name;
+    for (std::size_t i = 0; i < nodes; ++i) {
+        const Eigen::Map<const Eigen::Vector3d> x(&frame.arrays[0].data[3 * i]), normal(&frame.arrays[1].data[3 * i]);
+        EXPECT_NEAR(x.norm(), 2, 1e-14);
+        EXPECT_NEAR(normal.dot(x), 2, 1e-5);
+        EXPECT_NEAR(frame.arrays[2].data[i], -1, 1e-3);    // H
+        EXPECT_NEAR(frame.arrays[3].data[i], 0.25, 1e-3);  // K
+    }
+}
+
+TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
+    const Outcome coarse = run_case(perturbed, {"discretisation.elements=80", "discretisation.recovery=elementwise"});
+    EXPECT_EQ(coarse.summary.stop.reason, Stop::resolution_lost);
+    EXPECT_NE(coarse.summary.stop.message.find("INT "), std::string::npos) << coarse.summary.stop.message;
+    EXPECT_EQ(coarse.watch.frames.size(), 1u);  // to look at
+
+    const Outcome folded = run_case("kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 1.0, l = 12, m = 7}]\n",
+                                    {"discretisation.elements=80"});
+    EXPECT_EQ(folded.summary.stop.reason, Stop::mesh_lost);
+    EXPECT_NE(folded.summary.stop.message.find("folds at ("), std::string::npos) << folded.summary.stop.message;
+}
+
+TEST(SurfaceRun, ShapesThatCannotBeMade) {
+    const auto refusal = [](const std::string& shape, const std::vector<std::string>& sets = {}) -> std::string {
+        try {
+            run_case(shape, sets);
+        } catch (const CaseError& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    EXPECT_EQ(refusal("kind = \"torus\"\nradius = 2\ntube_radius = 1\n", {"discretisation.mesh=graded"}),
+              "case.toml: discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
+    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n").find("case.toml: shape.path: "), 0u);
+    EXPECT_EQ(refusal("kind = \"result\"\npath = \"none.hdf\"\n"),
+              "case.toml: shape.path: cannot open none.hdf: No such file or directory");
+    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.elements=100"}),
+              "case.toml: discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+}
+
+}  // namespace
+}  // namespace tubule::surface3d
