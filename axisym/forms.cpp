@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <experimental/simd>
 #include <limits>
+#include <stdexcept>
 
+#include "axisym/pack.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -14,15 +15,6 @@ namespace {
 namespace stdx = std::experimental;
 constexpr int lanes = ProfileSpace::lanes;
 constexpr int wide = ProfileSpace::max_width;
-// One element's quadrature points, or half of its splines, in one register.
-using Pack = stdx::simd<double, stdx::simd_abi::deduce_t<double, lanes>>;
-
-Pack load(const double* p) {
-    return Pack(p, stdx::vector_aligned);
-}
-void store(const Pack& v, double* p) {
-    v.copy_to(p, stdx::vector_aligned);
-}
 
 // Coefficients of an element, gathered into r, r', r'' at its quadrature points.
 template <int P>
@@ -59,7 +51,8 @@ Jet<Pack, 3, Order> energy_density(const Bending& bending, const Pack& r, const 
 
 Forms::Forms(const ProfileSpace& space, const Bending& bending)
     : space_(space), bending_(bending), images_(space.cell().images()) {
-    const int w = space.width();
+    const int w = space.width(), degree = space.degree();
+    if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(space.elements() * w * w);
     for (int e = 0; e < space.elements(); ++e)

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <experimental/simd>
 #include <stdexcept>
 
+#include "axisym/pack.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -32,7 +32,7 @@ ProfileSpace::ProfileSpace(Cell cell, std::vector<double> breaks, int degree, in
       degree_(degree),
       smoothness_(smoothness),
       multiplicity_(degree - smoothness) {
-    if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
+    if (degree < 2 || degree >= max_width) throw std::invalid_argument("spline degree must be 2 ... 7");
     if (smoothness < 1 || smoothness >= degree) throw std::invalid_argument("smoothness must be 1 ... degree - 1");
     if (breaks_.size() < 3 || !std::is_sorted(breaks_.begin(), breaks_.end(), std::less_equal<>{}))
         throw std::invalid_argument("breaks must ascend and bound at least two elements");
@@ -111,7 +111,6 @@ void ProfileSpace::Active::operator()(const T& z, int derivatives, T* out) const
 }
 
 void ProfileSpace::tabulate() {
-    using Pack = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, lanes>>;
     const int n = elements(), w = width();
     const GaussRule rule = gauss_rule(lanes * groups());
     basis_.assign(n * groups(), Basis{});
@@ -144,6 +143,10 @@ int ProfileSpace::element_at(double z) const {
     return static_cast<int>(it - breaks_.begin()) - 1;
 }
 
+void ProfileSpace::splines(int element, double z, int derivatives, double* out) const {
+    active_[element](z, derivatives, out);
+}
+
 std::array<double, 3> ProfileSpace::evaluate(const double* c, int element, double z) const {
     double values[3 * max_width];
     active_[element](z, 2, values);
@@ -166,7 +169,8 @@ double ProfileSpace::extremum_near(const double* c, double z) const {
         const auto [r, r1, r2] = evaluate(c, e, z);
         const double reach = breaks_[e + 1] - breaks_[e], before = z;
         if (r2 != 0) z = std::clamp(z - std::clamp(r1 / r2, -reach, reach), cell_.z0, cell_.z1);
-        if (std::abs(z - before) < 0.02 * reach) break;  // the next step would be smaller than 1e-3, r exact to 1e-6 of it
+        if (std::abs(z - before) < 0.02 * reach)
+            break;  // the next step would be smaller than 1e-3, r exact to 1e-6 of it
     }
     return z;
 }

@@ -1,4 +1,4 @@
-// Splines over one cell of a periodic profile: degree p, any knots, any smoothness at the knots.
+// Splines over one cell of a profile: degree p, any knots, any smoothness at the knots.
 // Cubic and quintic Hermite elements are the special cases (3, 1) and (5, 2) of (degree, smoothness).
 #pragma once
 
@@ -26,7 +26,7 @@ public:
     static constexpr int lanes = 4;      // quadrature points evaluated at once
     static constexpr int max_width = 8;  // active splines per element, degree 7 at most
 
-    // `breaks` ascends from cell.z0 to cell.z1 (at least 2 elements); degree 3, 5 or 7;
+    // `breaks` ascends from cell.z0 to cell.z1 (at least 2 elements); degree 2 ... 7;
     // 1 <= smoothness < degree. Throws std::invalid_argument.
     ProfileSpace(Cell cell, std::vector<double> breaks, int degree, int smoothness);
 
@@ -56,8 +56,11 @@ public:
     // r, r', r'' of the spline at z inside `element` (or its ends).
     std::array<double, 3> evaluate(const double* coefficients, int element, double z) const;
     double value(const double* coefficients, int element, double z) const;
-    // The derivative of order `degree`, constant on each element.
+    // out[k * width() + a] = derivative k = 0 ... derivatives (at most 2) of the active spline a at z inside `element`.
+    void splines(int element, double z, int derivatives, double* out) const;
+    // The derivative of order `degree`, constant on each element; and that of each active spline.
     double top_derivative(const double* coefficients, int element) const;
+    const double* top_derivatives(int element) const { return active_[element].top; }
     // A zero of r' near z, by Newton from z and staying in its neighbourhood: the place of a neck or a belly.
     double extremum_near(const double* coefficients, double z) const;
 

@@ -50,6 +50,16 @@ TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {
             }
 }
 
+TEST(Forms, refusesEvenDegrees) {
+    const ProfileSpace space(whole, uniform_breaks(whole, 5), 4, 3);
+    try {
+        Forms(space, bending(1));
+        ADD_FAILURE() << "accepted";
+    } catch (const std::invalid_argument& e) {
+        EXPECT_STREQ(e.what(), "spline degree must be 3, 5 or 7");
+    }
+}
+
 TEST(Forms, derivativesOfACase) {
     Case c = tube_case(bending(0.2, -2, 0, 0.06), 1, 2, {{0.4, 1}, {0.1, 3, 0, 0.3}}, 1);
     const auto checks = check_terms(c);
