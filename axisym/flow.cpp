@@ -21,11 +21,9 @@ FlowCounters& FlowCounters::operator+=(const FlowCounters& o) {
 }
 
 struct Flow::Impl {
-    const Forms& forms;
-    Observe observe;
-    std::function<Guards(const Observation&)> guards;
+    FlowSystem system;
     SUNContext context = nullptr;
-    N_Vector x = nullptr, v = nullptr, slope = nullptr, dissipated = nullptr, scratch = nullptr;
+    N_Vector x = nullptr, v = nullptr, slope = nullptr, dissipated = nullptr, scratch = nullptr, weights = nullptr;
     SUNMatrix jacobian = nullptr;
     SUNLinearSolver solver = nullptr;
     void* ida = nullptr;
@@ -33,12 +31,12 @@ struct Flow::Impl {
     int guard = -1;
     std::string message;
 
-    explicit Impl(const Forms& f) : forms(f) {}
+    explicit Impl(FlowSystem s) : system(std::move(s)) {}
     ~Impl() {
         IDAFree(&ida);
         SUNLinSolFree(solver);
         SUNMatDestroy(jacobian);
-        for (N_Vector n : {x, v, slope, dissipated, scratch}) N_VDestroy(n);
+        for (N_Vector n : {x, v, slope, dissipated, scratch, weights}) N_VDestroy(n);
         SUNContext_Free(&context);
     }
 };
@@ -51,7 +49,7 @@ double* data(N_Vector n) {
 
 template <class Impl>
 int residual(double, N_Vector x, N_Vector v, N_Vector F, void* user) {
-    return static_cast<Impl*>(user)->forms.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
+    return static_cast<Impl*>(user)->system.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
 }
 
 void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
@@ -62,9 +60,9 @@ void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
 template <class Impl>
 int jacobian(double, double cj, N_Vector x, N_Vector v, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector,
              N_Vector) {
-    const Forms& forms = static_cast<Impl*>(user)->forms;
-    set_pattern(forms.pattern(), J);  // IDA zeroes the whole matrix before each call
-    forms.jacobian(data(x), data(v), cj, SUNSparseMatrix_Data(J));
+    const FlowSystem& system = static_cast<Impl*>(user)->system;
+    set_pattern(*system.pattern, J);  // IDA zeroes the whole matrix before each call
+    system.jacobian(data(x), data(v), cj, SUNSparseMatrix_Data(J));
     return 0;
 }
 
@@ -74,14 +72,14 @@ int dissipation(double t, N_Vector x, N_Vector v, N_Vector rate, void* user) {
     // The only place where IDA shows the rates of the accepted corrector: what it returns are slopes of its dense
     // output.
     N_VScale(1, v, self->v);
-    data(rate)[0] = self->observe(t, data(x), data(v)).dissipation;
+    data(rate)[0] = self->system.dissipation(t, data(x), data(v));
     return 0;
 }
 
 template <class Impl>
 int guard_values(double t, N_Vector x, N_Vector v, double* values, void* user) {
     auto* self = static_cast<Impl*>(user);
-    const auto guards = self->guards(self->observe(t, data(x), data(v)));
+    const Guards guards = self->system.guards(t, data(x), data(v));
     std::copy(guards.begin(), guards.end(), values);
     return 0;
 }
@@ -97,13 +95,11 @@ void require(int status, const char* what) {
 
 }  // namespace
 
-Flow::Flow(const Forms& forms, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-           const TimeControl& control, Observe observe, std::function<Guards(const Observation&)> guards)
-    : impl_(std::make_unique<Impl>(forms)) {
+Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+           const TimeControl& control)
+    : impl_(std::make_unique<Impl>(std::move(system))) {
     Impl& s = *impl_;
     static_assert(sizeof(sunindextype) == sizeof(std::int64_t) || sizeof(sunindextype) == sizeof(int));
-    s.observe = std::move(observe);
-    s.guards = std::move(guards);
     s.time = t0;
     const int n = static_cast<int>(x0.size());
     require(SUNContext_Create(nullptr, &s.context), "a context");
@@ -117,18 +113,25 @@ Flow::Flow(const Forms& forms, const Eigen::VectorXd& x0, const Eigen::VectorXd&
     IDASetErrHandlerFn(s.ida, keep_message<Impl>, &s);
     require(IDASetUserData(s.ida, &s), "the user data");
     require(IDAInit(s.ida, residual<Impl>, t0, s.x, s.v), "the initial state");
-    require(IDASStolerances(s.ida, control.relative, control.absolute), "the tolerances");
+    s.weights = N_VNew_Serial(n, s.context);
+    N_VConst(control.absolute, s.weights);
+    for (Eigen::Index i = 0; i < s.system.scale.size(); ++i) data(s.weights)[i] *= s.system.scale[i];
+    require(IDASVtolerances(s.ida, control.relative, s.weights), "the tolerances");
+    if (s.system.differential.size() > 0) {
+        std::copy_n(s.system.differential.data(), n, data(s.scratch));
+        require(IDASetId(s.ida, s.scratch), "the kinds of unknowns");
+        require(IDASetSuppressAlg(s.ida, true), "the error test");
+    }
     require(IDASetMaxOrd(s.ida, control.max_order), "the order");
     // Newton much more exact than the error test asks, and a Jacobian never far off: fewer steps and fewer
     // failures, and errors that follow the tolerance (docs/decisions.md).
     require(IDASetNonlinConvCoef(s.ida, 0.01), "the Newton tolerance");
     require(IDASetDeltaCjLSetup(s.ida, 0.1), "the Jacobian's life");
     require(IDASetInitStep(s.ida, control.first_step), "the first step");
-    s.jacobian = SUNSparseMatrix(n, n, forms.pattern().nonZeros(), CSC_MAT, s.context);
-    set_pattern(forms.pattern(), s.jacobian);
+    s.jacobian = SUNSparseMatrix(n, n, s.system.pattern->nonZeros(), CSC_MAT, s.context);
+    set_pattern(*s.system.pattern, s.jacobian);
     s.solver = SUNLinSol_KLU(s.x, s.jacobian, s.context);
-    require(SUNLinSol_KLUSetOrdering(s.solver, forms.space().cell().mirror ? 2 : 0),
-            "the ordering");  // banded: as it is
+    require(SUNLinSol_KLUSetOrdering(s.solver, s.system.banded ? 2 : 0), "the ordering");
     require(IDASetLinearSolver(s.ida, s.solver, s.jacobian), "the linear solver");
     require(IDASetJacFn(s.ida, jacobian<Impl>), "the Jacobian");
     require(IDARootInit(s.ida, n_guards, guard_values<Impl>), "the guards");

@@ -1,19 +1,20 @@
-// The gradient flow M(x) x_t + grad E(x) = 0 of a discrete profile in time: the one place that sees IDA
-// (its variant IDAS, which also integrates the dissipation).
+// A profile's motion F(x, x_t) = 0 in time: the one place that sees IDA (its variant IDAS, which also integrates the
+// dissipation).
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
 
-#include "axisym/forms.hpp"
 
 namespace tubule::axisym {
 
 struct TimeControl {
     double relative = 1e-6;  // local error per step relative to the coefficients
-    double absolute = 1e-9;  // added to that
+    double absolute = 1e-9;  // added to that, times the unknown's scale
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
 };
@@ -23,18 +24,29 @@ struct FlowCounters {
     FlowCounters& operator+=(const FlowCounters& other);
 };
 
+// Guards are functions of the state, positive while all is well; a step that takes one of them through zero ends there.
+inline constexpr int n_guards = 3;
+using Guards = std::array<double, n_guards>;
+
+// What moves, and what is watched. All but `residual` and `jacobian` see accepted states, by time, unknowns and rates.
+struct FlowSystem {
+    // F(x, v); false where x is inadmissible: try a smaller step.
+    std::function<bool(const double* x, const double* v, double* F)> residual;
+    // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
+    std::function<void(const double* x, const double* v, double cj, double* values)> jacobian;
+    const Eigen::SparseMatrix<double>* pattern = nullptr;
+    bool banded = false;              // the unknowns stand in an order that is good for elimination
+    Eigen::VectorXd scale;            // of each unknown; empty: 1
+    Eigen::VectorXd differential;     // 0 for unknowns without a rate, whose local errors do not count; empty: 1
+    std::function<double(double t, const double* x, const double* v)> dissipation;
+    std::function<Guards(double t, const double* x, const double* v)> guards;
+};
+
 class Flow {
 public:
-    // Guards are functions of the observed state, positive while all is well; a step that takes one of
-    // them through zero ends there.
-    static constexpr int n_guards = 3;
-    using Guards = std::array<double, n_guards>;
-    // Called at the end of each step with the time, the coefficients and their rates.
-    using Observe = std::function<const Observation&(double t, const double* x, const double* v)>;
-
-    // forms must outlive the flow; v0 are the rates at x0 (Forms::rate).
-    Flow(const Forms& forms, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-         const TimeControl& control, Observe observe, std::function<Guards(const Observation&)> guards);
+    // From x0 with rates v0, which solve the system.
+    Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+         const TimeControl& control);
     ~Flow();
     Flow(Flow&&) = delete;
 

@@ -109,7 +109,7 @@ private:
     StopReport end_with(const StopReport& stop);
     bool estimate_error(const Observation& o);
     std::optional<StopReport> check(Flow::Outcome outcome, const Observation& o);
-    Flow::Guards guards(const Observation& o) const;
+    Guards guards(const Observation& o) const;
     StopReport guard_report(int guard, const Observation& o) const;
     void write_outputs(double until, const Observation& o);
     void write_row(double t, const Observation& o, const double* x, double dissipated);
@@ -187,10 +187,21 @@ void Attempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, doub
     control.max_order = case_.discretisation.time_order;
     control.first_step = first_step;
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    flow_ = std::make_unique<Flow>(
-        stage_->forms, x, v, t, control,
-        [this](double t, const double* x, const double* v) -> const Observation& { return observe(t, x, v); },
-        [this](const Observation& o) { return guards(o); });
+    const Forms& forms = stage_->forms;
+    FlowSystem system;
+    system.residual = [&forms](const double* at, const double* rate, double* F) { return forms.residual(at, rate, F); };
+    system.jacobian = [&forms](const double* at, const double* rate, double cj, double* values) {
+        forms.jacobian(at, rate, cj, values);
+    };
+    system.pattern = &forms.pattern();
+    system.banded = stage_->space.cell().mirror;
+    system.dissipation = [this](double when, const double* at, const double* rate) {
+        return observe(when, at, rate).dissipation;
+    };
+    system.guards = [this](double when, const double* at, const double* rate) {
+        return guards(observe(when, at, rate));
+    };
+    flow_ = std::make_unique<Flow>(std::move(system), x, v, t, control);
     stage_->transport.begin(flow_->x(), flow_->v());
     dissipation_last_ = observe(t, flow_->x(), flow_->v()).dissipation;
     const auto negative = [](double k) { return k < 0; };
@@ -343,7 +354,7 @@ bool Attempt::estimate_error(const Observation& o) {
     return gave_up_;
 }
 
-Flow::Guards Attempt::guards(const Observation& o) const {
+Guards Attempt::guards(const Observation& o) const {
     return {o.r_min - case_.accuracy.r_min, overhang_steepness - o.steepness, o.symbol - least_symbol_.value_or(0)};
 }
 
@@ -483,8 +494,8 @@ std::optional<StopReport> Attempt::recover() {
 
 std::optional<StopReport> Attempt::go() {
     // A start beyond a limit stops at once: the integrator only sees limits being crossed.
-    const Flow::Guards values = guards(now_);
-    for (int i = 0; i < Flow::n_guards; ++i)
+    const Guards values = guards(now_);
+    for (int i = 0; i < n_guards; ++i)
         if (values[i] <= 0) return end_with(guard_report(i, now_));
 
     std::optional<StopReport> stop;
