@@ -21,9 +21,30 @@
 namespace tubule {
 
 enum class Tier { axisym, surface3d };
-enum class ModelKind { gradient_flow };
+enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
 
 using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
+
+// The law of motion (maths 3).
+struct Model {
+    ModelKind kind = ModelKind::gradient_flow;
+    double Re = 1;                     // stokes, fluid: 1/Re is the viscosity
+    double gamma = 0;                  // stokes, fluid: friction
+    std::optional<bool> keeps_volume;  // by default all but the gradient flow do
+};
+
+// How a fluid begins.
+struct Velocity {
+    bool rotates = false;  // about the z axis, rigidly; else at rest
+    double omega = 0;      // angular velocity
+};
+
+// What the parameter of a profile is.
+enum class Parametrisation {
+    graph,    // z
+    even,     // in proportion to arc length
+    material  // goes with the flow
+};
 
 struct Accuracy {
     double energy = 1e-4;  // asked error of the energy at all times, relative to E_ref
@@ -38,6 +59,7 @@ struct Discretisation {
     std::optional<double> time_tolerance;  // relative tolerance of the time integrator
     int time_order = 5;                    // largest order of the backward differences, 1 ... 5
     bool symmetry = true;                  // solve one cell of a start that repeats or mirrors itself
+    std::optional<Parametrisation> parametrisation;  // by default as the model and the shape have it
 };
 
 // The same of tier surface3d.
@@ -76,7 +98,8 @@ struct Case {
     Tier tier = Tier::axisym;
     std::string title, source;
     Bending energy;
-    ModelKind model = ModelKind::gradient_flow;
+    Model model;
+    Velocity velocity;
     Shape shape;
     Accuracy accuracy;
     Discretisation discretisation;  // of tier axisym

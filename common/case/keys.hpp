@@ -56,7 +56,8 @@ inline std::vector<std::string> known_series() {
     std::vector<std::string> names{"time", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
     for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "energy_error",
-                             "integral_H2", "integral_K", "gauss_bonnet_defect", "elements"})
+                             "integral_H2", "integral_K", "gauss_bonnet_defect", "elements", "kinetic_energy", "speed",
+                             "momentum_z", "angular_momentum_z", "lambda"})
         names.push_back(name);
     names.push_back("mode_<n>");
     return names;
@@ -95,6 +96,36 @@ void keys(Keys& k, Shape& shape) {
 }
 
 template <class Keys>
+void keys(Keys& k, Model& model) {
+    k.choice("kind", model.kind,
+             {{"gradient-flow", ModelKind::gradient_flow},
+              {"overdamped", ModelKind::overdamped},
+              {"stokes", ModelKind::stokes},
+              {"fluid", ModelKind::fluid}});
+    if (model.kind == ModelKind::stokes || model.kind == ModelKind::fluid) {
+        k.number("Re", model.Re, {.above = 0});
+        k.number("gamma", model.gamma, {.from = 0});
+    } else {
+        for (const char* key : {"Re", "gamma"}) k.absent(key, "must be absent: it belongs to kind \"stokes\" or \"fluid\"");
+    }
+    k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
+}
+
+template <class Keys>
+void keys(Keys& k, Velocity& velocity, const Model& model) {
+    k.choice("initial", velocity.rotates, {{"rest", false}, {"rotation", true}});
+    k.check("initial", [&] {
+        return velocity.rotates && model.kind != ModelKind::fluid
+                   ? "must be \"rest\", not \"rotation\": only model.kind = \"fluid\" has inertia"
+                   : "";
+    });
+    if (velocity.rotates)
+        k.number("omega", velocity.omega, {}, k.required);
+    else
+        k.absent("omega", "must be absent: it belongs to initial = \"rotation\"");
+}
+
+template <class Keys>
 void keys(Keys& k, Accuracy& accuracy, Tier tier) {
     k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
     if (tier == Tier::axisym)
@@ -111,6 +142,8 @@ void keys(Keys& k, Discretisation& d) {
     k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
     k.integer("time_order", d.time_order, {.from = 1, .to = 5});
     k.flag("symmetry", d.symmetry);
+    k.choice("parametrisation", d.parametrisation,
+             {{"graph", Parametrisation::graph}, {"even", Parametrisation::even}, {"material", Parametrisation::material}});
 }
 
 template <class Keys>
@@ -201,6 +234,10 @@ void keys(Keys& k, Expect& expect, double end) {
         }
 }
 
+inline bool is_tube(const Shape& shape) {
+    return std::holds_alternative<Tube>(shape);
+}
+
 // Why a start is not one for tier "axisym": the key to blame, and the words that follow it. Empty if it is one.
 std::pair<std::string, std::string> not_axisymmetric(const Shape& shape);
 
@@ -210,6 +247,15 @@ void check_together(Keys& k, const Case& c) {
     if (c.tier != Tier::axisym) return;
     const auto [key, complaint] = not_axisymmetric(c.shape);
     k.check(key, [&] { return complaint; });
+    k.check("discretisation.parametrisation", [&]() -> std::string {
+        const auto chosen = c.discretisation.parametrisation;
+        const bool flows = c.model.kind != ModelKind::gradient_flow;
+        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || flows || c.model.keeps_volume == true))
+            return "must not be \"graph\": only the gradient flow of a tube with free volume is computed as one";
+        if (chosen == Parametrisation::material && !flows)
+            return "must not be \"material\": the gradient flow has no flow along the membrane";
+        return {};
+    });
     const Tube* tube = std::get_if<Tube>(&c.shape);
     if (!tube) return;
     k.check("accuracy.r_min", [&]() -> std::string {
@@ -236,10 +282,9 @@ void keys(Keys& k, Case& c) {
             k.absent(key, "must be absent: tier \"surface3d\" does not move surfaces yet");
     };
     only_axisym("model", [&](auto& k) {
-        k.choice("kind", c.model, {{"gradient-flow", ModelKind::gradient_flow}});
-        bool volume_is_free = true;  // the only choice yet, so the case need not remember it
-        k.choice("volume", volume_is_free, {{"free", true}});
+        keys(k, c.model);
     });
+    only_axisym("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
     k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });
     k.table("discretisation", [&](auto& k) {

@@ -376,7 +376,7 @@ TEST(Case, DefaultsAreThoseOfThePlainData) {
         "shape = {kind = \"tube\", radius = 1, length = 3}\n",
         {}, "case.toml");
     EXPECT_EQ(c.energy.k, (std::array{0.0, 1.0, 0.0}));  // an integer where a float is wanted
-    EXPECT_EQ(c.model, ModelKind::gradient_flow);
+    EXPECT_EQ(c.model.kind, ModelKind::gradient_flow);
     EXPECT_EQ(c.accuracy.energy, Accuracy{}.energy);
     EXPECT_EQ(c.accuracy.r_min, Accuracy{}.r_min);
     EXPECT_EQ(c.discretisation.order, Discretisation{}.order);
