@@ -207,23 +207,27 @@ double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const
     return weights.energy * o.energy + weights.area * o.area + weights.volume * o.volume + weights.gauge * o.gauge;
 }
 
-Eigen::VectorXd CurveForms::gradient_by_parameter(int parameter, const Eigen::VectorXd& x) const {
-    // E is linear in each modulus, and a polynomial of degree four at most in H0: central differences with one
-    // extrapolation are exact, up to rounding, for any step.
-    CurveForms other = *this;
-    if (parameter < static_cast<int>(n_bending_terms)) {
-        other.bending_.k = {};
-        other.bending_.k[parameter] = 1;
-        return other.gradient({.energy = 1}, x);
-    }
-    const double step = 0.5 * std::max(1.0, std::abs(bending_.H0));
-    const auto difference = [&](double h) -> Eigen::VectorXd {
-        other.bending_.H0 = bending_.H0 + h;
-        const Eigen::VectorXd above = other.gradient({.energy = 1}, x);
-        other.bending_.H0 = bending_.H0 - h;
-        return (above - other.gradient({.energy = 1}, x)) / (2 * h);
-    };
-    return (4 * difference(step / 2) - difference(step)) / 3;
+Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    const int w = splines.width();
+    Eigen::SparseMatrix<double> out = pattern_;
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Local at(space_, e, g, x.data());
+            const Pack dS =
+                (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
+            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+            for (int b = 0; b < w; ++b)
+                for (int a = 0; a < w; ++a) {
+                    const double value = stdx::reduce(dS * load(basis.by_point[0][a]) * load(basis.by_point[0][b]));
+                    const double* r = space_.r().signs(e);
+                    const double* z = space_.z().signs(e);
+                    out.valuePtr()[slot[b * 2 * w + a]] += r[a] * r[b] * value;
+                    out.valuePtr()[slot[(w + b) * 2 * w + w + a]] += z[a] * z[b] * value;
+                }
+        }
+    return out;
 }
 
 bool CurveForms::admissible(const Eigen::VectorXd& x) const {

@@ -54,8 +54,8 @@ public:
     // As above, added to the values of a matrix with pattern().
     void add_hessian(const Weights& weights, const double* x, double* values) const;
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
-    // d/d(parameter) of the gradient of E, for one of the moduli (index of its term) or H0 (index n_bending_terms).
-    Eigen::VectorXd gradient_by_parameter(int parameter, const Eigen::VectorXd& x) const;
+    // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
+    Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
     // r > 0 and |X'| > 0 at all quadrature points.
     bool admissible(const Eigen::VectorXd& x) const;

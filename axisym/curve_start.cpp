@@ -96,6 +96,48 @@ Meridian meridian(const Revolution& surface) {
     return graph_meridian(surface);
 }
 
+Meridian spheroid(double reduced_volume, bool prolate) {
+    if (!(reduced_volume > 0 && reduced_volume < 1))
+        throw std::invalid_argument(fmt::format("no spheroid has a reduced volume of {}", reduced_volume));
+    // Area of the spheroid with a = 1, c = q.
+    const auto area = [&](double q) {
+        const double e = std::sqrt(prolate ? 1 - 1 / (q * q) : 1 - q * q);
+        return 2 * pi * (prolate ? 1 + q / e * std::asin(e) : 1 + (1 - e * e) / e * std::atanh(e));
+    };
+    double low = 0, high = 1;  // of 1/q or q
+    for (int k = 0; k < 60; ++k) {
+        const double middle = (low + high) / 2, q = prolate ? 1 / middle : middle;
+        (8 * std::pow(pi, 1.5) * q / std::pow(area(q), 1.5) < reduced_volume ? low : high) = middle;
+    }
+    const double q = prolate ? 1 / low : low, a = std::sqrt(4 * pi / area(q));
+    return meridian(Ellipsoid{a, a, a * q});
+}
+
+Meridian bowl(double thickness, double opening) {
+    if (!(thickness > 0 && thickness < 1 && opening > 0 && opening < pi))
+        throw std::invalid_argument("a bowl needs a thickness between 0 and 1 and an opening between 0 and pi");
+    const double inner = 1 - thickness, rim = thickness / 2, middle = 1 - rim;
+    const double total = opening + pi * rim + inner * opening;
+    const double first = opening / total, second = (opening + pi * rim) / total;
+    Meridian m;
+    m.seams = {first, second};
+    m.at = [=](double t) {
+        const double s = t * total;
+        if (t <= first)
+            return std::array{std::sin(s), total * std::cos(s), -std::cos(s), total * std::sin(s)};
+        if (t >= second) {
+            const double angle = (total - s) / inner;
+            return std::array{inner * std::sin(angle), -total * std::cos(angle), -inner * std::cos(angle),
+                              -total * std::sin(angle)};
+        }
+        // Around the middle of the rim, from the outward direction over the top to the inward one.
+        const double angle = opening + (s - opening) / rim;
+        return std::array{middle * std::sin(opening) + rim * std::sin(angle), total * std::cos(angle),
+                          -middle * std::cos(opening) - rim * std::cos(angle), total * std::sin(angle)};
+    };
+    return m;
+}
+
 namespace {
 
 Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::VectorXd& x) {

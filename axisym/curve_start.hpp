@@ -34,6 +34,11 @@ Meridian meridian(const Capsule& capsule);
 Meridian meridian(const Torus& torus);
 Meridian meridian(const Tube& tube);
 Meridian meridian(const Revolution& surface);
+// Starts for the families of vesicles: a spheroid of this reduced volume (0 < v < 1) and the area 4 pi, prolate or
+// oblate; and a bowl, the shell between spheres of the radii 1 and 1 - thickness, open above the polar angle `opening`
+// from its bottom, with a round rim.
+Meridian spheroid(double reduced_volume, bool prolate);
+Meridian bowl(double thickness, double opening);
 // An existing curve, which is copied.
 Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x);
 // Through points (r, z) from end to end, by a quintic spline of the chord length. Closed cells begin and end with

@@ -126,20 +126,23 @@ TEST(CurveForms, derivativesOfEveryFunctional) {
             }
 }
 
-TEST(CurveForms, derivativesInTheModuli) {
-    // Definition, by central differences: E is linear in the moduli, of degree four in H0.
-    const CurveSpace space(Topology::cell, equal_breaks(6), 5, 4);
-    const Vector x = rough(space);
-    const double h = 1e-4;
-    for (int i = 0; i <= static_cast<int>(n_bending_terms); ++i) {
-        Bending above = bending(0.2, -2, 0.03, 0.06), below = above;
-        (i < static_cast<int>(n_bending_terms) ? above.k[i] : above.H0) += h;
-        (i < static_cast<int>(n_bending_terms) ? below.k[i] : below.H0) -= h;
-        const Vector expected = (CurveForms(space, above).gradient({.energy = 1}, x) -
-                                 CurveForms(space, below).gradient({.energy = 1}, x)) /
-                                (2 * h);
-        const Vector got = CurveForms(space, bending(0.2, -2, 0.03, 0.06)).gradient_by_parameter(i, x);
-        EXPECT_LT((got - expected).norm(), 1e-6 * expected.norm()) << i;
+TEST(CurveForms, mass) {
+    // Exact: INT |dX|^2 dS is the area for a shift along the axis, and INT r^2 dS = 8 pi/3 R^4 for dX = r e_r.
+    for (const Topology topology : {Topology::cell, Topology::half_cell}) {
+        const Meridian m = topology == Topology::cell ? meridian(Sphere{}) : half(meridian(Sphere{}));
+        const CurveSpace space(topology, equal_breaks(20), 7, 6);
+        const CurveForms forms(space, bending(1));
+        const Vector x = fit(space, m);
+        const int n = space.r().size();
+        Vector radial = x, axial = Vector::Zero(x.size());
+        radial.tail(space.z().size()).setZero();
+        const auto mass = forms.mass(x);
+        EXPECT_NEAR(radial.dot(mass * radial), 8 * pi / 3, 1e-10);
+        if (topology == Topology::cell) {
+            axial.tail(x.size() - n).setOnes();
+            EXPECT_NEAR(axial.dot(mass * axial), 4 * pi, 1e-10);
+            EXPECT_NEAR(radial.dot(mass * axial), 0, 1e-12);
+        }
     }
 }
 
