@@ -215,8 +215,7 @@ Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
             const Local at(space_, e, g, x.data());
-            const Pack dS =
-                (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
+            const Pack dS = (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
             const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
             for (int b = 0; b < w; ++b)
                 for (int a = 0; a < w; ++a) {

@@ -123,8 +123,7 @@ Meridian bowl(double thickness, double opening) {
     m.seams = {first, second};
     m.at = [=](double t) {
         const double s = t * total;
-        if (t <= first)
-            return std::array{std::sin(s), total * std::cos(s), -std::cos(s), total * std::sin(s)};
+        if (t <= first) return std::array{std::sin(s), total * std::cos(s), -std::cos(s), total * std::sin(s)};
         if (t >= second) {
             const double angle = (total - s) / inner;
             return std::array{inner * std::sin(angle), -total * std::cos(angle), -inner * std::cos(angle),

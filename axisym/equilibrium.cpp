@@ -6,6 +6,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "axisym/curve_measures.hpp"
@@ -124,7 +125,7 @@ double StationarySystem::merit(const Eigen::VectorXd& u) const {
     return value;
 }
 
-int StationarySystem::negative_directions(const Eigen::VectorXd& u) const {
+Eigen::VectorXd StationarySystem::spectrum(const Eigen::VectorXd& u) const {
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
@@ -151,7 +152,7 @@ int StationarySystem::negative_directions(const Eigen::VectorXd& u) const {
     const int free = n - static_cast<int>(fixed.cols());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian.bottomRightCorner(free, free),
                                                                Eigen::EigenvaluesOnly);
-    return static_cast<int>((eigen.eigenvalues().array() < 0).count());
+    return eigen.eigenvalues();
 }
 
 namespace {
@@ -257,8 +258,7 @@ private:
 
 namespace {
 
-const double gauge_factor = getenv("GF") ? atof(getenv("GF")) : 0.01;
-constexpr int coarsest = 8;          // elements of a whole cell or period
+constexpr int coarsest = 8;  // elements of a whole cell or period
 
 std::shared_ptr<const CurveSpace> make_space(Topology topology, double length, std::vector<double> breaks, int degree) {
     return std::make_shared<CurveSpace>(topology, std::move(breaks), degree, degree - 1, length);
@@ -299,7 +299,8 @@ bool descend(StationarySystem& system, Eigen::VectorXd& u, double scale, int& it
     return done;
 }
 
-// The same grading with another number of elements.
+}  // namespace
+
 std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
     const int n = static_cast<int>(breaks.size()) - 1;
     std::vector<double> out(elements + 1);
@@ -311,6 +312,8 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
     out.back() = 1;
     return out;
 }
+
+namespace {
 
 // Newton on meshes that follow the shape found on the one before, until two of them, the second with half as many
 // elements again, agree in the energy.
@@ -375,6 +378,17 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
 
 }  // namespace
 
+Eigen::VectorXd unknowns(const Equilibrium& shape) {
+    Eigen::VectorXd u(shape.x.size() + 3);
+    u << shape.x, shape.sigma, shape.P, 0;
+    return u;
+}
+
+int negative_directions(const StationaryProblem& problem, const Equilibrium& shape) {
+    const StationarySystem system(shape.space, problem, shape.gauge);
+    return static_cast<int>((system.spectrum(unknowns(shape)).array() < 0).count());
+}
+
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
                              const EquilibriumSettings& settings) {
     if (start.topology == Topology::tube)
@@ -386,14 +400,21 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& s
     Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + 3), x = fit(*space, start);
     scale_to(forms, problem.constraints, x);
     u.head(space->size()) = x;
-    return solve(problem, space, u, gauge_factor * forms.reference_energy(x), settings);
+    return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }
 
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium& nearby,
                              const EquilibriumSettings& settings) {
-    Eigen::VectorXd u(nearby.x.size() + 3);
-    u << nearby.x, nearby.sigma, nearby.P, 0;
-    return solve(problem, nearby.space, u, nearby.gauge, settings);
+    // Fewer elements first, as the mesh that confirms the first one has more: a chain of shapes keeps its size.
+    const CurveSpace& old = *nearby.space;
+    const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
+    const auto coarser = make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements),
+                                    settings.degree);
+    Eigen::VectorXd u(coarser->size() + 3);
+    u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.P, 0;
+    const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);
+    if (found.stop != Stop::solver_failed) return found;
+    return solve(problem, nearby.space, unknowns(nearby), nearby.gauge, settings);
 }
 
 }  // namespace tubule::axisym

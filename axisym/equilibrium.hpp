@@ -35,6 +35,7 @@ public:
     StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
 
     const CurveSpace& space() const { return *space_; }
+    const std::shared_ptr<const CurveSpace>& space_handle() const { return space_; }
     const CurveForms& forms() const { return forms_; }
     const StationaryProblem& problem() const { return problem_; }
     void set_problem(const StationaryProblem& problem);
@@ -48,9 +49,9 @@ public:
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
     // E + gauge D + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
     double merit(const Eigen::VectorXd& u) const;
-    // The second variation of that on displacements which keep the constraints and the place: how many of its
-    // eigenvalues are negative.
-    int negative_directions(const Eigen::VectorXd& u) const;
+    // Eigenvalues, ascending, of the second variation of that on the displacements (of coefficients) which keep the
+    // constraints and the place; only their signs have a meaning of their own.
+    Eigen::VectorXd spectrum(const Eigen::VectorXd& u) const;
 
 private:
     Weights lagrangian(const Eigen::VectorXd& u) const;
@@ -67,6 +68,7 @@ struct EquilibriumSettings {
     int degree = 5;
     int elements = 16;       // to begin with, of a whole cell
     int max_elements = 400;  // more are never taken
+    double gauge = 0.01;     // weight of the gauge energy relative to E_ref; docs/decisions.md
     bool descend = true;     // look for a minimum, from any start; if not, for any stationary shape near a good one
 };
 
@@ -90,5 +92,14 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& s
 // From an equilibrium of a nearby problem: its mesh and its parametrisation.
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium& nearby,
                              const EquilibriumSettings& settings = {});
+
+// u of a StationarySystem on its mesh.
+Eigen::VectorXd unknowns(const Equilibrium& shape);
+
+// Axisymmetric displacements, up to the constraints, that lower the energy: 0 at a minimum.
+int negative_directions(const StationaryProblem& problem, const Equilibrium& shape);
+
+// The same grading with another number of elements.
+std::vector<double> regraded(const std::vector<double>& breaks, int elements);
 
 }  // namespace tubule::axisym
