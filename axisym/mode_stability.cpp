@@ -1,0 +1,301 @@
+#include "axisym/mode_stability.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "axisym/pack.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+constexpr int lanes = ProfileSpace::lanes;
+using J = Jet<Pack, 6, 2>;
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// Variables of the quadratic form; those up to w_theta_theta go with cos(m theta), the others with sin.
+enum Variable { W, W_s, W_ss, W_tt, W_t, W_st };
+
+// A point of the disturbed surface in the frame (e_r, e_theta, e_z), and the derivatives there.
+struct Disturbed {
+    J r, s_r, s_z, t_r, t_z, ss_r, ss_z, st_r, st_z, tt_r, tt_z;
+};
+
+// The surface (r + w n_r) e_r + (z + w n_z) e_z. Each argument: value, first and second derivative in s.
+Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], const Pack (&nz)[3]) {
+    const J w = J::variable(Pack(0.0), W), w_s = J::variable(Pack(0.0), W_s), w_ss = J::variable(Pack(0.0), W_ss),
+            w_t = J::variable(Pack(0.0), W_t), w_st = J::variable(Pack(0.0), W_st), w_tt = J::variable(Pack(0.0), W_tt);
+    const auto constant = [](const Pack& value) {
+        J c;
+        c.v = value;
+        return c;
+    };
+    const auto first = [&](const Pack(&x)[3], const Pack(&n)[3]) {
+        return constant(x[1]) + w_s * constant(n[0]) + w * constant(n[1]);
+    };
+    const auto second = [&](const Pack(&x)[3], const Pack(&n)[3]) {
+        return constant(x[2]) + w_ss * constant(n[0]) + 2.0 * (w_s * constant(n[1])) + w * constant(n[2]);
+    };
+    const auto mixed = [&](const Pack(&n)[3]) { return w_st * constant(n[0]) + w_t * constant(n[1]); };
+    Disturbed d;
+    d.r = constant(r[0]) + w * constant(nr[0]);
+    d.s_r = first(r, nr), d.s_z = first(z, nz);
+    d.ss_r = second(r, nr), d.ss_z = second(z, nz);
+    d.t_r = w_t * constant(nr[0]), d.t_z = w_t * constant(nz[0]);
+    d.st_r = mixed(nr), d.st_z = mixed(nz);
+    d.tt_r = w_tt * constant(nr[0]) - d.r, d.tt_z = w_tt * constant(nz[0]);
+    return d;
+}
+
+// E + sigma A + P V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of d_theta^2
+// twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
+J functional_density(const Bending& bending, double sigma, double P, const Disturbed& d) {
+    // Normal d_theta X x d_s X, not of unit length.
+    const J n_r = d.r * d.s_z, n_t = d.t_z * d.s_r - d.t_r * d.s_z, n_z = -(d.r * d.s_r);
+    const J square = n_r * n_r + n_t * n_t + n_z * n_z;
+    const J inverse_area = inverse_sqrt(square), inverse_square = inverse_area * inverse_area;
+    const J E = d.t_r * d.t_r + d.r * d.r + d.t_z * d.t_z, F = d.t_r * d.s_r + d.t_z * d.s_z,
+            G = d.s_r * d.s_r + d.s_z * d.s_z;
+    const J L = d.tt_r * n_r + 2.0 * (d.t_r * n_t) + d.tt_z * n_z, M = d.st_r * n_r + d.s_r * n_t + d.st_z * n_z,
+            N = d.ss_r * n_r + d.ss_z * n_z;
+    const J H = (L * G - 2.0 * (M * F) + N * E) * (inverse_square * inverse_area);
+    const J K = (L * N - M * M) * (inverse_square * inverse_square);
+    const auto f = density(bending, H.v, K.v);
+    J sum = chain(H, K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+    sum.v += sigma;
+    return square * inverse_area * sum + (P / 2) * (d.r * n_r);
+}
+
+}  // namespace
+
+ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium& shape)
+    : problem_(problem), shape_(shape) {
+    const CurveSpace& space = *shape.space;
+    const ProfileSpace& splines = space.splines();
+    // Displacements go along a spline field n that is the normal up to the error of a projection. Only their normal
+    // part matters at a stationary shape, and two derivatives of n are at hand.
+    const auto normal = [&](double s) {
+        const CurvePoint p = space.evaluate(shape.x, s);
+        const double g = std::hypot(p.r1, p.z1);
+        return std::array{p.z1 / g, -p.r1 / g};
+    };
+    const Vector n_r = space.r().project([&](double s) { return normal(s)[0]; });
+    const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int group = 0; group < splines.groups(); ++group) {
+            const auto& b = splines.basis(e, group);
+            Pack r[3], z[3], nr[3], nz[3];
+            for (int q = 0; q < lanes; ++q) {
+                const CurvePoint p = space.evaluate(shape.x, b.z[q]);
+                const auto u = space.r().evaluate(n_r.data(), b.z[q]), v = space.z().evaluate(n_z.data(), b.z[q]);
+                r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
+                for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
+            }
+            const J density = functional_density(problem.bending, shape.sigma, shape.P, disturb(r, z, nr, nz));
+            const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
+            for (int q = 0; q < lanes; ++q) {
+                Point p;
+                p.r = r[0][q], p.g = 1 / base.inverse_speed[q], p.H = base.H[q];
+                p.weight = b.weight[q];
+                p.normal_r = z[1][q] / p.g, p.normal_z = -r[1][q] / p.g;
+                p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
+                for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
+                points_.push_back(p);
+            }
+        }
+}
+
+std::vector<Parity> ModeStability::parities(int m) const {
+    const int pole = m % 2 == 0 ? 1 : -1;
+    switch (shape_.space->topology()) {
+        case Topology::cell:
+            return {{pole, pole}};
+        case Topology::half_cell:
+            return {{pole, 1}, {pole, -1}};
+        case Topology::half_tube:
+            return {{1, 1}, {-1, -1}};
+        default:
+            return {{1, 1}};
+    }
+}
+
+ModeRates ModeStability::rates(int m, Dissipation dissipation, int count) const {
+    ModeRates out;
+    out.m = m;
+    for (const Parity& parity : parities(m)) add_rates(m, dissipation, parity, count, out);
+    return out;
+}
+
+namespace {
+
+// Columns that span the vectors orthogonal to all of `fixed`.
+Matrix complement(const Matrix& fixed) {
+    const Eigen::Index n = fixed.rows();
+    if (fixed.cols() == 0) return Matrix::Identity(n, n);
+    Eigen::ColPivHouseholderQR<Matrix> qr(fixed);
+    qr.setThreshold(1e-6);  // area and volume are one constraint for a sphere or a tube, up to the error of the mesh
+    const Matrix q = qr.householderQ();
+    return q.rightCols(n - qr.rank());
+}
+
+void append(Matrix& columns, const Vector& column) {
+    columns.conservativeResize(column.size(), columns.cols() + 1);
+    columns.col(columns.cols() - 1) = column;
+}
+
+// Smallest eigenvalues of A v = lambda M v, with the vectors. By way of the inverse, which finds them to the accuracy
+// of small numbers, however large the others are.
+struct Spectrum {
+    Vector values;
+    Matrix vectors;
+};
+Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
+    double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
+    for (int k = 0; k < 60; ++k, shift *= 4) {
+        const Matrix shifted = A + shift * M;
+        if (Eigen::LLT<Matrix>(shifted).info() != Eigen::Success) continue;
+        const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> eigen(M, shifted);
+        if (eigen.info() != Eigen::Success) break;
+        const int n = static_cast<int>(A.rows()), kept = std::min(count, n);
+        Spectrum out{Vector(kept), Matrix(n, kept)};
+        for (int i = 0; i < kept; ++i) {
+            out.values[i] = 1 / eigen.eigenvalues()[n - 1 - i] - shift;
+            out.vectors.col(i) = eigen.eigenvectors().col(n - 1 - i);
+        }
+        return out;
+    }
+    throw SolveError("the eigenproblem of the second variation is not solved");
+}
+
+}  // namespace
+
+void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const {
+    const CurveSpace& space = *shape_.space;
+    const ProfileSpace& splines = space.splines();
+    const Field field(splines, parity);
+    const int n = field.size(), width = splines.width();
+    const double m2 = m * m;
+    Matrix A = Matrix::Zero(n, n), mass = A, stiffness = A, source = A;
+    Vector area = Vector::Zero(n), volume = area, mean = area, rigid[2] = {area, area};
+    const Point* point = points_.data();
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int group = 0; group < splines.groups(); ++group) {
+            const auto& b = splines.basis(e, group);
+            for (int q = 0; q < lanes; ++q, ++point) {
+                const Point& p = *point;
+                const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
+                const double ds = p.weight, dS = ds * p.r * p.g;
+                Eigen::Matrix3d C;
+                C(0, 0) = Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t);
+                C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
+                C(0, 2) = C(2, 0) = Q(W, W_ss) - m2 * Q(W_ss, W_tt);
+                C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);
+                C(1, 2) = C(2, 1) = Q(W_s, W_ss);
+                C(2, 2) = Q(W_ss, W_ss);
+                // Translations along and across the axis, and the tilt, as normal displacements over cos(m theta).
+                const double z = space.evaluate(shape_.x, b.z[q]).z;
+                const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, z * p.normal_r - p.r * p.normal_z};
+                for (int a = 0; a < width; ++a) {
+                    const int i = field.dofs(e)[a];
+                    const double sign = field.signs(e)[a];
+                    const Eigen::Vector3d v(sign * b.by_spline[q][0][a], sign * b.by_spline[q][1][a],
+                                            sign * b.by_spline[q][2][a]);
+                    const Eigen::Vector3d Cv = ds * (C * v);
+                    area[i] -= dS * p.H * p.along * v[0];
+                    volume[i] += dS * p.along * v[0];
+                    mean[i] += dS * v[0];
+                    for (int k = 0; k < 2; ++k) rigid[k][i] += dS * p.along * motion[k] * v[0];
+                    for (int c = 0; c < width; ++c) {
+                        const int j = field.dofs(e)[c];
+                        const double other = field.signs(e)[c];
+                        const double f0 = other * b.by_spline[q][0][c], f1 = other * b.by_spline[q][1][c],
+                                     f2 = other * b.by_spline[q][2][c];
+                        A(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2];
+                        mass(j, i) += dS * p.along * p.along * f0 * v[0];
+                        stiffness(j, i) += dS * (f1 * v[1] / (p.g * p.g) + m2 / (p.r * p.r) * f0 * v[0]);
+                        source(j, i) += dS * p.H * p.along * f0 * v[0];
+                    }
+                }
+            }
+        }
+    // Functions that are regular at a pole begin with the power m of the distance: parity does it for m = 0 and 1; even
+    // ones must vanish, odd ones be flat.
+    Matrix pole(n, 0);
+    const auto regular_at = [&](int e, double s) {
+        double values[3 * ProfileSpace::max_width];
+        splines.splines(e, s, 2, values);
+        Vector functional = Vector::Zero(n);
+        for (int a = 0; a < width; ++a) functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * width + a];
+        append(pole, functional.normalized());
+    };
+    if (space.closed() && m >= 2) {
+        regular_at(0, 0);
+        if (space.topology() == Topology::cell) regular_at(splines.elements() - 1, 1);
+    }
+    const Matrix regular = complement(pole);
+
+    // Under reflection at a plane of symmetry, if the curve ends at one.
+    const int mirror = space.topology() == Topology::cell || space.topology() == Topology::tube ? 0 : parity.end;
+    Matrix M = mass;
+    const bool overdamped = dissipation == Dissipation::overdamped;
+    if (overdamped) {
+        // The tangential velocity of least norm with div u_T = H w is a gradient: u_T = grad chi, Lap chi = H w.
+        Matrix potential = regular;
+        if (m == 0 && mirror >= 0) potential = complement(mean);
+        const Matrix L = potential.transpose() * stiffness * potential, S = potential.transpose() * source;
+        M += S.transpose() * Eigen::LDLT<Matrix>(L).solve(S);
+    }
+    Matrix fixed = pole;
+    if (m == 0 && mirror >= 0) {
+        const Constraints& c = problem_.constraints;
+        if (overdamped || c.area) append(fixed, area.normalized());
+        if (overdamped || c.volume) append(fixed, volume.normalized());
+        if (!overdamped && c.reduced_volume) {
+            // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
+            const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;
+            const double whole = 2 * pi * space.images();
+            append(fixed, (volume - slope * area).normalized());
+            A -= whole * shape_.P * slope / (2 * shape_.observed.area) * area * area.transpose();
+        }
+    }
+    // Rigid motions: the displacements orthogonal to them in M are left. At a plane of symmetry a translation along the
+    // axis and a tilt are odd, a translation across it is even.
+    const Eigen::LDLT<Matrix> projection(mass);
+    for (int k = 0; k < 2; ++k) {
+        const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
+        if (!exists || mirror == (across ? -1 : 1)) continue;
+        const Vector coefficients = projection.solve(rigid[k]);
+        if (coefficients.dot(mass * coefficients) > 1e-12 * mass.sum()) append(fixed, (M * coefficients).normalized());
+    }
+    const Matrix free = complement(fixed);
+    const Spectrum found = smallest(free.transpose() * A * free, free.transpose() * M * free, count);
+
+    const double fastest_before = out.rates.empty() ? -std::numeric_limits<double>::infinity() : out.rates[0];
+    for (double value : found.values) out.rates.push_back(-value);
+    std::sort(out.rates.begin(), out.rates.end(), std::greater<>());
+    if (static_cast<int>(out.rates.size()) > count) out.rates.resize(count);
+    if (-found.values[0] <= fastest_before) return;
+    const Vector w = free * found.vectors.col(0);
+    constexpr int samples = 200;
+    out.shape.assign(samples + 1, 0);
+    for (int i = 0; i <= samples; ++i) out.shape[i] = field.evaluate(w.data(), static_cast<double>(i) / samples)[0];
+    const double largest = *std::max_element(out.shape.begin(), out.shape.end(),
+                                             [](double x, double y) { return std::abs(x) < std::abs(y); });
+    for (double& value : out.shape) value /= largest;
+}
+
+std::vector<ModeRates> mode_stability(const StationaryProblem& problem, const Equilibrium& shape, int last,
+                                      Dissipation dissipation, int count) {
+    const ModeStability stability(problem, shape);
+    std::vector<ModeRates> out;
+    for (int m = 0; m <= last; ++m) out.push_back(stability.rates(m, dissipation, count));
+    return out;
+}
+
+}  // namespace tubule::axisym
