@@ -163,8 +163,8 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.swirl = add(law.flows && law.swirls, swirl_.size());
     at_.p = add(law.flows, pressure_.size());
     at_.lambda = add(law.keeps_volume, 1);
-    at_.area = add(law.flows, 1);
-    at_.volume = add(law.flows && law.keeps_volume, 1);
+    at_.area = add(law.flows && law.holds_area, 1);
+    at_.volume = add(law.flows && law.keeps_volume && law.holds_volume, 1);
     const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
     at_.drift = add(law.flows && !held, 1);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
@@ -407,10 +407,10 @@ void CurveMotion::add_forms(const double* y, double* values) const {
         }
     };
     if (at_.area >= 0) add_border(at_.area, 0, 0, gradient_at({.area = 1}, y));
-    if (!law_.keeps_volume) return;
+    if (at_.lambda < 0) return;
     const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
     if (!law_.flows) return add_border(at_.lambda, 0, 0, slope);
-    add_border(at_.volume, 0, 0, slope);
+    if (at_.volume >= 0) add_border(at_.volume, 0, 0, slope);
     add_border(at_.lambda, at_.u_r, at_.u_r, slope);
     Eigen::SparseMatrix<double> second = forms_.pattern();
     forms_.add_hessian({.volume = 1}, y, second.valuePtr());
@@ -453,6 +453,35 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
     return out;
 }
 
+namespace {
+
+// Rows and columns of a matrix divided by the roots of their largest entries, again and again: pressures and velocities
+// over a very short step differ by many orders of magnitude.
+struct Equilibrated {
+    Eigen::VectorXd rows, columns;
+
+    explicit Equilibrated(Eigen::SparseMatrix<double>& A)
+        : rows(Eigen::VectorXd::Ones(A.rows())), columns(Eigen::VectorXd::Ones(A.cols())) {
+        for (int pass = 0; pass < 8; ++pass) {
+            Eigen::VectorXd r = Eigen::VectorXd::Zero(A.rows()), c = Eigen::VectorXd::Zero(A.cols());
+            const auto each = [&](auto&& visit) {
+                for (int j = 0; j < A.cols(); ++j)
+                    for (Eigen::SparseMatrix<double>::InnerIterator it(A, j); it; ++it) visit(it);
+            };
+            each([&](auto& it) {
+                r[it.row()] = std::max(r[it.row()], std::abs(it.value()));
+                c[it.col()] = std::max(c[it.col()], std::abs(it.value()));
+            });
+            const auto factor = [](double largest) { return largest > 0 ? 1 / std::sqrt(largest) : 1; };
+            r = r.unaryExpr(factor), c = c.unaryExpr(factor);
+            each([&](auto& it) { it.valueRef() *= r[it.row()] * c[it.col()]; });
+            rows.array() *= r.array(), columns.array() *= c.array();
+        }
+    }
+};
+
+}  // namespace
+
 CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
     constexpr int most_iterations = 25;
     Start s{y0, Eigen::VectorXd::Zero(at_.size)};
@@ -460,13 +489,15 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
     Eigen::SparseMatrix<double> J = pattern_;
     SparseLu lu;
     for (int step = 0; step < 2; ++step, before = s.y) {
+        s.rate.setZero();
         double last = std::numeric_limits<double>::infinity();
         for (int iteration = 0;; ++iteration) {
             if (!residual(s.y.data(), s.rate.data(), F.data()))
                 throw SolveError("the start of the motion leaves the half plane r > 0");
             jacobian(s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
+            const Equilibrated scale(J);
             lu.factor(J);
-            const Eigen::VectorXd change = lu.solve(F);
+            const Eigen::VectorXd change = scale.columns.cwiseProduct(lu.solve(Eigen::VectorXd(scale.rows.cwiseProduct(F))));
             s.y -= change;
             s.rate = (s.y - before) / h;
             const double size = change.head(space().size()).norm();

@@ -17,6 +17,10 @@ struct MotionLaw {
     double viscosity = 0;  // 1/Re
     double friction = 0;   // gamma
     bool keeps_volume = true;
+    // Of a flow: whether A(X) and V(X) are held against drift by errors in time. Where H varies little, both are the same
+    // condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda nu and a constant
+    // pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
+    bool holds_area = true, holds_volume = true;
     bool lagrangian = false;  // the parameter goes with the flow, X_t = u, instead of staying even
     bool swirls = false;  // u has a component around the axis
 };

@@ -23,12 +23,17 @@ namespace {
 constexpr int first_elements = 12;            // of one cell
 constexpr double finer_mesh = 1.5;            // elements of a pair of runs
 constexpr double finer_time = 0.1;            // tolerances of a pair of runs
-constexpr double tolerance_per_accuracy = 1;  // of the first run
+constexpr double tolerance_per_accuracy = 3;  // of the first run
 constexpr int most_pairs = 8, most_elements = 2000;
-constexpr double seam_size = 0.15;   // elements at a seam, of those elsewhere
+// Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
+// smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
+constexpr double seam_size = 0.15, seam_per_accuracy = 5;
 constexpr double steepest = 3;       // curvature times length of an element: beyond that nothing is resolved
 constexpr double stretched = 1e-3;   // least over largest |X_s|
 constexpr int steps_between_looks = 10;
+constexpr double newton_error = 2e-10;  // of the iteration, relative to the curve: area and volume are kept to that
+// 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
+constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
 enum Guard { neck_floor, well_posed, evenness };
 
@@ -47,6 +52,18 @@ MotionLaw law_of(const Case& c) {
     law.lagrangian = law.flows && c.discretisation.parametrisation != Parametrisation::even;
     law.swirls = c.velocity.rotates;
     return law;
+}
+
+// 1 - (INT H dS)^2/(A INT H^2 dS): zero where H is the same everywhere.
+double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
+    const auto squares = [&](double H0) {
+        Bending bending{{}, H0};
+        bending.k[0] = 1;
+        return CurveForms(space, bending).observe(x);
+    };
+    const CurveObservation o = squares(0);
+    const double sum = (o.energy + o.area - squares(1).energy) / 2;
+    return 1 - sum * sum / (o.area * o.energy);
 }
 
 // The energy along a run, for another to be compared with.
@@ -204,17 +221,23 @@ CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, con
     const ArcLength arc(start.meridian);
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
+    const double shrunk = std::pow(first_elements * size, 2);  // faster than the rest, of lower order
+    const double at_seam = std::min(seam_size * size, seam_per_accuracy * c.accuracy.energy * shrunk);
     const int degree = c.discretisation.order;
     space_ = std::make_unique<CurveSpace>(
         start.meridian.topology,
-        seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, seam_size * size), degree,
+        seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam), degree,
         c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
     const CurveForms forms(*space_, c.energy);
     const Eigen::VectorXd x = fit(*space_, arc);
     summary.reference_energy = forms.reference_energy(x);
     summary.elements = space_->splines().elements() * space_->images();
     summary.time_tolerance = settings.tolerance;
-    motion_ = std::make_unique<CurveMotion>(*space_, c.energy, law_of(c), gauge_of(c, summary.reference_energy, start.area), start.area,
+    MotionLaw law = law_of(c);
+    const double variation = variation_of_H(*space_, x);
+    law.holds_area = variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
+    if (law.flows && variation <= same_everywhere) law.keeps_volume = false;
+    motion_ = std::make_unique<CurveMotion>(*space_, c.energy, law, gauge_of(c, summary.reference_energy, start.area), start.area,
                                             start.volume);
     outputs_ = c.time.output;
     outputs_.push_back(c.time.end);
@@ -269,12 +292,14 @@ void CurveAttempt::begin() {
     const Eigen::VectorXd start = y;
     std::optional<CurveMotion::Start> consistent;
     // As short as the linear algebra bears, for a start that is not smooth may be far from where it was soon.
-    for (double h = 1e-12; !consistent; h *= 10) try {
-            consistent = motion_->consistent(y, h * case_.time.end);
+    double h = 1e-10 * std::min(case_.time.end, 1.0);
+    for (int tries = 0; !consistent; ++tries) try {
+            consistent = motion_->consistent(y, h);
         } catch (const SolveError&) {
-            if (h > 1e-7) throw;
+            if (tries == 4) throw;
+            h *= 10;
         }
-    make_flow({0, consistent->y, consistent->rate}, 0);
+    make_flow({0, consistent->y, consistent->rate}, h);
     Eigen::VectorXd shown = consistent->y;
     shown.head(space_->size()) = start.head(space_->size());
     const Look l = look(shown.data(), consistent->rate.data());
@@ -315,6 +340,7 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     control.absolute = 0.1 * settings_.tolerance;
     control.max_order = case_.discretisation.time_order;
     control.first_step = first_step;
+    control.newton = std::clamp(newton_error / settings_.tolerance, 1e-8, 0.01);
     if (flow_) dissipated_before_ += flow_->dissipated(flow_->time()), counters_before_ += flow_->counters();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
     flow_ = std::make_unique<Flow>(std::move(system), state.y, state.rate, state.time, control);

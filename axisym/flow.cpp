@@ -125,7 +125,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     require(IDASetMaxOrd(s.ida, control.max_order), "the order");
     // Newton much more exact than the error test asks, and a Jacobian never far off: fewer steps and fewer
     // failures, and errors that follow the tolerance (docs/decisions.md).
-    require(IDASetNonlinConvCoef(s.ida, 0.01), "the Newton tolerance");
+    require(IDASetNonlinConvCoef(s.ida, control.newton), "the Newton tolerance");
     require(IDASetDeltaCjLSetup(s.ida, 0.1), "the Jacobian's life");
     require(IDASetInitStep(s.ida, control.first_step), "the first step");
     s.jacobian = SUNSparseMatrix(n, n, s.system.pattern->nonZeros(), CSC_MAT, s.context);

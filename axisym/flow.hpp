@@ -17,6 +17,7 @@ struct TimeControl {
     double absolute = 1e-9;  // added to that, times the unknown's scale
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
+    double newton = 0.01;    // how far the iteration goes, of what the error test allows
 };
 
 struct FlowCounters {

@@ -41,8 +41,9 @@ TEST(ShapeKeys, EveryShapeReadsBackAsWritten) {
         const std::string written = effective_toml(c);
         EXPECT_EQ(effective_toml(parse_case(written, {}, "again.toml")), written);
         for (const char* value : {"1.25", "scan.obj", "-2", "1e-06"})  // not lost on the way
-            if (shapes[i].find(value) != std::string::npos)
+            if (shapes[i].find(value) != std::string::npos) {
                 EXPECT_NE(written.find(value), std::string::npos) << written;
+            }
     }
 }
 
