@@ -17,6 +17,7 @@ import numpy as np
 
 PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 sys.path.insert(0, str(PLOT))
+import colours  # noqa: E402
 import energy  # noqa: E402
 import labels  # noqa: E402
 import results  # noqa: E402
@@ -230,14 +231,14 @@ class Columns(InFolder):
 class Scales(unittest.TestCase):
     def test_a_neck_does_not_set_the_colour_scale(self):
         values, area = np.append(np.linspace(-1, 1, 1000), -1e6), np.append(np.ones(1000), 1e-3)
-        norm, extend = tubes.colour_scale([values], [area], 0.0)
-        self.assertAlmostEqual(norm.vmax, tubes.MARGIN * tubes.COVERED, delta=0.01)  # 98 % of a uniform spread
+        norm, extend = colours.colour_scale([values], [area], 0.0)
+        self.assertAlmostEqual(norm.vmax, colours.MARGIN * colours.COVERED, delta=0.01)  # 98 % of a uniform spread
         self.assertEqual((norm.vmin, extend), (-norm.vmax, "min"))
 
     def test_rounding_is_no_colour(self):
-        norm, extend = tubes.colour_scale([np.array([1e-14, -1e-14])], [np.ones(2)], 0.0)
+        norm, extend = colours.colour_scale([np.array([1e-14, -1e-14])], [np.ones(2)], 0.0)
         self.assertEqual((norm.vmin, norm.vmax, extend), (-1, 1, "neither"))
-        norm, _ = tubes.colour_scale([np.full(5, -2.0)], [np.ones(5)], -2.0)
+        norm, _ = colours.colour_scale([np.full(5, -2.0)], [np.ones(5)], -2.0)
         self.assertEqual(norm(-2.0), 0.5)
 
     def test_interpolation_is_exact_on_parabolas_and_never_overshoots(self):
@@ -361,7 +362,7 @@ class Refusals(InFolder):
         damaged(text, "its case is not valid TOML")
 
     def test_nothing_to_draw(self):
-        self.refused("no frames to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")
+        self.refused("no profiles to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")
         self.refused("no energy series to draw", write(self.folder / "a.hdf", rows=0), "--kind", "energy")
         self.refused("neither frames nor an energy series", write(self.folder / "a.hdf", rows=0, times=[]))
 

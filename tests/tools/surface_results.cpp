@@ -2,8 +2,8 @@
 //
 //   surface_results FOLDER
 //
-// closed_K.hdf and tube_K.hdf, K = 2, 3, 4: flat triangulations moved by a polynomial map of degree K, which elements of
-// order K represent exactly (vtk_test.py knows the map). Two frames, the second one twice as large. mixed.hdf: two
+// closed_K.hdf and tube_K.hdf, K = 2, 3, 4: flat triangulations moved by a polynomial map of degree K, which elements
+// of order K represent exactly (vtk_test.py knows the map). Two frames, the second one twice as large. mixed.hdf: two
 // meshes, one after the other. shapes_*.hdf: known shapes with recovered curvatures, for pictures.
 #include <cmath>
 #include <filesystem>
@@ -69,7 +69,10 @@ Record polynomial_frame(const TriangleMesh& base, int order, double time, std::s
     }
     return {time,
             {{"order", static_cast<double>(order)}},
-            {array_of("points", x), array_of("flat", at), array_of("value", value), array_of("tensor", tensor),
+            {array_of("points", x),
+             array_of("flat", at),
+             array_of("value", value),
+             array_of("tensor", tensor),
              {"restart_state", {2}, {1, 2}}},
             mesh};
 }
@@ -114,8 +117,7 @@ template <class Shape>
 void write_shapes(const std::filesystem::path& file, const std::string& title, const TriangleMesh& base, int order,
                   const std::vector<Shape>& shapes) {
     const std::string text = "tier = \"surface3d\"\n[about]\ntitle = \"" + title + "\"\n";
-    auto writer = ResultWriter::create(file, {text, {}}, {},
-                                       {"time", "energy", "energy_20", "energy_40", "energy_42"});
+    auto writer = ResultWriter::create(file, {text, {}}, {}, {"time", "energy", "energy_20", "energy_40", "energy_42"});
     const std::size_t mesh = writer.mesh(cells_of(flat_mesh(base, order)));
     for (std::size_t i = 0; i < shapes.size(); ++i) {
         std::vector<double> row;

@@ -80,7 +80,8 @@ int plot(const PlotOptions& options) {
 }  // namespace
 
 void add_plot(CLI::App& app, int& exit_status) {
-    CLI::App* command = app.add_subcommand("plot", "Draw tubes at the output times and energies over time");
+    CLI::App* command =
+        app.add_subcommand("plot", "Draw tubes and surfaces at the output times, and energies over time");
     const auto options = std::make_shared<PlotOptions>();
     command->add_option("RESULT", options->results, "result files; several are labelled by what differs in their cases")
         ->required();
@@ -88,11 +89,12 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->add_option("-o,--output", options->outputs,
                      "picture to write, .png, .svg or .pdf; may be repeated (default: both RESULT.png and .svg)")
         ->allow_extra_args(false);
-    command->add_option("--times", options->times, "times of the tubes, such as 0,0.05,1.4 (default: up to six frames)")
+    command
+        ->add_option("--times", options->times, "times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
         ->delimiter(',')
         ->allow_extra_args(false);
-    command->add_option("--kind", options->kind, "what to draw: profiles, energy, all")
-        ->check(CLI::IsMember({"profiles", "energy", "all"}))
+    command->add_option("--kind", options->kind, "what to draw: profiles, surface, energy, all")
+        ->check(CLI::IsMember({"profiles", "surface", "energy", "all"}))
         ->capture_default_str();
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""Draws results of tubule: tubes at the output times, and energies over time. See `tubule plot --help`."""
+"""Draws results of tubule: tubes and surfaces at the output times, energies over time. See `tubule plot --help`."""
 
 import argparse
 import os
 import sys
+from operator import attrgetter
 
 EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
@@ -14,7 +15,7 @@ def arguments():
     parser.add_argument("results", nargs="+")
     parser.add_argument("-o", "--output", action="append", default=[])
     parser.add_argument("--times", default="")
-    parser.add_argument("--kind", choices=("profiles", "energy", "all"), default="all")
+    parser.add_argument("--kind", choices=("profiles", "surface", "energy", "all"), default="all")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
 
@@ -27,6 +28,7 @@ def draw(paths, outputs, times, kind, term_labels):
     from energy import EnergyPanel
     from labels import row_labels
     from results import BadInput, read_result
+    from surfaces import SurfacePanel
     from tubes import TubePanel, choose_columns
 
     style.check_outputs(outputs)
@@ -34,34 +36,46 @@ def draw(paths, outputs, times, kind, term_labels):
     names = [os.path.splitext(os.path.basename(path))[0] for path in paths]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
 
-    tubes = energy = None
-    columns = choose_columns(results, times) if any(r.frames for r in results) else []
-    if kind != "energy" and columns:
-        tubes = TubePanel(results, labels, columns)
-    drawable = [i for i, r in enumerate(results) if "energy" in r.series]
-    if kind != "profiles" and drawable:
-        marked = [column.time for column in columns if column.time is not None]
+    tubes = surfaces = energy = None
+    profile_columns = choose_columns(results, times) if any(r.frames for r in results) else []
+    if kind in ("profiles", "all") and profile_columns:
+        tubes = TubePanel(results, labels, profile_columns)
+    shown = [i for i, r in enumerate(results) if r.surfaces]
+    surface_columns = choose_columns([results[i] for i in shown], times, attrgetter("surfaces")) if shown else []
+    if kind in ("surface", "all") and surface_columns:
+        surfaces = SurfacePanel([results[i] for i in shown], [labels[i] for i in shown], surface_columns)
+    # A surface that was only looked at has one row, which is no curve.
+    drawable = [i for i, r in enumerate(results) if r.has_energy(least=2 if r.surfaces and kind == "all" else 1)]
+    if kind in ("energy", "all") and drawable:
+        marked = [column.time for column in profile_columns or surface_columns if column.time is not None]
         energy = EnergyPanel([results[i] for i in drawable], [labels[i] for i in drawable], marked, term_labels)
-    panels = [panel for panel in (tubes, energy) if panel]
+    panels = [panel for panel in (tubes, surfaces, energy) if panel]
     if not panels:
-        wanted = {"profiles": "no frames", "energy": "no energy series", "all": "neither frames nor an energy series"}
+        wanted = {
+            "profiles": "no profiles",
+            "surface": "no surfaces",
+            "energy": "no energy series",
+            "all": "neither frames nor an energy series",
+        }
         raise BadInput(f"{', '.join(paths)}: {wanted[kind]} to draw")
 
-    bars = 0.62 if tubes else 0.0
+    bars = 0.62
     title = 0.2 if len(results) == 1 else 0.0
-    figure = Figure(figsize=(style.WIDTH, title + sum(panel.height for panel in panels) + bars + 0.1))
+    coloured = [panel for panel in (tubes, surfaces) if panel]
+    tall = title + sum(panel.height for panel in panels) + bars * len(coloured) + 0.1
+    figure = Figure(figsize=(style.WIDTH, tall))
     top = figure.get_figheight() - 0.05
     if title:
         figure.text(0.5, top / figure.get_figheight(), ", ".join(labels[0]), ha="center", va="top", fontsize=9)
         top -= title
-    for letter, panel in zip("ab", panels):
+    for letter, panel in zip("abc", panels):
         top -= panel.height
         panel.draw(figure, top)
         if len(panels) > 1:
             figure.text(0.01, (top + panel.height) / figure.get_figheight(), f"({letter})", va="top", fontsize=9)
-        if panel is tubes:
+        if panel in coloured:
             top -= bars
-            tubes.draw_colour_bars(figure, top + 0.08)
+            panel.draw_colour_bars(figure, top + 0.08)
     style.save(figure, outputs)
 
 

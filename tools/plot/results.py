@@ -28,12 +28,26 @@ class Frame:
 
 
 @dataclass
+class Surface:
+    """A frame on a mesh; arrays [cell, node of the cell], nodes in VTK's order."""
+
+    time: float
+    order: int
+    closed: bool  # or one period of a tube
+    points: np.ndarray  # and three coordinates
+    normal: np.ndarray
+    H: np.ndarray
+    K: np.ndarray
+
+
+@dataclass
 class Result:
     path: str
     case: dict  # with overrides applied
     about: dict
     series: dict  # name -> 1-D array, times strictly increasing
     frames: list  # of Frame, times strictly increasing
+    surfaces: list  # of Surface, likewise
 
     @property
     def title(self):
@@ -46,7 +60,7 @@ class Result:
     @property
     def end_time(self):
         """Time of the last frame or row; 0 without any."""
-        ends = [frame.time for frame in self.frames[-1:]] + list(self.series.get("time", [])[-1:])
+        ends = [frame.time for frame in [*self.frames[-1:], *self.surfaces[-1:]]] + list(self.series.get("time", [])[-1:])
         return float(max(ends, default=0.0))
 
     @property
@@ -54,6 +68,9 @@ class Result:
         """The reason ("pinch-off", ...) when the run did not get to its end, else None."""
         reason = self.about.get("stop", "unfinished")
         return None if reason in ("finished", "stationary") else str(reason)
+
+    def has_energy(self, least):
+        return "energy" in self.series and self.series["energy"].size >= least
 
     def terms(self, known):
         """Names of the energy terms in the series, "20" for energy_20: the known ones first, in their order."""
@@ -75,7 +92,7 @@ def read_result(path):
         try:
             case = effective_case(file["case"].asstr()[()], _strings(file["case"].attrs.get("set")))
             about = {key: _plain(value) for key, value in file["about"].attrs.items()} if "about" in file else {}
-            return Result(path, case, about, _series(file.get("series", {})), _frames(path, file.get("frames", {})))
+            return Result(path, case, about, _series(file.get("series", {})), *_frames(path, file))
         except BadCase as error:
             raise BadInput(f"{path}: {error}") from error
         except (OSError, KeyError, TypeError, ValueError, AttributeError) as error:
@@ -108,19 +125,46 @@ def _increasing(times):
     return np.flatnonzero(times > before)
 
 
-def _frames(path, group):
-    frames = []
-    for name in sorted(group):
-        record = group[name]
-        missing = [key for key in ("z", "r", "H", "K") if key not in record]
-        if missing or "time" not in record.attrs:
-            raise BadInput(f"{path}: frame {name} lacks {', '.join(missing) or 'its time'}")
-        arrays = [np.asarray(record[key], float) for key in ("z", "r", "H", "K")]
-        if any(array.ndim != 1 or array.shape != arrays[0].shape or array.size < 2 for array in arrays):
-            raise BadInput(f"{path}: frame {name}: z, r, H, K must be lists of one length, 2 or more")
-        if not all(np.isfinite(array).all() for array in arrays):
-            raise BadInput(f"{path}: frame {name} holds numbers that are not finite")
-        frames.append(Frame(float(record.attrs["time"]), *arrays))
-    if not frames:
-        return []
-    return [frames[i] for i in _increasing(np.array([frame.time for frame in frames]))]
+def _frames(path, file):
+    """Profiles and surfaces."""
+    frames, surfaces = [], []
+    for name, record in sorted(file.get("frames", {}).items()):
+        if "time" not in record.attrs:
+            raise BadInput(f"{path}: frame {name} lacks its time")
+        if "mesh" in record.attrs:
+            surfaces.append(_surface(path, name, record, file[f"meshes/{record.attrs['mesh']:06d}"]))
+        else:
+            frames.append(_profile(path, name, record))
+    return _in_time(frames), _in_time(surfaces)
+
+
+def _in_time(frames):
+    return [frames[i] for i in _increasing(np.array([frame.time for frame in frames]))] if frames else []
+
+
+def _arrays(path, name, group, keys):
+    missing = [key for key in keys if key not in group]
+    if missing:
+        raise BadInput(f"{path}: frame {name} lacks {', '.join(missing)}")
+    arrays = [np.asarray(group[key], float) for key in keys]
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise BadInput(f"{path}: frame {name} holds numbers that are not finite")
+    return arrays
+
+
+def _profile(path, name, record):
+    arrays = _arrays(path, name, record, ("z", "r", "H", "K"))
+    if any(array.ndim != 1 or array.shape != arrays[0].shape or array.size < 2 for array in arrays):
+        raise BadInput(f"{path}: frame {name}: z, r, H, K must be lists of one length, 2 or more")
+    return Frame(float(record.attrs["time"]), *arrays)
+
+
+def _surface(path, name, record, mesh):
+    order = int(mesh.attrs["order"])
+    cells = np.asarray(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
+    (points,) = _arrays(path, name, record, ("Points",))
+    H, K, normal = _arrays(path, name, record["PointData"], ("H", "K", "normal"))
+    if points.shape != normal.shape or any(values.shape != points.shape[:1] for values in (H, K)):
+        raise BadInput(f"{path}: frame {name}: Points, normal, H, K must have one row a point")
+    closed = mesh.attrs["period"] == 0
+    return Surface(float(record.attrs["time"]), order, closed, points[cells], normal[cells], H[cells], K[cells])

@@ -11,6 +11,7 @@ from labels import formula, number
 from results import BadInput
 
 WIDTH = 7.0  # inches: the text width of a two-column page
+DPI = 300  # of PNG, and of pictures within SVG and PDF
 FORMATS = (".png", ".svg", ".pdf")
 MARKERS = "os^Dv<>p"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # of energy terms; the total is solid
@@ -69,6 +70,6 @@ def save(figure, paths):
     for path in paths:
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(os.path.splitext(path)[1].lower())
         try:
-            figure.savefig(path, dpi=300, metadata=metadata)
+            figure.savefig(path, dpi=DPI, metadata=metadata)
         except OSError as error:
             raise BadInput(f"{path}: cannot be written: {error.strerror}") from error

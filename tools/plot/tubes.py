@@ -1,14 +1,12 @@
 """Panel (a): one row of tubes a result, one column a time; left halves coloured by H, right halves by K."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import Normalize
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from colours import curvature_colours, draw_bars
 from labels import number, wrapped
 from results import BadInput
 from style import WIDTH, time_name, time_text
@@ -20,10 +18,6 @@ COLUMN_GAP, ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.14, 0.24, 16
 SCALE_BAR = 0.3  # inches right of the last column
 STRIPS = 40  # across half a tube
 MIN_POINTS, POINTS_PER_INCH = 300, 150  # along a tube
-COVERED = 0.98  # part of all membrane area whose curvature lies inside the colour scale
-MARGIN = 1.25  # the colour scale reaches further than that by this factor
-ROUNDING = 1e-9  # a uniform tube has K = 0 but for this, which must not be blown up to full colour
-H_COLOURS, K_COLOURS = "PuOr", "RdBu_r"
 
 
 @dataclass
@@ -37,7 +31,7 @@ def same_time(a, b, span):
     return abs(a - b) <= 1e-6 * abs(b) + 1e-12 * span
 
 
-def choose_columns(results, times=None):
+def choose_columns(results, times=None, frames_of=attrgetter("frames")):
     """Columns of frames at the wanted times, else at up to six of the times there are, evenly by number.
 
     Times that all results have go before others. Of several results, the last frame of one that did not get
@@ -47,22 +41,22 @@ def choose_columns(results, times=None):
     lone = len(results) == 1
 
     def is_stop(result, frame):
-        return result.stopped_early is not None and frame is result.frames[-1]
+        return result.stopped_early is not None and frame is frames_of(result)[-1]
 
     def has(result, time):
         """A frame at that time, or none to expect because the run had stopped."""
         ended = result.stopped_early is not None and result.end_time < time
-        return ended or any(same_time(frame.time, time, span) for frame in result.frames)
+        return ended or any(same_time(frame.time, time, span) for frame in frames_of(result))
 
     candidates = []
-    for time in sorted(f.time for r in results for f in r.frames if lone or not is_stop(r, f)):
+    for time in sorted(f.time for r in results for f in frames_of(r) if lone or not is_stop(r, f)):
         if not candidates or not same_time(time, candidates[-1], span):
             candidates.append(time)
     shared = [time for time in candidates if all(has(result, time) for result in results)]
     if len(shared) > 2:
         candidates = shared
     if times:
-        available = sorted({f.time for r in results for f in r.frames})
+        available = sorted({f.time for r in results for f in frames_of(r)})
         for time in times:
             if not any(same_time(time, other, span) for other in available):
                 known = ", ".join(time_text(t) for t in available[:12]) + (", ..." if len(available) > 12 else "")
@@ -75,7 +69,7 @@ def choose_columns(results, times=None):
     columns = [Column(time, [None] * len(results), [None] * len(results)) for time in candidates]
     last = Column(None, [None] * len(results), [None] * len(results))
     for row, result in enumerate(results):
-        for frame in result.frames:
+        for frame in frames_of(result):
             column = next((c for c in columns if same_time(frame.time, c.time, span)), None)
             if column is None and is_stop(result, frame) and not times:
                 column = next((c for c in columns if c.time > frame.time), last)
@@ -85,28 +79,13 @@ def choose_columns(results, times=None):
     return columns + ([last] if any(last.cells) else [])
 
 
-def _caption(column, row):
+def caption(column, row):
     """Why the run of a row ended with the frame in this column, and when unless the column's header says it."""
     stop, frame = column.stops[row], column.cells[row]
     if not stop:
         return ""
     shown = column.time is not None and same_time(frame.time, column.time, frame.time)
     return stop if shown else f"{stop}\nt = {time_text(frame.time)}"
-
-
-def colour_scale(values, areas, centre):
-    """A symmetric scale around `centre` that covers nearly all area: a pinching neck does not bleach the rest."""
-    distance = np.abs(np.concatenate(values) - centre)
-    area = np.concatenate(areas)
-    order = np.argsort(distance)
-    covered = np.cumsum(area[order]) / area.sum()
-    half = MARGIN * distance[order][min(np.searchsorted(covered, COVERED), distance.size - 1)]
-    if half < ROUNDING * max(1.0, abs(centre)):
-        half = max(1.0, abs(centre))
-    beyond_low = any((v < centre - half).any() for v in values)
-    beyond_high = any((v > centre + half).any() for v in values)
-    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond_low, beyond_high]
-    return Normalize(centre - half, centre + half), extend
 
 
 def _area(frame):
@@ -127,7 +106,7 @@ class TubePanel:
 
         widths = [2 * max(frame.r.max() for frame in column.cells if frame) for column in columns]
         lengths = [max((f.length for f in cells if f), default=0.0) for cells in zip(*(c.cells for c in columns))]
-        self.captions = [[_caption(column, row) for column in columns] for row in range(len(results))]
+        self.captions = [[caption(column, row) for column in columns] for row in range(len(results))]
         captions = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
         room_x = WIDTH - self.left - SCALE_BAR - 0.1 - COLUMN_GAP * len(columns)
         room_y = MAX_HEIGHT - sum(captions) - ROW_GAP * len(results)
@@ -150,11 +129,7 @@ class TubePanel:
             self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
         self.right = self.centres[-1] + self.scale * widths[-1] / 2
 
-        common_H0 = {result.H0 for result in results}
-        self.H_centre = common_H0.pop() if len(common_H0) == 1 else 0.0
-        areas = [_area(frame) for frame in frames]
-        self.H_norm, self.H_extend = colour_scale([frame.H for frame in frames], areas, self.H_centre)
-        self.K_norm, self.K_extend = colour_scale([frame.K for frame in frames], areas, 0.0)
+        self.H, self.K = curvature_colours(results, frames, [_area(frame) for frame in frames])
 
     def draw(self, figure, bottom):
         """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
@@ -191,12 +166,9 @@ class TubePanel:
         slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened: necks would go black
         lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
         shade = (0.7 + 0.3 * np.clip(lit, 0, 1))[..., None]
-        for side, values, norm, colours in (
-            (-1, frame.H, self.H_norm, H_COLOURS),
-            (1, frame.K, self.K_norm, K_COLOURS),
-        ):
+        for side, values, colours in ((-1, frame.H, self.H), (1, frame.K, self.K)):
             values = sampled(values)
-            rgb = plt.get_cmap(colours)(norm((values[1:] + values[:-1]) / 2))[:, None, :3] * shade
+            rgb = colours.rgb((values[1:] + values[:-1]) / 2)[:, None] * shade
             corners = np.stack([x + side * r[:, None] * s, np.broadcast_to(z[:, None], (z.size, s.size))], axis=-1)
             mesh = QuadMesh(corners, antialiased=False, rasterized=True, linewidth=0, zorder=1)
             mesh.set_facecolor(rgb.reshape(-1, 3))
@@ -215,21 +187,4 @@ class TubePanel:
 
     def draw_colour_bars(self, figure, bottom):
         """Two colour bars in the 0.5 inches above `bottom`."""
-        width, height = figure.get_size_inches()
-        H_label = "mean curvature H (left halves)"
-        if self.H_centre:
-            H_label += f", white: H\u2080 = {number(self.H_centre)}"
-        bars = (
-            (0.12, self.H_norm, H_COLOURS, self.H_extend, H_label),
-            (0.56, self.K_norm, K_COLOURS, self.K_extend, "Gaussian curvature K (right halves)"),
-        )
-        for left, norm, colours, extend, label in bars:
-            axes = figure.add_axes([left, (bottom + 0.38) / height, 0.34, 0.09 / height])
-            bar = figure.colorbar(ScalarMappable(norm, colours), cax=axes, orientation="horizontal", extend=extend)
-            bar.outline.set_linewidth(0.5)
-            bar.set_label(label, labelpad=2)
-            bar.ax.tick_params(width=0.5, length=2.5)
-            bar.locator = MaxNLocator(5)
-            bar.formatter = FuncFormatter(lambda value, _: number(value))
-            bar.solids.set_rasterized(True)
-            bar.solids.set_edgecolor("face")
+        draw_bars(figure, bottom, self.H, self.K, " (left halves)", " (right halves)")
