@@ -332,6 +332,13 @@ void ResultWriter::finish(const About& more) {
     impl_->finished = true;
 }
 
+bool is_point_data(const Array& array, const SurfaceCells& mesh) {
+    if (array.name == "points" || array.name.starts_with("restart_")) return false;
+    const auto& shape = array.shape;
+    if (shape.empty() || shape[0] != mesh.nodes) return false;
+    return shape.size() == 1 || (shape.size() == 2 && (shape[1] == 3 || shape[1] == 6));
+}
+
 Result read_result(const fs::path& file) {
     Contents contents = load(file);
     Result result;

@@ -45,6 +45,9 @@ struct Record {
     std::optional<std::size_t> mesh = std::nullopt;
 };
 
+// Whether an array of a frame on this mesh is data of its nodes.
+bool is_point_data(const Array& array, const SurfaceCells& mesh);
+
 using Value = std::variant<std::int64_t, double, std::string>;
 using About = std::vector<std::pair<std::string, Value>>;
 

@@ -90,13 +90,6 @@ VtkPoints vtk_points(const SurfaceCells& mesh) {
     return points;
 }
 
-bool is_point_data(const Array& array, const SurfaceCells& mesh) {
-    if (array.name == "points" || array.name.starts_with("restart_")) return false;
-    const auto& shape = array.shape;
-    if (shape.empty() || shape[0] != mesh.nodes) return false;
-    return shape.size() == 1 || (shape.size() == 2 && (shape[1] == 3 || shape[1] == 6));
-}
-
 std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes) {
     std::vector<WrittenMesh> written;
     if (meshes.empty()) return written;

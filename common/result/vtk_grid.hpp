@@ -44,9 +44,6 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written);
 // The arrays of such a frame, as they were written.
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh);
 
-// Whether VTK shows an array as data of the points.
-bool is_point_data(const Array& array, const SurfaceCells& mesh);
-
 // Makes /VTKHDF, a temporal view of the frames that have a mesh, if there are any: no numbers are stored twice.
 void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMesh>& meshes);
 

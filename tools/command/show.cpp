@@ -66,14 +66,29 @@ std::string array_list(const Record& record) {
 // The numbers of the first frame are the columns: the frames of a result are all alike.
 void add_frames(Text& out, const std::vector<Record>& frames) {
     if (frames.empty()) return;
-    add(out, "\n{:>6} {:>14}", "frame", "time");
+    const bool on_meshes = frames.front().mesh.has_value();
+    add(out, "\n{:>6} {:>14}{}", "frame", "time", on_meshes ? "   mesh" : "");
     for (const auto& [name, value] : frames.front().numbers) add(out, " {:>14}", name);
     add(out, "  arrays\n");
     for (std::size_t i = 0; i < frames.size(); ++i) {
         add(out, "{:>6} {:>14.8g}", i, frames[i].time);
+        if (frames[i].mesh) add(out, " {:>6}", *frames[i].mesh);
         for (const auto& [name, value] : frames[i].numbers) add(out, " {:>14.8g}", value);
         add(out, "  {}\n", array_list(frames[i]));
     }
+}
+
+std::size_t cell_count(const SurfaceCells& mesh) {
+    const auto k = static_cast<std::size_t>(mesh.order);
+    return mesh.cells.size() / ((k + 1) * (k + 2) / 2);
+}
+
+void add_meshes(Text& out, const std::vector<SurfaceCells>& meshes) {
+    if (meshes.empty()) return;
+    add(out, "\n{:>6} {:>9} {:>9} {:>6}  periodic\n", "mesh", "triangles", "nodes", "order");
+    for (std::size_t i = 0; i < meshes.size(); ++i)
+        add(out, "{:>6} {:>9} {:>9} {:>6}  {}\n", i, cell_count(meshes[i]), meshes[i].nodes, meshes[i].order,
+            meshes[i].period > 0 ? fmt::format("in z, {:.8g}", meshes[i].period) : "no: closed");
 }
 
 void add_summary(Text& out, const Result& result, const std::string& file) {
@@ -94,23 +109,28 @@ void add_summary(Text& out, const Result& result, const std::string& file) {
         for (const std::string& name : result.series_names)
             line("  " + name, fmt::format("{:.12g}", result.series.at(name).back()));
     }
+    add_meshes(out, result.meshes);
     add_frames(out, result.frames);
 }
 
 // ---- CSV
 
+// Every `stride`-th number of an array, from the given one.
 struct Column {
     std::string name;
     const std::vector<double>* values;
+    std::size_t from = 0, stride = 1;
 };
 
 void add_table(Text& out, const std::vector<Column>& columns) {
     for (std::size_t j = 0; j < columns.size(); ++j) add(out, "{}{}", j > 0 ? "," : "", columns[j].name);
     add(out, "\n");
-    const std::size_t rows = columns.empty() ? 0 : columns.front().values->size();
+    const std::size_t rows = columns.empty() ? 0 : columns.front().values->size() / columns.front().stride;
     for (std::size_t i = 0; i < rows; ++i) {
-        for (std::size_t j = 0; j < columns.size(); ++j)
-            add(out, "{}{:.17g}", j > 0 ? "," : "", (*columns[j].values)[i]);
+        for (std::size_t j = 0; j < columns.size(); ++j) {
+            const auto& [name, values, from, stride] = columns[j];
+            add(out, "{}{:.17g}", j > 0 ? "," : "", (*values)[from + i * stride]);
+        }
         add(out, "\n");
     }
 }
@@ -122,7 +142,7 @@ std::vector<Column> series_columns(const Result& result) {
 }
 
 // The arrays sampled at the points z. The spline's own may happen to be as long, but their rows are no points.
-std::vector<Column> sampled_columns(const Record& frame) {
+std::vector<Column> profile_columns(const Record& frame) {
     const auto z = std::find_if(frame.arrays.begin(), frame.arrays.end(), [](const Array& a) { return a.name == "z"; });
     if (z == frame.arrays.end()) throw std::runtime_error("the frame has no array z of sampling points");
     std::vector<Column> columns;
@@ -130,6 +150,31 @@ std::vector<Column> sampled_columns(const Record& frame) {
         if (array.shape == z->shape && array.name != "knots" && array.name != "coefficients" && !is_private(array))
             columns.push_back({array.name, &array.data});
     return columns;
+}
+
+// The nodes, first of all where they are.
+std::vector<Column> surface_columns(const Record& frame, const SurfaceCells& mesh) {
+    static const std::vector<std::string> vector{"x", "y", "z"}, tensor{"xx", "xy", "xz", "yy", "yz", "zz"};
+    std::vector<Column> points, data;
+    for (const Array& array : frame.arrays) {
+        if (array.name == "points") {
+            for (std::size_t c = 0; c < 3; ++c) points.push_back({vector[c], &array.data, c, 3});
+        } else if (is_point_data(array, mesh) && array.shape.size() == 1) {
+            data.push_back({array.name, &array.data});
+        } else if (is_point_data(array, mesh)) {
+            const std::size_t width = array.shape[1];
+            const auto& names = width == 3 ? vector : tensor;
+            for (std::size_t c = 0; c < width; ++c)
+                data.push_back({array.name + "_" + names[c], &array.data, c, width});
+        }
+    }
+    points.insert(points.end(), data.begin(), data.end());
+    return points;
+}
+
+std::vector<Column> frame_columns(const Result& result, std::size_t index) {
+    const Record& frame = result.frames[index];
+    return frame.mesh ? surface_columns(frame, result.meshes[*frame.mesh]) : profile_columns(frame);
 }
 
 // ---- JSON
@@ -152,6 +197,9 @@ std::string json(double value) {
     return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
 }
 std::string json(std::int64_t value) {
+    return fmt::format("{}", value);
+}
+std::string json(int value) {
     return fmt::format("{}", value);
 }
 std::string json(std::size_t value) {
@@ -182,8 +230,17 @@ std::string json(const Record& record, bool data) {
         if (data) arrays += fmt::format(", \"data\": {}", json(array.data));
         arrays += "}";
     }
-    return fmt::format("{{\"time\": {}, \"numbers\": {}, \"arrays\": {{{}}}}}", json(record.time), json(record.numbers),
-                       arrays);
+    const std::string mesh = record.mesh ? fmt::format("\"mesh\": {}, ", *record.mesh) : "";
+    return fmt::format("{{\"time\": {}, {}\"numbers\": {}, \"arrays\": {{{}}}}}", json(record.time), mesh,
+                       json(record.numbers), arrays);
+}
+
+// Of cells only the number, unless `data` too is wanted.
+std::string json(const SurfaceCells& mesh, bool data) {
+    std::string out = fmt::format("{{\"order\": {}, \"nodes\": {}, \"triangles\": {}, \"period\": {}", mesh.order,
+                                  mesh.nodes, cell_count(mesh), json(mesh.period));
+    if (data) out += fmt::format(", \"cells\": {}, \"shifts\": {}", json(mesh.cells), json(mesh.shifts));
+    return out + "}";
 }
 
 void add_json(Text& out, const Result& result, std::optional<std::size_t> with_data) {
@@ -194,7 +251,10 @@ void add_json(Text& out, const Result& result, std::optional<std::size_t> with_d
         const std::string& name = result.series_names[j];
         add(out, "{}\n{}: {}", j > 0 ? "," : "", json(name), json(result.series.at(name)));
     }
-    add(out, "\n}},\n\"frames\": [");
+    add(out, "\n}},\n\"meshes\": [");
+    for (std::size_t i = 0; i < result.meshes.size(); ++i)
+        add(out, "{}\n{}", i > 0 ? "," : "", json(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
+    add(out, "\n],\n\"frames\": [");
     for (std::size_t i = 0; i < result.frames.size(); ++i)
         add(out, "{}\n{}", i > 0 ? "," : "", json(result.frames[i], with_data == i));
     add(out, "\n],\n\"checkpoint\": {}\n}}\n", result.checkpoint ? json(*result.checkpoint, false) : "null");
@@ -220,7 +280,7 @@ Text shown(const ShowOptions& options) {
     if (options.json)
         add_json(out, result, frame);
     else if (options.csv)
-        add_table(out, frame ? sampled_columns(result.frames[*frame]) : series_columns(result));
+        add_table(out, frame ? frame_columns(result, *frame) : series_columns(result));
     else
         add_summary(out, result, options.file);
     return out;
@@ -248,9 +308,9 @@ void add_show(CLI::App& app, int& exit_status) {
     command->add_option("FILE", options->file, "result file NAME.hdf")->required();
     CLI::Option* csv = command->add_flag("--csv", options->csv, "the series, in full precision");
     command->add_flag("--json", options->json, "everything but the numbers of the frames' arrays")->excludes(csv);
-    command->add_option(
-        "--frame", options->frame,
-        "with --csv: the sampled arrays of this frame instead; with --json: its arrays too (-1: the last)");
+    command->add_option("--frame", options->frame,
+                        "with --csv: points and what is known there, of this frame, instead; with --json: its arrays "
+                        "too (-1: the last)");
     command->callback([options, &exit_status] { exit_status = show(*options); });
 }
 
