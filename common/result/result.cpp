@@ -239,6 +239,7 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     impl->contents.series = series;
     // The old result ends here: its journal, should one lie about, has another id.
     impl->consolidate();
+    write_view(path, impl->contents);
     return ResultWriter(std::move(impl));
 }
 
@@ -253,6 +254,7 @@ ResultWriter ResultWriter::resume(const fs::path& file) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
     impl->consolidate();
+    write_view(path, impl->contents);
     return ResultWriter(std::move(impl));
 }
 

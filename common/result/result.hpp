@@ -83,7 +83,8 @@ public:
     void frame(const Record& frame);
     void checkpoint(const Record& state);  // replaces the one before
     void discard();                        // forgets all rows, meshes, frames and the checkpoint: the run begins again
-    void finish(const About& more);        // adds to /about, writes NAME.hdf whole, removes the journal
+    // Adds to /about, writes NAME.hdf whole, and the folder `view` if frames have meshes; removes the journal.
+    void finish(const About& more);
 
 private:
     struct Impl;
@@ -105,7 +106,7 @@ struct Result {
 // records are included. Throws std::runtime_error naming the file when it is no result.
 Result read_result(const std::filesystem::path& file);
 
-// Merges a left-over journal into the file, so that it can be read by any HDF5 program.
+// Merges a left-over journal into the file, so that it can be read by any HDF5 program, and into the folder `view`.
 void repair_result(const std::filesystem::path& file);
 
 }  // namespace tubule

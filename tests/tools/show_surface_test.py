@@ -45,7 +45,8 @@ class Show(unittest.TestCase):
         self.assertIn(["0", "48", "216", "3", "in", "z,", "2"], lines)
         self.assertIn(["1", "48", "216", "3", "in", "z,", "4"], lines)
         self.assertIn(["2", "80", "362", "3", "no:", "closed"], lines)
-        self.assertEqual([line[:3] for line in lines[-4:]], [["0", "0", "0"], ["1", "1", "1"], ["2", "0", "2"], ["3", "1", "2"]])
+        frames = [["0", "0", "0"], ["1", "1", "1"], ["2", "0", "2"], ["3", "1", "2"]]  # number, time, mesh
+        self.assertEqual([line[:3] for line in lines[-4:]], frames)
         self.assertIn("points[362,", lines[-1])
         self.assertNotIn("restart_state", self.show("mixed.hdf"))
 

@@ -3,8 +3,9 @@
 
     vtk_test.py SURFACE_RESULTS
 
-SURFACE_RESULTS (surface_results.cpp) writes flat triangulations moved by a polynomial map of the elements' degree, which
-is written again here: cells of VTK must meet it everywhere, not only at their nodes. A wrong order of nodes cannot.
+SURFACE_RESULTS (surface_results.cpp) writes flat triangulations moved by a polynomial map of the elements' degree,
+which is written again here: cells of VTK must meet it everywhere, not only at their nodes. A wrong order of nodes
+cannot.
 """
 
 import json
@@ -113,7 +114,8 @@ class Surfaces(unittest.TestCase):
                     # 4 rings of 6 points; the seam runs through the first ring's 6 edges, k nodes each.
                     self.check_size(grid, k, 48, 0, 6 * k)
                     self.check_exact(grid, k, frame)
-                    z = vtk_to_numpy(grid.GetPoints().GetData())[:, 2] - 0.1 * (1 + frame) * array(grid, "flat")[:, 0] ** k
+                    bent = 0.1 * (1 + frame) * array(grid, "flat")[:, 0] ** k
+                    z = vtk_to_numpy(grid.GetPoints().GetData())[:, 2] - bent
                     self.assertAlmostEqual(np.ptp(z), 2 * (1 + frame), delta=0.5)  # jittered ends of one period
 
     def test_several_meshes(self):
@@ -125,8 +127,8 @@ class Surfaces(unittest.TestCase):
     def test_curvatures_arrive(self):
         grid = self.view("shapes_torus", 0)
         points, normal = vtk_to_numpy(grid.GetPoints().GetData()), array(grid, "normal")
-        # A torus of radii 2 and 1: K = cos/(2 + cos), H = -(2 + 2 cos)/(2 + cos) at the angle around the tube; recovered
-        # on 32 x 16 quadrangles.
+        # A torus of radii 2 and 1: K = cos/(2 + cos), H = -(2 + 2 cos)/(2 + cos) at the angle around the tube;
+        # recovered on 32 x 16 quadrangles.
         cosine = np.hypot(points[:, 0], points[:, 1]) - 2
         np.testing.assert_allclose(array(grid, "K"), cosine / (2 + cosine), atol=0.05)
         np.testing.assert_allclose(array(grid, "H"), -(2 + 2 * cosine) / (2 + cosine), atol=0.05)

@@ -425,9 +425,19 @@ TEST_F(ResultFile, TheViewFollowsTheFrames) {
                      "    print(f['VTKHDF'].attrs['time'] == entry['time'], f['VTKHDF/Points'].shape)\n"),
               "True (9, 3)\nTrue (9, 3)\nTrue (9, 3)\n");
 
-    // A result without surfaces takes its place; others in the folder stay.
+    // A run that goes on and is killed: repairing makes the view whole.
+    {
+        auto again = ResultWriter::resume(file);
+        EXPECT_EQ(view().size(), 4u);
+        again.checkpoint(surface_record_at(3, 0));
+        again.frame(surface_record_at(4, 0));
+    }
+    repair_result(file);
+    EXPECT_EQ(view().size(), 5u);
+
+    // A new result takes its place; other files in the folder stay.
     std::ofstream(directory / "view" / "run_notes.hdf") << "mine";
-    create().finish({});
+    const auto other = create();
     EXPECT_EQ(view(), std::vector<std::string>{"run_notes.hdf"});
 }
 

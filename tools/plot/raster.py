@@ -17,7 +17,8 @@ def lattice(order):
     """Barycentric integers of the nodes of a cell in VTK's order, for orders 1 to 4."""
     k = order
     corners = [(k, 0, 0), (0, k, 0), (0, 0, k)]
-    edges = [(k - i, i, 0) for i in range(1, k)] + [(0, k - i, i) for i in range(1, k)] + [(i, 0, k - i) for i in range(1, k)]
+    way = range(1, k)
+    edges = [(k - i, i, 0) for i in way] + [(0, k - i, i) for i in way] + [(i, 0, k - i) for i in way]
     inside = {1: [], 2: [], 3: [(1, 1, 1)], 4: [(2, 1, 1), (1, 2, 1), (1, 1, 2)]}[k]
     return np.array(corners + edges + inside)
 
@@ -113,8 +114,7 @@ def sample(nodes, normals, values, order, closed, view, origin, scale, width, he
     `origin` is the upper left corner of the picture in the plane of the view, `scale` samples a unit of length.
     """
     out = Samples(width, height, values.shape[-1], closed)
-    seen = nodes @ view.axes
-    seen = np.stack([(seen[..., 0] - origin[0]) * scale, (origin[1] - seen[..., 1]) * scale, seen[..., 2] * scale], axis=-1)
+    seen = scale * (nodes @ view.axes - (*origin, 0)) * (1, -1, 1)
     turned = normals @ view.axes
     # A side is no longer than the way along its nodes.
     k = order

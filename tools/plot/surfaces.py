@@ -63,7 +63,8 @@ class SurfacePanel:
         self.right = self.centres[-1] + self.scale * widths[-1] / 2
         self.left = min(left, self.centres[0] - self.scale * widths[0] / 2) - 0.12
 
-        self.titles = ["last state" if c.time is None else f"{time_name(i)} = {time_text(c.time)}" for i, c in enumerate(columns)]
+        times = [column.time for column in columns]
+        self.titles = ["last state" if t is None else f"{time_name(i)} = {time_text(t)}" for i, t in enumerate(times)]
         if self.beside and not columns[0].time:
             self.titles = [""]  # the only time there is, and zero: no more than a shape
         self.height, self.middles = HEADER if any(self.titles) else 0.08, []  # of each row of pictures, from the top
