@@ -129,18 +129,18 @@ SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     mesh.order = static_cast<int>(integer("order"));
     mesh.nodes = static_cast<std::size_t>(integer("nodes"));
     mesh.period = get_attribute<double>(open_attribute(group, "period"), H5T_NATIVE_DOUBLE, "period");
-    const auto connectivity = get_integers(group, "Connectivity");
-    if (mesh.period == 0) {
-        mesh.cells.assign(connectivity.begin(), connectivity.end());
-        return mesh;
-    }
-    const auto node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
-    for (const std::int64_t point : connectivity) {
+    if (mesh.order < 1 || mesh.order > 4)
+        throw std::runtime_error(fmt::format("mesh {}: its order is {}, not 1 to 4", name, mesh.order));
+    const bool tube = mesh.period > 0;
+    std::vector<std::int64_t> node, shift;
+    if (tube) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
+    const std::size_t points = tube ? std::min(node.size(), shift.size()) : mesh.nodes;
+    for (const std::int64_t point : get_integers(group, "Connectivity")) {
         const auto p = static_cast<std::size_t>(point);
-        if (p >= std::min(node.size(), shift.size()))
-            throw std::runtime_error(fmt::format("mesh {}: a cell has point {}, which it lacks", name, point));
-        mesh.cells.push_back(static_cast<int>(node[p]));
-        mesh.shifts.push_back(static_cast<int>(shift[p]));
+        if (p >= points)
+            throw std::runtime_error(fmt::format("mesh {}: a cell has point {} of {}", name, point, points));
+        mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
+        if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
     }
     return mesh;
 }

@@ -355,7 +355,8 @@ TEST_F(ResultFile, ADamagedSurfaceNamesItsLack) {
     };
     EXPECT_CONTAINS(damaged("del f['meshes']"), "000000 lies on mesh 0, which is missing");
     EXPECT_CONTAINS(damaged("del f['meshes/000000/point_shift']"), "point_shift");
-    EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"), "a cell has point 99, which it lacks");
+    EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"), "mesh 000000: a cell has point 99 of 14");
+    EXPECT_CONTAINS(damaged("f['meshes/000000'].attrs['order'] = 7"), "mesh 000000: its order is 7, not 1 to 4");
     EXPECT_CONTAINS(damaged("g = f['frames/000000']; del g['Points']; g['Points'] = np.zeros((3, 3))"),
                     "Points has fewer rows than its mesh has nodes");
 }
