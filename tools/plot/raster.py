@@ -138,7 +138,7 @@ def shaded(samples, colours):
     outside = samples.outside[hit]
     normal = samples.normal[hit]
     normal /= np.where(outside, 1, -1)[:, None] * np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    shade = 0.62 + 0.4 * np.clip(normal @ LIGHT, 0, 1)
+    shade = 0.56 + 0.46 * ((1 + normal @ LIGHT) / 2) ** 1.5  # no edge where the light ends
     middle = LIGHT + [0, 0, 1]
     gloss = 0.3 * np.clip(normal @ (middle / np.linalg.norm(middle)), 0, 1) ** 40
     rgb = np.where(outside[:, None], colours, 0.35 * colours + 0.32)  # paler inside, and darker

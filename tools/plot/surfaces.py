@@ -11,7 +11,7 @@ from tubes import caption
 
 MAX_HEIGHT = 5.4  # inches of all rows together
 MAX_SIZE = 2.7  # inches of one surface
-GAP, HEADER, LABEL_WIDTH, RIM = 0.14, 0.24, 16, 0.02  # RIM: around each surface
+GAP, HEADER, LABEL_WIDTH, RIM = 0.14, 0.24, 22, 0.02  # RIM: around each surface
 SCALE_BAR = 0.35  # inches right of the last column
 
 
@@ -57,7 +57,9 @@ class SurfacePanel:
         pitch = [max(self.scale * width, 0.62) + GAP for width in widths]
         slack = np.clip((room_x + GAP * len(widths) - sum(pitch)) / len(widths), 0, 0.6)
         self.centres = left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
-        if lone:  # in the middle of the page
+        if lone and self.beside:  # above their colour bars
+            self.centres = np.array([0.29, 0.73]) * WIDTH
+        elif lone:  # in the middle of the page
             ends = self.centres[0] - pitch[0] / 2, self.centres[-1] + pitch[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(ends)) / 2
         self.right = self.centres[-1] + self.scale * widths[-1] / 2
