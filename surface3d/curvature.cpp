@@ -1,7 +1,10 @@
 #include "surface3d/curvature.hpp"
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <map>
+#include <stdexcept>
 
 #include "surface3d/projection.hpp"
 
@@ -169,12 +172,23 @@ CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recove
     }
 }
 
-void smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field) {
+CurvatureGradients smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field) {
+    if (!(eps >= 0)) throw std::invalid_argument(fmt::format("curvatures are smoothed by eps >= 0, not {:g}", eps));
+    const Tabulation& table = space.tabulation();
+    const auto rough = load<6>(space, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<6>& out) {
+        const SurfacePoint<double> p = tangent_point(X, table, q);
+        const CellColumns<3> grad = gradients(p, table, q);
+        Eigen::Matrix<double, 6, 1> both;
+        both << grad * space.gather(field.H, cell), grad * space.gather(field.K, cell);
+        out.noalias() += (table.weight[q] * p.area * both) * table.value.col(q).transpose();
+    });
     const Eigen::SparseMatrix<double> M = mass_matrix(space, mesh);
     SparseCholesky step;
     step.factor(M + eps * stiffness_matrix(space, mesh));
     field.H = step.solve(M * field.H);
     field.K = step.solve(M * field.K);
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> smoothed = step.solve(rough.transpose().eval()).transpose();
+    return {smoothed.topRows<3>(), smoothed.bottomRows<3>()};
 }
 
 }  // namespace tubule::surface3d

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/case/surface_choices.hpp"
+#include "surface3d/polynomial_graph.hpp"
 #include "surface3d/surface_space.hpp"
 
 namespace tubule::surface3d {
@@ -21,8 +22,13 @@ struct CurvatureField {
 // All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate.
 CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recovery recovery = Recovery::patch);
 
-// The paper's smoothing: H and K become one implicit step of length eps > 0 of heat flow on the surface.
-void smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field);
+// The paper's smoothing, one implicit step of length eps >= 0 of heat flow on the surface: H and K are replaced by
+// theirs, and so are the components of the gradients that H and K had before, from element to element. Normal and B
+// stay. std::invalid_argument when eps is negative.
+struct CurvatureGradients {
+    VectorField H, K;
+};
+CurvatureGradients smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field);
 
 // Recovery::patch and patch_nodal, with the neighbourhoods kept for as long as the triangles stay.
 //
@@ -53,14 +59,13 @@ private:
         int patch, shift;  // of the node, as the patch sees it
         double weight;
     };
-    struct Graph;
 
-    std::vector<Graph> fit(const CurvedMesh& mesh) const;
+    std::vector<PolynomialGraph> fit(const CurvedMesh& mesh) const;
     int shift(const CurvedMesh& mesh, int cell, int a) const {
         return mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + a] : 0;
     }
 
-    int degree_;
+    int degree_, most_members_ = 0;
     Tabulation corner_table_;
     std::vector<int> patch_of_;  // of each node that is a vertex
     std::vector<Patch> patches_;

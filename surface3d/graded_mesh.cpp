@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "surface3d/polynomial_graph.hpp"
 #include "surface3d/surface_space.hpp"
 
 namespace tubule::surface3d {
@@ -20,7 +21,10 @@ struct Place {
     Eigen::Vector3d x, along, around;
 };
 Place place(const Profile& profile, double t, double theta) {
-    if (profile.period == 0) t = std::clamp(t, 1e-6, 1 - 1e-6);  // the angle has no direction at a pole
+    if (profile.period == 0) {
+        if (t < 0 || t > 1) t = t < 0 ? -t : 2 - t, theta += pi;  // over the pole and down on the other side
+        t = std::clamp(t, 1e-6, 1 - 1e-6);                        // the angle has no direction at a pole
+    }
     const double turns = profile.period > 0 ? std::floor(t) : 0, step = 1e-6;
     const auto at = [&](double parameter) {
         const Eigen::Vector2d rz = profile.at(parameter - turns);
@@ -43,6 +47,46 @@ Eigen::MatrixXd without_polynomials(int points, int degree) {
         Eigen::HouseholderQR<Eigen::MatrixXd>(V).householderQ() * Eigen::MatrixXd::Identity(points, degree + 1);
     return Eigen::MatrixXd::Identity(points, points) - Q * Q.transpose();
 }
+
+// How far the curvatures that PatchRecovery would find are from the exact ones: a vertex amid six equilateral triangles
+// of exact nodes.
+class PatchDefect {
+public:
+    explicit PatchDefect(int order)
+        : fit_(2 * order, 3 * order * (order + 1) + 1), nodes_(3, 3 * order * (order + 1) + 1) {
+        for (int i = -order; i <= order; ++i)
+            for (int j = std::max(-order, -order - i); j <= std::min(order, order - i); ++j)
+                lattice_.push_back(Eigen::Vector2d(i, j) / order);
+    }
+
+    // at(x, y): the point x and y edges away from the vertex, in two directions across each other.
+    template <class At>
+    double operator()(At&& at) {
+        const SurfacePoint<double> vertex = at(0.0, 0.0);
+        exact_.clear();
+        for (std::size_t i = 0; i < lattice_.size(); ++i) {
+            exact_.push_back(at(lattice_[i][0] + lattice_[i][1] / 2, lattice_[i][1] * std::sqrt(0.75)));
+            nodes_.col(static_cast<Eigen::Index>(i)) = exact_.back().x;
+        }
+        const PolynomialGraph graph = fit_(vertex.x, vertex.normal, nodes_);
+        double sum = 0, total = 0;
+        for (std::size_t i = 0; i < lattice_.size(); ++i) {
+            // The share of this vertex in the recovery: 1 there, 0 where its triangles end.
+            const double u = lattice_[i][0], v = lattice_[i][1];
+            const double weight = 1 - std::max({std::abs(u), std::abs(v), std::abs(u + v)});
+            if (weight <= 0) continue;
+            sum += weight * weight * (graph.at(exact_[i].x).B - exact_[i].B).squaredNorm();
+            total += weight * weight;
+        }
+        return std::sqrt(sum / total);
+    }
+
+private:
+    GraphFit fit_;
+    Eigen::Matrix3Xd nodes_;
+    std::vector<Eigen::Vector2d> lattice_;
+    std::vector<SurfacePoint<double>> exact_;
+};
 
 double parameter(int i) {
     return static_cast<double>(i) / samples;
@@ -181,22 +225,33 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
     for (int s = 0; s < n_spans; ++s) r.spans.push_back(0.5 * length * std::pow(0.6, n_spans - 1 - s));
     r.defect = Eigen::MatrixXd::Zero(samples + 1, n_spans);
     const Eigen::MatrixXd remainder = without_polynomials(points, order);
-    Eigen::Matrix<double, Eigen::Dynamic, 6> B(points, 6);
-    for (int i = 0; i <= samples; ++i)
-        for (int m = 0; m < meridians; ++m)
-            for (int s = 0; s < n_spans; ++s) {
-                const double t = parameter(i), theta = 2 * pi * m / meridians;
-                const double dt = r.spans[s] / r.speed[i], dtheta = r.spans[s] / (r.around[i] / (2 * pi));
-                for (const bool along : {true, false}) {
-                    if (!along && dtheta > 2 * pi) continue;  // near a pole: the other direction tells
-                    for (int j = 0; j < points; ++j) {
-                        const double x = static_cast<double>(j) / (points - 1) - 0.5;
-                        B.row(j) = packed_tensor(at(t + (along ? x * dt : 0), theta + (along ? 0 : x * dtheta)).B);
+#pragma omp parallel
+    {
+        PatchDefect patch_defect(order);
+        Eigen::Matrix<double, Eigen::Dynamic, 6> B(points, 6);
+#pragma omp for schedule(static)
+        for (int i = 0; i <= samples; ++i)
+            for (int m = 0; m < meridians; ++m)
+                for (int s = 0; s < n_spans; ++s) {
+                    const double t = parameter(i), theta = 2 * pi * m / meridians;
+                    const double dt = r.spans[s] / r.speed[i], dtheta = r.spans[s] / (r.around[i] / (2 * pi));
+                    double approximation = 0;
+                    for (const bool along : {true, false}) {
+                        if (!along && dtheta > 2 * pi) continue;  // near a pole: the other direction tells
+                        for (int j = 0; j < points; ++j) {
+                            const double x = static_cast<double>(j) / (points - 1) - 0.5;
+                            B.row(j) = packed_tensor(at(t + (along ? x * dt : 0), theta + (along ? 0 : x * dtheta)).B);
+                        }
+                        approximation = std::max(approximation, (remainder * B).norm() / std::sqrt(1.0 * points));
                     }
-                    const double defect = (remainder * B).norm() / std::sqrt(static_cast<double>(points));
-                    r.defect(i, s) = std::max(r.defect(i, s), defect);
+                    // Straight ahead from the profile's surface: no angle is needed, and poles are points like others.
+                    const Place p = place(profile, t, theta);
+                    const double recovery = patch_defect([&](double x, double y) {
+                        return point(p.x + x * dt * p.along + y * dtheta * p.around, p.along, p.around);
+                    });
+                    r.defect(i, s) = std::max(r.defect(i, s), std::hypot(approximation, recovery));
                 }
-            }
+    }
     return r;
 }
 

@@ -1,6 +1,4 @@
-#include <Eigen/QR>
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 #include "surface3d/curvature.hpp"
@@ -8,26 +6,6 @@
 
 namespace tubule::surface3d {
 namespace {
-
-constexpr int max_degree = 2 * max_order;
-
-int coefficients(int degree) {
-    return (degree + 1) * (degree + 2) / 2;
-}
-
-// x^0 ... x^degree and the first two derivatives.
-struct Powers {
-    double v[max_degree + 1], d[max_degree + 1], dd[max_degree + 1];
-
-    Powers(double x, int degree) {
-        v[0] = 1, d[0] = 0, dd[0] = 0;
-        for (int i = 1; i <= degree; ++i) {
-            v[i] = v[i - 1] * x;
-            d[i] = i * v[i - 1];
-            dd[i] = i * d[i - 1];
-        }
-    }
-};
 
 // Normal, B, H and K of a point as one column, and nodal columns as fields.
 using Column11 = Eigen::Matrix<double, 11, 1>;
@@ -47,34 +25,6 @@ CurvatureField field_of(const Columns11& values) {
 }
 
 }  // namespace
-
-// height(x, y) over the plane through `origin` spanned by e1, e2, in units of `scale`.
-struct PatchRecovery::Graph {
-    Eigen::Vector3d origin, e1, e2, normal;
-    double scale = 1;
-    Eigen::Matrix<double, (max_degree + 1) * (max_degree + 2) / 2, 1> coefficient;
-
-    SurfacePoint<double> at(const Eigen::Vector3d& position, int degree) const {
-        const Eigen::Vector3d d = (position - origin) / scale;
-        const Powers x(d.dot(e1), degree), y(d.dot(e2), degree);
-        double h = 0, hx = 0, hy = 0, hxx = 0, hxy = 0, hyy = 0;
-        for (int i = 0, n = 0; i <= degree; ++i)
-            for (int j = 0; i + j <= degree; ++j, ++n) {
-                const double c = coefficient[n];
-                h += c * x.v[i] * y.v[j];
-                hx += c * x.d[i] * y.v[j];
-                hy += c * x.v[i] * y.d[j];
-                hxx += c * x.dd[i] * y.v[j];
-                hxy += c * x.d[i] * y.d[j];
-                hyy += c * x.v[i] * y.dd[j];
-            }
-        SurfacePoint<double> p;
-        const Eigen::Vector3d X = origin + scale * (x.v[1] * e1 + y.v[1] * e2 + h * normal);
-        set_tangents<double>(p, X, e1 + hx * normal, e2 + hy * normal);
-        set_curvature<double>(p, normal * (hxx / scale), normal * (hxy / scale), normal * (hyy / scale));
-        return p;
-    }
-};
 
 PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
     : degree_(2 * mesh.order),
@@ -96,7 +46,7 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
     for (Patch& patch : patches_) {
         std::set<std::array<int, 2>> cells, members;  // (cell, shift), (node, shift)
         std::vector<std::array<int, 2>> front{{patch.vertex, 0}};
-        while (static_cast<int>(members.size()) <= coefficients(degree_) && !front.empty()) {
+        while (static_cast<int>(members.size()) <= graph_coefficients(degree_) && !front.empty()) {
             std::vector<std::array<int, 2>> next;
             for (const auto& [vertex, vertex_shift] : front)
                 for (const auto& [cell, c] : patches_[patch_of_[vertex]].corners) {
@@ -110,6 +60,7 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
             front = next;
         }
         for (const auto& [node, by] : members) patch.members.push_back({node, by});
+        most_members_ = std::max(most_members_, static_cast<int>(patch.members.size()));
     }
 
     const auto nodes = lattice(mesh.order);
@@ -124,58 +75,39 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
         }
 }
 
-std::vector<PatchRecovery::Graph> PatchRecovery::fit(const CurvedMesh& mesh) const {
+std::vector<PolynomialGraph> PatchRecovery::fit(const CurvedMesh& mesh) const {
     const int n_patches = static_cast<int>(patches_.size());
-    std::vector<Graph> graphs(n_patches);
+    std::vector<PolynomialGraph> graphs(n_patches);
 #pragma omp parallel
     {
-        Eigen::MatrixXd rows;
-        Eigen::VectorXd heights;
-        Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors;
+        GraphFit fit(degree_, most_members_);
+        Eigen::Matrix3Xd points(3, most_members_);
 #pragma omp for schedule(static)
         for (int i = 0; i < n_patches; ++i) {
             const Patch& patch = patches_[i];
-            Graph& graph = graphs[i];
-            graph.origin = mesh.nodes[patch.vertex];
-            graph.normal.setZero();
+            Eigen::Vector3d normal = Eigen::Vector3d::Zero();
             for (const auto& [cell, c] : patch.corners)
-                graph.normal += tangent_point(cell_nodes(mesh, cell), corner_table_, c).normal;
-            graph.normal.normalize();
-            graph.e1 = graph.normal.unitOrthogonal();
-            graph.e2 = graph.normal.cross(graph.e1);
-
+                normal += tangent_point(cell_nodes(mesh, cell), corner_table_, c).normal;
             const int n = static_cast<int>(patch.members.size());
-            const auto offset = [&](int r) {
-                const Member& m = patch.members[r];
-                return Eigen::Vector3d(mesh.nodes[m.node] + m.shift * mesh.period * Eigen::Vector3d::UnitZ() -
-                                       graph.origin);
-            };
-            graph.scale = 0;
-            for (int r = 0; r < n; ++r) graph.scale = std::max(graph.scale, offset(r).norm());
-            rows.resize(n, coefficients(degree_));
-            heights.resize(n);
             for (int r = 0; r < n; ++r) {
-                const Eigen::Vector3d d = offset(r) / graph.scale;
-                const Powers x(d.dot(graph.e1), degree_), y(d.dot(graph.e2), degree_);
-                for (int ex = 0, column = 0; ex <= degree_; ++ex)
-                    for (int ey = 0; ex + ey <= degree_; ++ey, ++column) rows(r, column) = x.v[ex] * y.v[ey];
-                heights[r] = d.dot(graph.normal);
+                const auto& [node, by] = patch.members[r];
+                points.col(r) = mesh.nodes[node] + by * mesh.period * Eigen::Vector3d::UnitZ();
             }
-            graph.coefficient.head(rows.cols()) = factors.compute(rows).solve(heights);
+            graphs[i] = fit(mesh.nodes[patch.vertex], normal.normalized(), points.leftCols(n));
         }
     }
     return graphs;
 }
 
 CurvatureField PatchRecovery::nodal(const CurvedMesh& mesh) const {
-    const std::vector<Graph> graphs = fit(mesh);
+    const std::vector<PolynomialGraph> graphs = fit(mesh);
     Columns11 values(11, mesh.size());
 #pragma omp parallel for schedule(static)
     for (int node = 0; node < mesh.size(); ++node) {
         Column11 mean = Column11::Zero();
         for (const auto& [patch, by, weight] : shares_[node]) {
             const Eigen::Vector3d x = mesh.nodes[node] + by * mesh.period * Eigen::Vector3d::UnitZ();
-            mean += weight * column_of(graphs[patch].at(x, degree_));
+            mean += weight * column_of(graphs[patch].at(x));
         }
         values.col(node) = mean;
     }
@@ -183,7 +115,7 @@ CurvatureField PatchRecovery::nodal(const CurvedMesh& mesh) const {
 }
 
 CurvatureField PatchRecovery::projected(const SurfaceSpace& space, const CurvedMesh& mesh) const {
-    const std::vector<Graph> graphs = fit(mesh);
+    const std::vector<PolynomialGraph> graphs = fit(mesh);
     const Tabulation& table = space.tabulation();
     const Projection project(space, mesh);
     return field_of(project(load<11>(space, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<11>& out) {
@@ -193,7 +125,7 @@ CurvatureField PatchRecovery::projected(const SurfaceSpace& space, const CurvedM
         Column11 mean = Column11::Zero();
         for (int c = 0; c < 3; ++c) {
             const Eigen::Vector3d x = p.x - shift(mesh, cell, c) * mesh.period * Eigen::Vector3d::UnitZ();
-            mean += weight[c] * column_of(graphs[patch_of_[mesh.node(cell, c)]].at(x, degree_));
+            mean += weight[c] * column_of(graphs[patch_of_[mesh.node(cell, c)]].at(x));
         }
         out.noalias() += (table.weight[q] * p.area * mean) * table.value.col(q).transpose();
     })));
