@@ -173,12 +173,23 @@ double triangles_of(const Resolution& r, const std::vector<double>& size) {
 // Rings of sizes_of(level), with the level that gives this many triangles; there are more the lower the level.
 template <class Sizes>
 TriangleMesh rings_of_number(const Resolution& r, const Profile& profile, int triangles, Sizes&& sizes_of) {
-    double low = 1e-12, high = 1e3;
-    for (int step = 0; step < 60; ++step) {
-        const double level = std::sqrt(low * high);
-        (triangles_of(r, sizes_of(level)) > triangles ? low : high) = level;
+    TriangleMesh best;
+    double wanted = triangles;
+    const auto excess = [&](const TriangleMesh& mesh) {
+        return std::abs(std::log(static_cast<double>(mesh.triangles.size()) / triangles));
+    };
+    // Whole rings of whole numbers of points are some percent off what the sizes would give: ask for that much less.
+    for (int attempt = 0; attempt < 4; ++attempt) {
+        double low = 1e-12, high = 1e3;
+        for (int step = 0; step < 60; ++step) {
+            const double level = std::sqrt(low * high);
+            (triangles_of(r, sizes_of(level)) > wanted ? low : high) = level;
+        }
+        TriangleMesh mesh = ring_mesh(rings_for(r, profile, sizes_of(high)), profile.period);
+        wanted *= triangles / static_cast<double>(mesh.triangles.size());
+        if (best.triangles.empty() || excess(mesh) < excess(best)) best = std::move(mesh);
     }
-    return ring_mesh(rings_for(r, profile, sizes_of(high)), profile.period);
+    return best;
 }
 
 }  // namespace
@@ -212,11 +223,14 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
         return point(p.x, p.along, p.around);
     };
     double length = 0;
+    int different = 1;  // meridians; of a surface of revolution one does for all
     for (int i = 0; i <= samples; ++i) {
+        const double first = at(parameter(i), 0).B.norm();
         for (int m = 0; m < meridians; ++m) {
             const SurfacePoint<double> p = at(parameter(i), 2 * pi * m / meridians);
             r.speed[i] += p.tangent[0].norm() / meridians;
             r.around[i] += p.tangent[1].norm() * 2 * pi / meridians;
+            if (std::abs(p.B.norm() - first) > 1e-9 * first) different = meridians;
         }
         length += r.speed[i] / samples;
     }
@@ -231,7 +245,7 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
         Eigen::Matrix<double, Eigen::Dynamic, 6> B(points, 6);
 #pragma omp for schedule(static)
         for (int i = 0; i <= samples; ++i)
-            for (int m = 0; m < meridians; ++m)
+            for (int m = 0; m < different; ++m)
                 for (int s = 0; s < n_spans; ++s) {
                     const double t = parameter(i), theta = 2 * pi * m / meridians;
                     const double dt = r.spans[s] / r.speed[i], dtheta = r.spans[s] / (r.around[i] / (2 * pi));

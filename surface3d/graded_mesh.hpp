@@ -26,8 +26,9 @@ Profile tube_profile(double radius, double length);
 Profile capsule_profile(const Capsule& capsule);
 
 // What decides on sizes, at evenly spaced parameters 0 ... 1: lengths on the surface for a step of the parameter and
-// around the axis, and in column i how far the shape operator is from a polynomial of the elements' degree over a
-// distance of spans[i] (root mean square, along or around, whichever is more).
+// around the axis, and in column i of `defect` the errors of the shape operator, root mean square, that elements of
+// edge spans[i] would make: of its best approximation (along or around, whichever is more) and of PatchRecovery,
+// together.
 struct Resolution {
     std::vector<double> speed, around, spans;
     Eigen::MatrixXd defect;
@@ -37,7 +38,7 @@ struct Resolution {
 using ExactPoint =
     std::function<SurfacePoint<double>(const Eigen::Vector3d& p, const Eigen::Vector3d& e1, const Eigen::Vector3d& e2)>;
 
-// For elements of this order, the worst of 8 meridians.
+// For elements of this order, the worst of 8 meridians. `point` is called by several threads at once.
 Resolution measure_resolution(const ExactPoint& point, const Profile& profile, int order);
 
 // Of the surface map(profile); `map` as for mapped_mesh.
