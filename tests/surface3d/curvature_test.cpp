@@ -9,6 +9,7 @@
 #include "common/shapes/tube.hpp"
 #include "surface3d/base_meshes.hpp"
 #include "surface3d/bending_force.hpp"
+#include "surface3d/exact_curvature.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
@@ -72,18 +73,44 @@ TEST(Curvature, EnergiesOfThePerturbedSphere) {
     EXPECT_GT(o.integral_H2, willmore_bound);
 }
 
-TEST(Curvature, SmoothingDampsAnEigenfunctionAsItMust) {
-    // On the unit sphere z + 2 becomes z/(1 + 2 eps) + 2.
+TEST(Curvature, SmoothingDampsEigenfunctionsAsItMust) {
+    // On the unit sphere z + 2 becomes z/(1 + 2 eps) + 2. Its gradient is e_z - z n, with components
+    // -xz, -yz, 2/3 - (z^2 - 1/3): what is of order 2 becomes 1/(1 + 6 eps) of it.
     const CurvedMesh mesh = mapped_mesh(icosphere(4), 3, map_of(Sphere{}));
     const SurfaceSpace space(mesh);
     CurvatureField field = recover(space, mesh);
     for (int i = 0; i < mesh.size(); ++i) field.H[i] = mesh.nodes[i].z() + 2, field.K[i] = 3;
     const double eps = 0.1;
-    smooth(space, mesh, eps, field);
+    const CurvatureGradients gradients = smooth(space, mesh, eps, field);
     for (int i = 0; i < mesh.size(); ++i) {
-        EXPECT_NEAR(field.H[i], mesh.nodes[i].z() / (1 + 2 * eps) + 2, 1e-4);  // the surface is one of P3
+        const Eigen::Vector3d n = mesh.nodes[i];
+        EXPECT_NEAR(field.H[i], n.z() / (1 + 2 * eps) + 2, 1e-4);  // the surface is one of P3
         EXPECT_NEAR(field.K[i], 3, 1e-12);
+        Eigen::Vector3d second = -n.z() * n;
+        second.z() += 1.0 / 3;
+        const Eigen::Vector3d exact = second / (1 + 6 * eps) + 2.0 / 3 * Eigen::Vector3d::UnitZ();
+        EXPECT_LT((gradients.H.col(i) - exact).norm(), 1e-3);
+        EXPECT_LT(gradients.K.col(i).norm(), 1e-11);
     }
+    EXPECT_THROW(smooth(space, mesh, -1e-9, field), std::invalid_argument);
+}
+
+TEST(Curvature, ExactNodesAreInterpolated) {
+    // Interpolation in P_k: order k + 1 for values, k for gradients. No recovery is far better than it; the default is
+    // as good but for a factor.
+    const auto map = map_of(Ellipsoid{1, 1.2, 1.5});
+    FieldErrors errors[2];
+    for (int i : {0, 1}) {
+        const TriangleMesh base = icosphere(4 * (i + 1));
+        const CurvedMesh mesh = mapped_mesh(base, 3, map);
+        errors[i] = field_errors(base, mesh, exact_curvature(mesh, exact_nodes(base, 3, map)), map);
+    }
+    for (const auto which : {&FieldErrors::normal, &FieldErrors::H, &FieldErrors::K})
+        EXPECT_GT(order_of(errors[0], errors[1], which), 3.6);
+    EXPECT_GT(order_of(errors[0], errors[1], &FieldErrors::grad_K), 2.6);
+    const FieldErrors found = errors_of(3, 8, Recovery::patch);
+    EXPECT_LT(found.K, 2 * errors[1].K);
+    EXPECT_LT(found.grad_K, 2 * errors[1].grad_K);
 }
 
 // Energies, area, volume, integrals.
