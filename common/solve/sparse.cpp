@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "common/solve/sparse_engine.hpp"
+
+extern "C" void openblas_set_num_threads(int);  // <cblas.h> is another library's on some systems
 
 namespace tubule {
 namespace {
@@ -28,6 +31,15 @@ void require_finite(const Matrix& A) {
         for (Matrix::InnerIterator entry(A, column); entry; ++entry)
             if (!std::isfinite(entry.value()))
                 throw SolveError(fmt::format("matrix entry ({}, {}) is {}", entry.row(), column, entry.value()));
+}
+
+// A second BLAS thread gains nothing in factors as small as ours, and OpenBLAS's wait by spinning, on the core that the
+// next assembly wants (docs/decisions.md). Who sets OPENBLAS_NUM_THREADS is obeyed.
+void use_one_blas_thread() {
+    [[maybe_unused]] static const bool once = [] {
+        if (!std::getenv("OPENBLAS_NUM_THREADS")) openblas_set_num_threads(1);
+        return true;
+    }();
 }
 
 double norm_1(const Matrix& A) {
@@ -108,7 +120,9 @@ struct SparseSolver::Impl {
 };
 
 SparseSolver::SparseSolver(const char* name, std::unique_ptr<SparseEngine> engine)
-    : impl_(new Impl{.name = name, .engine = std::move(engine), .A = {}, .counters = {}}) {}
+    : impl_(new Impl{.name = name, .engine = std::move(engine), .A = {}, .counters = {}}) {
+    use_one_blas_thread();
+}
 SparseSolver::SparseSolver(SparseSolver&&) noexcept = default;
 SparseSolver& SparseSolver::operator=(SparseSolver&&) noexcept = default;
 SparseSolver::~SparseSolver() = default;

@@ -69,7 +69,7 @@ void print_smoothed(const Sample& s, const CurvatureField& rough) {
         CurvatureField field;
         FieldErrors errors;
     } best;
-    for (const double eps : {0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1}) {
+    for (const double eps : {0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0}) {
         CurvatureField field = rough;
         const CurvatureGradients gradients = smooth(s.space, s.mesh, eps * s.h * s.h, field);
         const FieldErrors e = field_errors(s.exact, s.space, s.mesh, field, &gradients);

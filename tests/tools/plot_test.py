@@ -22,6 +22,7 @@ import energy  # noqa: E402
 import labels  # noqa: E402
 import results  # noqa: E402
 import tubes  # noqa: E402
+import validation  # noqa: E402
 import work_precision  # noqa: E402
 
 TUBULE = None
@@ -383,6 +384,49 @@ class Refusals(InFolder):
         done = subprocess.run([sys.executable, "-B", "-c", script], capture_output=True, text=True)
         self.assertEqual(done.returncode, 4)
         self.assertIn("has no h5py; install the package python3-h5py", done.stderr)
+
+
+class Validation(InFolder):
+    HEAD = "surface,mesh,k,recovery,h,H,K,grad_H,grad_K\n"
+    ROW = "dumbbell,structured,3,{},{},{},2e-3,3e-2,4e-2\n"
+
+    def draw(self, text):
+        table = self.folder / "table.csv"
+        table.write_text(text)
+        command = [sys.executable, "-B", PLOT / "validation.py", table, "-o", self.folder / "v.svg"]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_figure(self):
+        rows = [self.ROW.format(name, h, 1e-3 * h) for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2)]
+        done = self.draw(self.HEAD + "".join(rows))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        texts = svg_texts(self.folder / "v.svg")
+        for words in ("patch recovery, the default", "longest edge h", "h\u2074", "\u2207K"):
+            self.assertIn(words, texts)
+        table = validation.read_table(self.folder / "table.csv")
+        self.assertEqual(table[3, "patch", "H"], [(0.2, 2e-4), (0.1, 1e-4)])  # coarse first
+        self.assertNotIn((3, "unknown", "H"), table)
+
+    def test_surface_has_the_area_of_the_papers_and_the_curvature_of_a_sphere(self):
+        # 5.176926500756, and INT K = 4 pi: rings of the profile by the midpoint rule.
+        angle = (np.arange(4000) + 0.5) * np.pi / 4000
+        r, z, nr, nz, H, K = validation.profile(angle)
+        area = 2 * np.pi * r * np.hypot(np.gradient(r, angle), np.gradient(z, angle)) * np.pi / 4000
+        self.assertAlmostEqual(np.sum(area), 5.176926500756, delta=1e-4)
+        self.assertAlmostEqual(np.sum(K * area), 4 * np.pi, delta=1e-3)
+        self.assertTrue(np.all(H < -np.sqrt(np.maximum(4 * K, 0)) + 1e-9))  # outward normal; H^2 >= 4 K
+        np.testing.assert_allclose(nr**2 + nz**2, 1, atol=1e-12)
+
+    def test_refusals(self):
+        for text, words in (
+            ("a,b\n1,2\n", "must have the columns"),
+            (self.HEAD + self.ROW.format("patch", 0.1, "small"), "must have the columns"),
+            (self.HEAD + self.ROW.format("patch", 0.1, 0), "positive numbers"),
+            (self.HEAD, "has no rows"),
+        ):
+            done = self.draw(text)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, done.stderr)
 
 
 class WorkPrecision(InFolder):
