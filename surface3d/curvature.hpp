@@ -12,6 +12,8 @@
 
 namespace tubule::surface3d {
 
+class Projection;
+
 // Nodal values.
 struct CurvatureField {
     VectorField normal;    // unit, outward
@@ -42,9 +44,10 @@ public:
     explicit PatchRecovery(const CurvedMesh& mesh);
 
     // `mesh` has the triangles of the constructor's; its nodes may have moved. The projection keeps integrals: energies
-    // are free of the error of interpolation, which has a sign.
+    // are free of the error of interpolation, which has a sign. Whoever has a projection of this mesh can lend it.
     CurvatureField nodal(const CurvedMesh& mesh) const;
     CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh) const;
+    CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh, const Projection& project) const;
 
 private:
     struct Member {

@@ -115,9 +115,13 @@ CurvatureField PatchRecovery::nodal(const CurvedMesh& mesh) const {
 }
 
 CurvatureField PatchRecovery::projected(const SurfaceSpace& space, const CurvedMesh& mesh) const {
+    return projected(space, mesh, Projection(space, mesh));
+}
+
+CurvatureField PatchRecovery::projected(const SurfaceSpace& space, const CurvedMesh& mesh,
+                                        const Projection& project) const {
     const std::vector<PolynomialGraph> graphs = fit(mesh);
     const Tabulation& table = space.tabulation();
-    const Projection project(space, mesh);
     return field_of(project(load<11>(space, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<11>& out) {
         const SurfacePoint<double> p = tangent_point(X, table, q);
         const Eigen::Vector2d at = table.point.col(q);

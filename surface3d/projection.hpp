@@ -25,7 +25,10 @@ Eigen::Matrix<double, rows, Eigen::Dynamic> load(const SurfaceSpace& space, cons
 // Nodal values from integrals against the functions of P_k. SolveError if the mesh is degenerate.
 class Projection {
 public:
-    Projection(const SurfaceSpace& space, const CurvedMesh& mesh) { mass_.factor(mass_matrix(space, mesh)); }
+    Projection(const SurfaceSpace& space, const CurvedMesh& mesh) { update(space, mesh); }
+
+    // For nodes that have moved; the ordering stays while the triangles do.
+    void update(const SurfaceSpace& space, const CurvedMesh& mesh) { mass_.factor(mass_matrix(space, mesh)); }
 
     template <int rows>
     Eigen::Matrix<double, rows, Eigen::Dynamic> operator()(const Eigen::Matrix<double, rows, Eigen::Dynamic>& b) const {

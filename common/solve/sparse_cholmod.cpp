@@ -1,5 +1,6 @@
 #include <cholmod.h>
 #include <fmt/core.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,6 +25,19 @@ struct Common : cholmod_common {
     Common(const Common&) = delete;
     Common& operator=(const Common&) = delete;
     ~Common() { cholmod_finish(this); }
+};
+
+// While it lives, parallel regions have one thread. CHOLMOD asks for four in every supernode, whatever the machine has,
+// and these wait for each other by spinning: on two busy cores it took 2 to 30 times as long (docs/decisions.md).
+class OneThread {
+public:
+    OneThread() { omp_set_max_active_levels(0); }
+    OneThread(const OneThread&) = delete;
+    OneThread& operator=(const OneThread&) = delete;
+    ~OneThread() { omp_set_max_active_levels(levels_); }
+
+private:
+    int levels_ = omp_get_max_active_levels();
 };
 
 // The lower triangle of A as CHOLMOD sees it, without a copy.
@@ -96,6 +110,7 @@ public:
     void factor(const Matrix& A) override {
         require_symmetric(A);
         cholmod_sparse view = lower_triangle(A);
+        const OneThread one_thread;
         const bool done = cholmod_factorize(&view, factor_, &common_);
         if (done && common_.status == CHOLMOD_NOT_POSDEF)
             throw SolveError(fmt::format("matrix of size {} is not positive definite: no positive pivot for unknown {}",
