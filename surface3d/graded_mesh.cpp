@@ -38,15 +38,30 @@ Place place(const Profile& profile, double t, double theta) {
             slope[0] * radial + slope[1] * Eigen::Vector3d::UnitZ(), here[0] * tangent};
 }
 
-// Removes the polynomials of a degree from values at evenly spaced points.
-Eigen::MatrixXd without_polynomials(int points, int degree) {
-    Eigen::MatrixXd V(points, degree + 1);
-    for (int i = 0; i < points; ++i)
-        for (int j = 0; j <= degree; ++j) V(i, j) = std::pow(2.0 * i / (points - 1) - 1, j);
-    const Eigen::MatrixXd Q =
-        Eigen::HouseholderQR<Eigen::MatrixXd>(V).householderQ() * Eigen::MatrixXd::Identity(points, degree + 1);
-    return Eigen::MatrixXd::Identity(points, points) - Q * Q.transpose();
-}
+// How far the shape operator on a curve is from the polynomials of a degree, root mean square.
+class CurveDefect {
+public:
+    explicit CurveDefect(int degree) : B_(3 * (degree + 1), 6), remainder_(B_.rows(), B_.rows()) {
+        Eigen::MatrixXd V(B_.rows(), degree + 1);
+        for (int j = 0; j <= degree; ++j) V.col(j) = Eigen::ArrayXd::LinSpaced(B_.rows(), -1, 1).pow(j);
+        const Eigen::MatrixXd Q =
+            Eigen::HouseholderQR<Eigen::MatrixXd>(V).householderQ() * Eigen::MatrixXd::Identity(V.rows(), V.cols());
+        remainder_ = Eigen::MatrixXd::Identity(B_.rows(), B_.rows()) - Q * Q.transpose();
+    }
+
+    // at(x): the point at -1/2 <= x <= 1/2.
+    template <class At>
+    double operator()(At&& at) {
+        const auto last = static_cast<double>(B_.rows() - 1);
+        for (Eigen::Index j = 0; j < B_.rows(); ++j)
+            B_.row(j) = packed_tensor(at(static_cast<double>(j) / last - 0.5).B);
+        return (remainder_ * B_).norm() / std::sqrt(last + 1);
+    }
+
+private:
+    Eigen::Matrix<double, Eigen::Dynamic, 6> B_;
+    Eigen::MatrixXd remainder_;
+};
 
 // How far the curvatures that PatchRecovery would find are from the exact ones: a vertex amid six equilateral triangles
 // of exact nodes.
@@ -235,36 +250,31 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
         length += r.speed[i] / samples;
     }
 
-    const int n_spans = 14, points = 3 * (order + 1);
+    const int n_spans = 14;
     for (int s = 0; s < n_spans; ++s) r.spans.push_back(0.5 * length * std::pow(0.6, n_spans - 1 - s));
     r.defect = Eigen::MatrixXd::Zero(samples + 1, n_spans);
-    const Eigen::MatrixXd remainder = without_polynomials(points, order);
 #pragma omp parallel
     {
+        CurveDefect curve_defect(order);
         PatchDefect patch_defect(order);
-        Eigen::Matrix<double, Eigen::Dynamic, 6> B(points, 6);
+        const auto defect = [&](double t, double theta, double dt, double dtheta) {
+            double approximation = curve_defect([&](double x) { return at(t + x * dt, theta); });
+            if (dtheta <= 2 * pi)  // beyond, near a pole, the other direction tells
+                approximation =
+                    std::max(approximation, curve_defect([&](double x) { return at(t, theta + x * dtheta); }));
+            // Straight ahead from the profile's surface: no angle is needed, and poles are points like others.
+            const Place p = place(profile, t, theta);
+            return std::hypot(approximation, patch_defect([&](double x, double y) {
+                                  return point(p.x + x * dt * p.along + y * dtheta * p.around, p.along, p.around);
+                              }));
+        };
 #pragma omp for schedule(static)
         for (int i = 0; i <= samples; ++i)
             for (int m = 0; m < different; ++m)
-                for (int s = 0; s < n_spans; ++s) {
-                    const double t = parameter(i), theta = 2 * pi * m / meridians;
-                    const double dt = r.spans[s] / r.speed[i], dtheta = r.spans[s] / (r.around[i] / (2 * pi));
-                    double approximation = 0;
-                    for (const bool along : {true, false}) {
-                        if (!along && dtheta > 2 * pi) continue;  // near a pole: the other direction tells
-                        for (int j = 0; j < points; ++j) {
-                            const double x = static_cast<double>(j) / (points - 1) - 0.5;
-                            B.row(j) = packed_tensor(at(t + (along ? x * dt : 0), theta + (along ? 0 : x * dtheta)).B);
-                        }
-                        approximation = std::max(approximation, (remainder * B).norm() / std::sqrt(1.0 * points));
-                    }
-                    // Straight ahead from the profile's surface: no angle is needed, and poles are points like others.
-                    const Place p = place(profile, t, theta);
-                    const double recovery = patch_defect([&](double x, double y) {
-                        return point(p.x + x * dt * p.along + y * dtheta * p.around, p.along, p.around);
-                    });
-                    r.defect(i, s) = std::max(r.defect(i, s), std::hypot(approximation, recovery));
-                }
+                for (int s = 0; s < n_spans; ++s)
+                    r.defect(i, s) =
+                        std::max(r.defect(i, s), defect(parameter(i), 2 * pi * m / meridians, r.spans[s] / r.speed[i],
+                                                        r.spans[s] / (r.around[i] / (2 * pi))));
     }
     return r;
 }
