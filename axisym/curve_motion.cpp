@@ -422,7 +422,7 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
     const ProfileSpace& splines = space().splines();
     const double images = space().images();
     Balance out;
-    Pack kinetic{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0};
+    Pack kinetic{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0}, acceleration{0.0};
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(*this, e, g, y, rate);
@@ -442,6 +442,7 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
             const Pack shear = 0.5 * (f.v[w1] - w * r_s / r) * ig;
             kinetic += (0.5 * law_.inertia) * dS * square;
             dissipation += dS * (law_.friction * square + 2 * law_.viscosity * (ss * ss + tt * tt + 2 * shear * shear));
+            acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
             momentum += dS * v;
             angular += dS * r * w;
             divergence += dS * (ss + tt) * (ss + tt);
@@ -449,6 +450,7 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
         }
     out.kinetic = stdx::reduce(kinetic), out.dissipation = stdx::reduce(dissipation);
     out.momentum_z = stdx::reduce(momentum), out.angular_z = stdx::reduce(angular);
+    out.acceleration = stdx::reduce(acceleration);
     out.divergence = std::sqrt(stdx::reduce(divergence)), out.speed = std::sqrt(stdx::hmax(speed));
     return out;
 }

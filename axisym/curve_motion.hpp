@@ -69,6 +69,7 @@ public:
         double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
         double momentum_z = 0, angular_z = 0;
         double speed = 0;       // largest |u|; of the gradient flow |X_t.nu|
+        double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
         double divergence = 0;  // sqrt(INT (div u)^2 dS), of which only the part in the pressures is zero
     };
     Balance balance(const double* y, const double* rate) const;

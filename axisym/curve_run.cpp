@@ -23,7 +23,8 @@ namespace {
 constexpr int first_elements = 12;            // of one cell
 constexpr double finer_mesh = 1.5;            // elements of a pair of runs
 constexpr double finer_time = 0.1;            // tolerances of a pair of runs
-constexpr double tolerance_per_accuracy = 3;  // of the first run
+// Of the first run; the waves of a fluid, weakly damped, cost steps.
+constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;
 constexpr int most_pairs = 8, most_elements = 2000;
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
@@ -31,7 +32,9 @@ constexpr double seam_size = 0.15, seam_per_accuracy = 5;
 constexpr double steepest = 3;       // curvature times length of an element: beyond that nothing is resolved
 constexpr double stretched = 1e-3;   // least over largest |X_s|
 constexpr int steps_between_looks = 10;
-constexpr double newton_error = 2e-10;  // of the iteration, relative to the curve: area and volume are kept to that
+// Of the iteration, relative to the curve: area and volume are kept to that, and in gradient flow, whose first iterate is
+// less good, the volume wants more.
+constexpr double newton_error = 2e-12, newton_error_descent = 2e-13;
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
@@ -150,9 +153,12 @@ struct Settings {
     double tolerance = 1e-4;
 };
 
-Settings finer(const Settings& s, const Case& c) {
+// `excess` is how many times more than asked the two runs before differed; 1 to begin with. The error of the mesh falls
+// at least with the sixth power of its width, unless the shape is not smooth.
+Settings finer(const Settings& s, const Case& c, double excess) {
     Settings out = s;
-    if (!c.discretisation.elements) out.elements = static_cast<int>(std::ceil(finer_mesh * s.elements));
+    const double mesh = std::clamp(finer_mesh * std::pow(excess, 1.0 / 6), finer_mesh, 2.5);
+    if (!c.discretisation.elements) out.elements = static_cast<int>(std::ceil(mesh * s.elements));
     if (!c.discretisation.time_tolerance) out.tolerance = std::max(finer_time * s.tolerance, 1e-13);
     return out;
 }
@@ -189,6 +195,7 @@ private:
     StopReport guard_report(int guard) const;
     std::optional<StopReport> step();
     std::optional<StopReport> check(double t);
+    double what_may_change(double t) const;
     void write_outputs(double until);
     void write_row(double t, const Look& l, const double* y, double dissipated);
     void write_frame(double t, const Look& l, const double* y, const double* rate, double dissipated);
@@ -340,7 +347,7 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     control.absolute = 0.1 * settings_.tolerance;
     control.max_order = case_.discretisation.time_order;
     control.first_step = first_step;
-    control.newton = std::clamp(newton_error / settings_.tolerance, 1e-8, 0.01);
+    control.newton = std::clamp((motion.law().flows ? newton_error : newton_error_descent) / settings_.tolerance, 1e-7, 0.01);
     if (flow_) dissipated_before_ += flow_->dissipated(flow_->time()), counters_before_ += flow_->counters();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
     flow_ = std::make_unique<Flow>(std::move(system), state.y, state.rate, state.time, control);
@@ -371,13 +378,18 @@ StopReport CurveAttempt::guard_report(int guard) const {
     }
 }
 
+// By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
+double CurveAttempt::what_may_change(double t) const {
+    const double left = case_.time.end - t;
+    return std::max({now_.balance.dissipation * left, now_.balance.kinetic, now_.balance.acceleration * left * left});
+}
+
 std::optional<StopReport> CurveAttempt::check(double t) {
     const Look& l = now_;
     if (seconds_since(started_) > case_.time.limit.value_or(std::numeric_limits<double>::infinity()))
         return StopReport{Stop::time_limit, t, fmt::format("used the {} s of time.limit", *case_.time.limit), "go on with --resume"};
     if (watch_.interrupted()) return StopReport{Stop::interrupted, t, "interrupted by a signal", "go on with --resume"};
-    if (case_.time.stationary && l.balance.dissipation * (case_.time.end - t) < *case_.time.stationary * summary.reference_energy &&
-        l.balance.kinetic < *case_.time.stationary * summary.reference_energy)
+    if (case_.time.stationary && what_may_change(t) < *case_.time.stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), space_->size());
@@ -507,7 +519,8 @@ Settings coarser(const Settings& s) {
 
 Settings first_settings(const Case& c, const Beginning& start) {
     const int images = start.meridian.topology == Topology::half_cell || start.meridian.topology == Topology::half_tube ? 2 : 1;
-    Settings s{first_elements, tolerance_per_accuracy * c.accuracy.energy};
+    const bool waves = c.model.kind == ModelKind::fluid;
+    Settings s{first_elements, (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy};
     const Settings given{(c.discretisation.elements.value_or(0) + images - 1) / images, c.discretisation.time_tolerance.value_or(0)};
     if (c.discretisation.elements) s.elements = coarser(given).elements;
     if (c.discretisation.time_tolerance) s.tolerance = coarser(given).tolerance;
@@ -575,10 +588,11 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
         return attempt;
     };
     auto coarse = run_one(false, settings, nullptr);
+    double excess = 1;
     for (int pair = 1;; ++pair) {
         const Stop early = coarse->summary.stop.reason;
         if (early == Stop::interrupted || early == Stop::time_limit) return coarse->summary;
-        const Settings next = finer(settings, c);
+        const Settings next = finer(settings, c, excess);
         auto fine = run_one(true, next, &coarse->trace);
         describe(fine->summary, c, fine->error, pair);
         const bool agrees = fine->summary.as_accurate_as_asked && comparable(coarse->summary.stop, fine->summary.stop);
@@ -589,6 +603,7 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
             accept(fine->summary, c);
             return fine->summary;
         }
+        excess = fine->summary.estimated_error / c.accuracy.energy;
         observer.discard();
         state.reset();
         settings = next;

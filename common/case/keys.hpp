@@ -113,12 +113,9 @@ void keys(Keys& k, Model& model) {
 
 template <class Keys>
 void keys(Keys& k, Velocity& velocity, const Model& model) {
+    if (model.kind != ModelKind::fluid)
+        return k.absent("initial", "must be absent: only model.kind = \"fluid\" has a velocity at the start");
     k.choice("initial", velocity.rotates, {{"rest", false}, {"rotation", true}});
-    k.check("initial", [&] {
-        return velocity.rotates && model.kind != ModelKind::fluid
-                   ? "must be \"rest\", not \"rotation\": only model.kind = \"fluid\" has inertia"
-                   : "";
-    });
     if (velocity.rotates)
         k.number("omega", velocity.omega, {}, k.required);
     else

@@ -89,16 +89,16 @@ TEST(CaseRefusal, TextThatIsNoToml) {
 }
 
 TEST(CaseRefusal, UnknownKeysAndTables) {
-    const std::string tables = "tier, about, energy, model, shape, accuracy, discretisation, time, expect";
+    const std::string tables = "tier, about, energy, model, velocity, shape, accuracy, discretisation, time, expect";
     expect_refused({
         Edit{"tier =", "teir =", "1:1: unknown key teir; did you mean 'tier'? Allowed here: " + tables},
-        Edit{"[discretisation]", "[velocity]", "18:2: unknown key velocity. Allowed here: " + tables},
+        Edit{"[discretisation]", "[speed]", "18:2: unknown key speed. Allowed here: " + tables},
         Edit{"[[shape.mode]]", "[time.mode]",
              "13:7: unknown key time.mode. Allowed here: end, output, stationary, limit"},
         Edit{"title", "tilte", "3:1: unknown key about.tilte; did you mean 'title'? Allowed here: title, source"},
         Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0"},
         Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
-        Edit{"kind = \"gr", "Re = 1\nkind = \"gr", "8:1: unknown key model.Re. Allowed here: kind, volume"},
+        Edit{"kind = \"gr", "Re = 1\nkind = \"gr", "8:6: model.Re must be absent: it belongs to kind \"stokes\" or \"fluid\""},
         // Reported as misspelt, not as the missing radius:
         Edit{"radius", "  raduis",
              "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
@@ -112,7 +112,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
              "energy, r_min"},
         Edit{"order", "oder",
              "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
-             "order, smoothness, time_tolerance, time_order, symmetry"},
+             "order, smoothness, time_tolerance, time_order, symmetry, parametrisation"},
         Edit{"end =", "ende =",
              "21:1: unknown key time.ende; did you mean 'end'? Allowed here: end, output, "
              "stationary, limit"},
@@ -123,7 +123,8 @@ TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
         "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, "
         "r_min, r_max, energy_error, "
-        "integral_H2, integral_K, gauss_bonnet_defect, elements, mode_<n>";
+        "integral_H2, integral_K, gauss_bonnet_defect, elements, kinetic_energy, speed, momentum_z, "
+             "angular_momentum_z, lambda, mode_<n>";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
         Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
@@ -188,9 +189,10 @@ TEST(CaseRefusal, UnknownChoices) {
     expect_refused({
         Edit{"\"axisym\"", "\"Axisim\"",
              "1:8: tier must be one of \"axisym\", \"surface3d\", not \"Axisim\"; did you mean 'axisym'?"},
-        Edit{"\"gradient-flow\"", "\"fluid\"", "8:8: model.kind must be \"gradient-flow\", not \"fluid\""},
-        Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"fixed\"",
-             "9:10: model.volume must be \"free\", not \"fixed\""},
+        Edit{"\"gradient-flow\"", "\"water\"",
+             "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"water\""},
+        Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"kept\"",
+             "9:10: model.volume must be one of \"free\", \"fixed\", not \"kept\""},
         Edit{"\"tube\"", "\"cube\"",
              "10:8: shape.kind must be one of \"tube\", \"sphere\", \"ellipsoid\", \"torus\", "
              "\"capsule\", \"dumbbell\", \"file\", \"result\", not \"cube\"; did you mean 'tube'?"},
@@ -323,9 +325,9 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
         Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
         Override{"mode.0.n=1",
-                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, "
+                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, velocity, "
                  "shape, accuracy, discretisation, time, expect"},
-        Override{"model.kind=stokes", "model.kind must be \"gradient-flow\", not \"stokes\""},
+        Override{"model.kind=honey", "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
         Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},
