@@ -103,7 +103,8 @@ struct MakeMeridian {
     Meridian operator()(const MeshFile&) const { throw CaseError(c.path + ": a mesh is no profile"); }
     Meridian operator()(const ResultFrame& from) const {
         const Result result = read_start(c, from);
-        const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
+        const int count = static_cast<int>(result.frames.size()),
+                  number = from.frame < 0 ? count + from.frame : from.frame;
         if (number < 0 || number >= count)
             throw CaseError(fmt::format("{}: shape.frame must be one of the {} frames of {}, not {}", c.path, count,
                                         from.path, from.frame));
@@ -135,7 +136,8 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K), add("u_n", &Sample::u_n);
     if (motion.law().flows) add("u_t", &Sample::u_t), add("p", &Sample::p);
     if (motion.law().swirls) add("u_theta", &Sample::u_theta);
-    for (const Array& more : {array("restart_breaks", breaks), array("restart_y", state.y), array("restart_rate", state.rate)})
+    for (const Array& more :
+         {array("restart_breaks", breaks), array("restart_y", state.y), array("restart_rate", state.rate)})
         out.arrays.push_back(more);
     out.numbers.insert(out.numbers.end(), {{"restart_tolerance", state.tolerance},
                                            {"restart_total_start", state.total_start},

@@ -499,7 +499,8 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
             jacobian(s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
             const Equilibrated scale(J);
             lu.factor(J);
-            const Eigen::VectorXd change = scale.columns.cwiseProduct(lu.solve(Eigen::VectorXd(scale.rows.cwiseProduct(F))));
+            const Eigen::VectorXd change =
+                scale.columns.cwiseProduct(lu.solve(Eigen::VectorXd(scale.rows.cwiseProduct(F))));
             s.y -= change;
             s.rate = (s.y - before) / h;
             const double size = change.head(space().size()).norm();

@@ -17,12 +17,12 @@ struct MotionLaw {
     double viscosity = 0;  // 1/Re
     double friction = 0;   // gamma
     bool keeps_volume = true;
-    // Of a flow: whether A(X) and V(X) are held against drift by errors in time. Where H varies little, both are the same
-    // condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda nu and a constant
-    // pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
+    // Of a flow: whether A(X) and V(X) are held against drift by errors in time. Where H varies little, both are the
+    // same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda nu and a
+    // constant pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
     bool holds_area = true, holds_volume = true;
     bool lagrangian = false;  // the parameter goes with the flow, X_t = u, instead of staying even
-    bool swirls = false;  // u has a component around the axis
+    bool swirls = false;      // u has a component around the axis
 };
 
 // The unknowns y and where they stand: the curve X = (r, z) as CurveSpace has it; the velocity u = (u_r, u_z) likewise;
@@ -68,9 +68,9 @@ public:
     struct Balance {
         double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
         double momentum_z = 0, angular_z = 0;
-        double speed = 0;       // largest |u|; of the gradient flow |X_t.nu|
+        double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
         double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
-        double divergence = 0;  // sqrt(INT (div u)^2 dS), of which only the part in the pressures is zero
+        double divergence = 0;    // sqrt(INT (div u)^2 dS), of which only the part in the pressures is zero
     };
     Balance balance(const double* y, const double* rate) const;
 

@@ -20,21 +20,18 @@ namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions.md, "Curves in motion".
-constexpr int first_elements = 12;            // of one cell
-constexpr double finer_mesh = 1.5;            // elements of a pair of runs
-constexpr double finer_time = 0.1;            // tolerances of a pair of runs
+constexpr int first_elements = 12;  // of one cell
+constexpr double finer_mesh = 1.5;  // elements of a pair of runs
+constexpr double finer_time = 0.1;  // tolerances of a pair of runs
 // Of the first run; the waves of a fluid, weakly damped, cost steps.
 constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;
 constexpr int most_pairs = 8, most_elements = 2000;
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
 constexpr double seam_size = 0.15, seam_per_accuracy = 5;
-constexpr double steepest = 3;       // curvature times length of an element: beyond that nothing is resolved
-constexpr double stretched = 1e-3;   // least over largest |X_s|
+constexpr double steepest = 3;      // curvature times length of an element: beyond that nothing is resolved
+constexpr double stretched = 1e-3;  // least over largest |X_s|
 constexpr int steps_between_looks = 10;
-// Of the iteration, relative to the curve: area and volume are kept to that, and in gradient flow, whose first iterate is
-// less good, the volume wants more.
-constexpr double newton_error = 2e-12, newton_error_descent = 2e-13;
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
@@ -76,7 +73,8 @@ public:
     double end() const { return points_.back()[0]; }
     // Cubic between the steps.
     double operator()(double t) const {
-        const auto after = std::lower_bound(points_.begin(), points_.end(), t, [](const auto& p, double x) { return p[0] < x; });
+        const auto after =
+            std::lower_bound(points_.begin(), points_.end(), t, [](const auto& p, double x) { return p[0] < x; });
         if (after == points_.begin()) return (*after)[1];
         if (after == points_.end()) return points_.back()[1];
         const auto &a = *(after - 1), &b = *after;
@@ -171,8 +169,8 @@ struct CurveState {
 class CurveAttempt {
 public:
     // Nothing is written unless `recorded`.
-    CurveAttempt(const Case& c, RunObserver& watch, bool recorded, const Beginning& start, const Settings& settings, const Trace* coarser,
-                 std::chrono::steady_clock::time_point started);
+    CurveAttempt(const Case& c, RunObserver& watch, bool recorded, const Beginning& start, const Settings& settings,
+                 const Trace* coarser, std::chrono::steady_clock::time_point started);
 
     void begin();
     void resume(const CurveRestart& restart, double time);
@@ -222,9 +220,16 @@ private:
     std::vector<double> row_;
 };
 
-CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, const Beginning& start, const Settings& settings,
-                           const Trace* coarser, std::chrono::steady_clock::time_point started)
-    : case_(c), watch_(watch), recorded_(recorded), start_(start), settings_(settings), coarser_(coarser), started_(started) {
+CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, const Beginning& start,
+                           const Settings& settings, const Trace* coarser,
+                           std::chrono::steady_clock::time_point started)
+    : case_(c),
+      watch_(watch),
+      recorded_(recorded),
+      start_(start),
+      settings_(settings),
+      coarser_(coarser),
+      started_(started) {
     const ArcLength arc(start.meridian);
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
@@ -232,9 +237,8 @@ CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, con
     const double at_seam = std::min(seam_size * size, seam_per_accuracy * c.accuracy.energy * shrunk);
     const int degree = c.discretisation.order;
     space_ = std::make_unique<CurveSpace>(
-        start.meridian.topology,
-        seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam), degree,
-        c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
+        start.meridian.topology, seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam),
+        degree, c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
     const CurveForms forms(*space_, c.energy);
     const Eigen::VectorXd x = fit(*space_, arc);
     summary.reference_energy = forms.reference_energy(x);
@@ -244,8 +248,8 @@ CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, con
     const double variation = variation_of_H(*space_, x);
     law.holds_area = variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
     if (law.flows && variation <= same_everywhere) law.keeps_volume = false;
-    motion_ = std::make_unique<CurveMotion>(*space_, c.energy, law, gauge_of(c, summary.reference_energy, start.area), start.area,
-                                            start.volume);
+    motion_ = std::make_unique<CurveMotion>(*space_, c.energy, law, gauge_of(c, summary.reference_energy, start.area),
+                                            start.area, start.volume);
     outputs_ = c.time.output;
     outputs_.push_back(c.time.end);
     std::sort(outputs_.begin(), outputs_.end());
@@ -330,24 +334,29 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     const MotionLayout& at = motion.layout();
     FlowSystem system;
     system.residual = [&motion](const double* y, const double* v, double* F) { return motion.residual(y, v, F); };
-    system.jacobian = [&motion](const double* y, const double* v, double cj, double* J) { motion.jacobian(y, v, cj, J); };
+    system.jacobian = [&motion](const double* y, const double* v, double cj, double* J) {
+        motion.jacobian(y, v, cj, J);
+    };
     system.pattern = &motion.pattern();
     system.differential = motion.differential();
-    // Velocities without inertia, pressures and numbers follow from the curve; their own errors do not count, and they
-    // are known to fewer digits than it.
+    // Velocities without inertia, pressures and numbers follow from the curve; their own errors do not count. Over
+    // a very short step rounding alone moves them more than the curve: they have no say in when the iteration ends
+    // either.
     const double length = std::sqrt(start_.area);
-    system.scale = Eigen::VectorXd::Constant(at.size, 1e5 * length);
+    system.scale = Eigen::VectorXd::Constant(at.size, 1e12 * length / settings_.tolerance);
     system.scale.head(space_->size()).setConstant(length);
     if (motion.law().inertia != 0)
         for (int i = space_->size(); i < at.p; ++i) system.scale[i] = std::sqrt(summary.reference_energy / start_.area);
-    system.dissipation = [this](double t, const double* y, const double* v) { return observe(t, y, v).balance.dissipation; };
+    system.dissipation = [this](double t, const double* y, const double* v) {
+        return observe(t, y, v).balance.dissipation;
+    };
     system.guards = [this](double t, const double* y, const double* v) { return guards(observe(t, y, v)); };
     TimeControl control;
     control.relative = settings_.tolerance;
     control.absolute = 0.1 * settings_.tolerance;
     control.max_order = case_.discretisation.time_order;
     control.first_step = first_step;
-    control.newton = std::clamp((motion.law().flows ? newton_error : newton_error_descent) / settings_.tolerance, 1e-7, 0.01);
+    control.two_iterations = true;
     if (flow_) dissipated_before_ += flow_->dissipated(flow_->time()), counters_before_ += flow_->counters();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
     flow_ = std::make_unique<Flow>(std::move(system), state.y, state.rate, state.time, control);
@@ -368,13 +377,15 @@ StopReport CurveAttempt::guard_report(int guard) const {
                     "lower accuracy.r_min to follow the neck further"};
         case well_posed:
             return {Stop::ill_posed, t,
-                    fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}", now_.o.s_symbol),
+                    fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
+                                now_.o.s_symbol),
                     "no resolution helps: the energy does not resist short waves there"};
         default:
-            return {Stop::mesh_lost, t,
-                    fmt::format("the parameter of the profile is stretched {:.3g} times more at one place than at another",
-                                now_.o.g_max / now_.o.g_min),
-                    "set discretisation.parametrisation = \"even\""};
+            return {
+                Stop::mesh_lost, t,
+                fmt::format("the parameter of the profile is stretched {:.3g} times more at one place than at another",
+                            now_.o.g_max / now_.o.g_min),
+                "set discretisation.parametrisation = \"even\""};
     }
 }
 
@@ -387,7 +398,8 @@ double CurveAttempt::what_may_change(double t) const {
 std::optional<StopReport> CurveAttempt::check(double t) {
     const Look& l = now_;
     if (seconds_since(started_) > case_.time.limit.value_or(std::numeric_limits<double>::infinity()))
-        return StopReport{Stop::time_limit, t, fmt::format("used the {} s of time.limit", *case_.time.limit), "go on with --resume"};
+        return StopReport{Stop::time_limit, t, fmt::format("used the {} s of time.limit", *case_.time.limit),
+                          "go on with --resume"};
     if (watch_.interrupted()) return StopReport{Stop::interrupted, t, "interrupted by a signal", "go on with --resume"};
     if (case_.time.stationary && what_may_change(t) < *case_.time.stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
@@ -395,14 +407,16 @@ std::optional<StopReport> CurveAttempt::check(double t) {
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), space_->size());
     if (const auto crossing = self_intersection(*space_, x)) {
         const CurvePoint p = space_->evaluate(x, (*crossing)[0]);
-        return StopReport{Stop::self_intersection, t, fmt::format("the profile meets itself or the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
+        return StopReport{Stop::self_intersection, t,
+                          fmt::format("the profile meets itself or the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
                           "the model knows no contact: what comes after is not meant"};
     }
     const std::vector<double>& breaks = space_->splines().breaks();
     const int e = space_->splines().element_at(l.o.s_curvature);
     const double turn = l.o.curvature * l.o.g_max * (breaks[e + 1] - breaks[e]);
     if (turn > steepest)
-        return StopReport{Stop::resolution_lost, t, fmt::format("an element turns by {:.2g} radians near s = {:.4g}", turn, l.o.s_curvature),
+        return StopReport{Stop::resolution_lost, t,
+                          fmt::format("an element turns by {:.2g} radians near s = {:.4g}", turn, l.o.s_curvature),
                           "ask for more accuracy, or set discretisation.elements"};
     return std::nullopt;
 }
@@ -416,7 +430,9 @@ std::optional<StopReport> CurveAttempt::step() {
     if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
     const Look l = observe(t, flow_->x(), flow_->v());
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), space_->size());
-    trace.add(t, l.o.energy, motion_->forms().gradient({.energy = 1}, x).dot(Eigen::Map<const Eigen::VectorXd>(flow_->v(), space_->size())));
+    trace.add(
+        t, l.o.energy,
+        motion_->forms().gradient({.energy = 1}, x).dot(Eigen::Map<const Eigen::VectorXd>(flow_->v(), space_->size())));
     if (coarser_ && t <= coarser_->end()) error = std::max(error, error_now_ = std::abs(l.o.energy - (*coarser_)(t)));
     write_outputs(t);
     if (last_row_ < t) write_row(t, l, flow_->x(), dissipated(t));
@@ -506,9 +522,14 @@ void CurveAttempt::write_frame(double t, const Look& l, const double* y, const d
     if (!recorded_ || t == last_frame_) return;
     last_frame_ = t;
     const int n = motion_->layout().size;
-    const CurveRestart state{space_->splines().breaks(), Eigen::Map<const Eigen::VectorXd>(y, n),
-                             Eigen::Map<const Eigen::VectorXd>(rate, n), settings_.tolerance, total_start_, dissipated,
-                             error, summary.reference_energy};
+    const CurveRestart state{space_->splines().breaks(),
+                             Eigen::Map<const Eigen::VectorXd>(y, n),
+                             Eigen::Map<const Eigen::VectorXd>(rate, n),
+                             settings_.tolerance,
+                             total_start_,
+                             dissipated,
+                             error,
+                             summary.reference_energy};
     watch_.frame([&] { return curve_record(t, *motion_, state, l.o.energy); });
 }
 
@@ -518,10 +539,12 @@ Settings coarser(const Settings& s) {
 }
 
 Settings first_settings(const Case& c, const Beginning& start) {
-    const int images = start.meridian.topology == Topology::half_cell || start.meridian.topology == Topology::half_tube ? 2 : 1;
+    const int images =
+        start.meridian.topology == Topology::half_cell || start.meridian.topology == Topology::half_tube ? 2 : 1;
     const bool waves = c.model.kind == ModelKind::fluid;
     Settings s{first_elements, (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy};
-    const Settings given{(c.discretisation.elements.value_or(0) + images - 1) / images, c.discretisation.time_tolerance.value_or(0)};
+    const Settings given{(c.discretisation.elements.value_or(0) + images - 1) / images,
+                         c.discretisation.time_tolerance.value_or(0)};
     if (c.discretisation.elements) s.elements = coarser(given).elements;
     if (c.discretisation.time_tolerance) s.tolerance = coarser(given).tolerance;
     return s;
@@ -532,7 +555,8 @@ Settings first_settings(const Case& c, const Beginning& start) {
 std::vector<std::string> curve_series_names(const Case& c) {
     std::vector<std::string> names{"time", "step_size", "order", "newton_iterations", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max"}) names.push_back(name);
+    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max"})
+        names.push_back(name);
     for (const int n : tracked_modes(c)) names.push_back(fmt::format("mode_{}", n));
     if (law_of(c).flows)
         for (const char* name : {"kinetic_energy", "speed", "momentum_z", "angular_momentum_z", "lambda"})
@@ -582,8 +606,10 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
     }
     const auto run_one = [&](bool recorded, const Settings& with, const Trace* coarser) {
         auto attempt = std::make_unique<CurveAttempt>(c, observer, recorded, start, with, coarser, started);
-        if (recorded && state) attempt->resume(*state, restart->time);
-        else attempt->begin();
+        if (recorded && state)
+            attempt->resume(*state, restart->time);
+        else
+            attempt->begin();
         attempt->go();
         return attempt;
     };

@@ -9,7 +9,6 @@
 #include <memory>
 #include <string>
 
-
 namespace tubule::axisym {
 
 struct TimeControl {
@@ -18,6 +17,9 @@ struct TimeControl {
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
     double newton = 0.01;    // how far the iteration goes, of what the error test allows
+    // Two iterations at least. IDA is content with one where those before converged quickly; then constraints hold to
+    // the error of the step only, for they are bent.
+    bool two_iterations = false;
 };
 
 struct FlowCounters {
@@ -36,9 +38,9 @@ struct FlowSystem {
     // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
     std::function<void(const double* x, const double* v, double cj, double* values)> jacobian;
     const Eigen::SparseMatrix<double>* pattern = nullptr;
-    bool banded = false;              // the unknowns stand in an order that is good for elimination
-    Eigen::VectorXd scale;            // of each unknown; empty: 1
-    Eigen::VectorXd differential;     // 0 for unknowns without a rate, whose local errors do not count; empty: 1
+    bool banded = false;           // the unknowns stand in an order that is good for elimination
+    Eigen::VectorXd scale;         // of each unknown; empty: 1
+    Eigen::VectorXd differential;  // 0 for unknowns without a rate, whose local errors do not count; empty: 1
     std::function<double(double t, const double* x, const double* v)> dissipation;
     std::function<Guards(double t, const double* x, const double* v)> guards;
 };

@@ -53,12 +53,12 @@ struct Accuracy {
 
 // Explicit choices of tier axisym; where absent, the asked accuracy decides.
 struct Discretisation {
-    std::optional<int> elements;           // over one period of the tube; switches adaptive refinement off
-    int order = 5;                         // polynomial degree of the spline: 3, 5, 7
-    std::optional<int> smoothness;         // continuous derivatives at knots, 1 ... order-1; default order-1
-    std::optional<double> time_tolerance;  // relative tolerance of the time integrator
-    int time_order = 5;                    // largest order of the backward differences, 1 ... 5
-    bool symmetry = true;                  // solve one cell of a start that repeats or mirrors itself
+    std::optional<int> elements;                     // over one period of the tube; switches adaptive refinement off
+    int order = 5;                                   // polynomial degree of the spline: 3, 5, 7
+    std::optional<int> smoothness;                   // continuous derivatives at knots, 1 ... order-1; default order-1
+    std::optional<double> time_tolerance;            // relative tolerance of the time integrator
+    int time_order = 5;                              // largest order of the backward differences, 1 ... 5
+    bool symmetry = true;                            // solve one cell of a start that repeats or mirrors itself
     std::optional<Parametrisation> parametrisation;  // by default as the model and the shape have it
 };
 

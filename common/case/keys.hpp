@@ -106,7 +106,8 @@ void keys(Keys& k, Model& model) {
         k.number("Re", model.Re, {.above = 0});
         k.number("gamma", model.gamma, {.from = 0});
     } else {
-        for (const char* key : {"Re", "gamma"}) k.absent(key, "must be absent: it belongs to kind \"stokes\" or \"fluid\"");
+        for (const char* key : {"Re", "gamma"})
+            k.absent(key, "must be absent: it belongs to kind \"stokes\" or \"fluid\"");
     }
     k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
 }
@@ -139,8 +140,9 @@ void keys(Keys& k, Discretisation& d) {
     k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
     k.integer("time_order", d.time_order, {.from = 1, .to = 5});
     k.flag("symmetry", d.symmetry);
-    k.choice("parametrisation", d.parametrisation,
-             {{"graph", Parametrisation::graph}, {"even", Parametrisation::even}, {"material", Parametrisation::material}});
+    k.choice(
+        "parametrisation", d.parametrisation,
+        {{"graph", Parametrisation::graph}, {"even", Parametrisation::even}, {"material", Parametrisation::material}});
 }
 
 template <class Keys>
@@ -278,9 +280,7 @@ void keys(Keys& k, Case& c) {
         else
             k.absent(key, "must be absent: tier \"surface3d\" does not move surfaces yet");
     };
-    only_axisym("model", [&](auto& k) {
-        keys(k, c.model);
-    });
+    only_axisym("model", [&](auto& k) { keys(k, c.model); });
     only_axisym("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
     k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });

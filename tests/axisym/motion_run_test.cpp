@@ -70,10 +70,10 @@ TEST(CurveRun, wavesOfASphereDecay) {
     // maths 6 (a), with k40 = k42 = H0 = 0, where the radius is stationary: F2 = 2, f = 4 at R = 1.
     for (const int l : {2, 3, 4}) {
         const double L = l * (l + 1) - 2, rate = -L * (2 * L + 4), t = -0.5 / rate, amplitude = 1e-4;
-        const Outcome o = run_text(
-            "[energy]\nk20 = 1.0\n[shape]\nkind = \"sphere\"\nradius = 1.0\n",
-            {"shape.mode.0.l=" + std::to_string(l), "shape.mode.0.amplitude=" + std::to_string(amplitude),
-             "time.end=" + std::to_string(t), "accuracy.energy=1e-9"});
+        const Outcome o =
+            run_text("[energy]\nk20 = 1.0\n[shape]\nkind = \"sphere\"\nradius = 1.0\n",
+                     {"shape.mode.0.l=" + std::to_string(l), "shape.mode.0.amplitude=" + std::to_string(amplitude),
+                      "time.end=" + std::to_string(t), "accuracy.energy=1e-9"});
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         // The projection of the radius on the harmonic: trapezoids over the polar angle of the sampled points.
         const auto &r = o.array(o.watch.frames.size() - 1, "r"), &z = o.array(o.watch.frames.size() - 1, "z");
@@ -142,8 +142,8 @@ struct Waves {
 };
 
 TEST(CurveRun, wavesOfATubeFollowTheAmplitudeEquations) {
-    for (const auto& [name, model] : {std::pair{"overdamped", ModelKind::overdamped}, {"stokes", ModelKind::stokes},
-                                      {"fluid", ModelKind::fluid}}) {
+    for (const auto& [name, model] :
+         {std::pair{"overdamped", ModelKind::overdamped}, {"stokes", ModelKind::stokes}, {"fluid", ModelKind::fluid}}) {
         std::vector<std::string> sets{std::string("model.kind=") + name};
         if (model != ModelKind::overdamped) sets.insert(sets.end(), {"model.Re=2.0", "model.gamma=0.3"});
         const Outcome o = run_text(
@@ -163,12 +163,16 @@ TEST(CurveRun, wavesOfATubeFollowTheAmplitudeEquations) {
 TEST(CurveRun, lawsOfConservation) {
     for (const char* model : {"gradient-flow", "overdamped", "stokes", "fluid"})
         for (const char* parametrisation : {"even", "material"}) {
+            // Waves of a fluid on an even parameter want many elements (docs/decisions.md).
+            const bool even = std::string(parametrisation) == "even";
+            const double asked = even ? 1e-3 : 1e-5;
             std::vector<std::string> sets{std::string("model.kind=") + model, "model.volume=fixed",
-                                          "accuracy.energy=1e-5"};
+                                          "accuracy.energy=" + std::to_string(asked)};
             const bool flows = std::string(model) != "gradient-flow";
             if (flows) sets.push_back(std::string("discretisation.parametrisation=") + parametrisation);
             const Outcome o = run_text(spheroid, sets);
             SCOPED_TRACE(std::string(model) + " " + parametrisation);
+
             ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
             const auto area = o.series("area"), volume = o.series("volume"), defect = o.series("identity_defect");
             for (std::size_t i = 1; i < area.size(); ++i) {
@@ -176,7 +180,7 @@ TEST(CurveRun, lawsOfConservation) {
                     EXPECT_NEAR(area[i] / area[1], 1, 1e-8);
                 }
                 EXPECT_NEAR(volume[i] / volume[1], 1, 1e-8);
-                EXPECT_LE(std::abs(defect[i]), 1e-5 * o.summary.reference_energy);
+                EXPECT_LE(std::abs(defect[i]), asked * o.summary.reference_energy);
             }
         }
 }
@@ -213,6 +217,7 @@ TEST(CurveRun, whatIsStatedHolds) {
         const std::string kind = std::string("model.kind=") + model;
         const Outcome exact = run_text(spheroid, {kind, "accuracy.energy=1e-7", "time.end=0.1"});
         const Outcome o = run_text(spheroid, {kind, "accuracy.energy=1e-5", "time.end=0.1"});
+        ASSERT_EQ(exact.summary.stop.reason, Stop::finished) << exact.summary.stop.message;
         const double error = std::abs(o.summary.energy - exact.summary.energy) / o.summary.reference_energy;
         EXPECT_LE(error, o.summary.estimated_error) << model;
         EXPECT_LE(o.summary.estimated_error, 1e-5) << model;
@@ -221,8 +226,8 @@ TEST(CurveRun, whatIsStatedHolds) {
 
 TEST(CurveRun, goesOnAfterAnInterruption) {
     for (const char* model : {"gradient-flow", "fluid"}) {
-        const Case c = parse_case("tier = \"axisym\"\n" + spheroid, {std::string("model.kind=") + model, "accuracy.energy=1e-5"},
-                                  "case.toml");
+        const Case c = parse_case("tier = \"axisym\"\n" + spheroid,
+                                  {std::string("model.kind=") + model, "accuracy.energy=1e-5"}, "case.toml");
         Watch whole, first, second;
         const RunSummary expected = run(c, whole);
         first.interrupt_at = 0.1;

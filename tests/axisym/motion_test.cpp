@@ -1,12 +1,11 @@
 // The laws of motion of a profile curve: derivatives, consistent starts, inf-sup stability.
-#include "axisym/curve_motion.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <random>
 
+#include "axisym/curve_motion.hpp"
 #include "axisym/curve_start.hpp"
 #include "common/geometry/profile_point.hpp"
 
@@ -69,7 +68,8 @@ TEST(CurveMotion, jacobianIsTheDerivative) {
 
 // The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |sigma(u)|^2 dS.
 double inf_sup(const CurveSpace& space, const Vector& x) {
-    const CurveMotion motion(space, {}, {.viscosity = 0.5, .friction = 1, .keeps_volume = false, .lagrangian = true}, 1, 1, 1);
+    const CurveMotion motion(space, {}, {.viscosity = 0.5, .friction = 1, .keeps_volume = false, .lagrangian = true}, 1,
+                             1, 1);
     const MotionLayout& at = motion.layout();
     Vector y = Vector::Zero(at.size);
     y.head(space.size()) = x;
@@ -95,15 +95,16 @@ double inf_sup(const CurveSpace& space, const Vector& x) {
 }
 
 TEST(CurveMotion, pressuresAreInfSupStable) {
-    // The constant must not fall as elements become smaller: with pressures one degree below the velocities it does not,
-    // on a cell, on a tube, on equal and on graded elements.
+    // The constant must not fall as elements become smaller: with pressures one degree below the velocities it does
+    // not, on a cell, on a tube, on equal and on graded elements.
     for (const Topology topology : {Topology::half_cell, Topology::cell, Topology::tube}) {
         std::vector<double> betas;
         for (const int n : {8, 16, 32, 64}) {
             const CurveSpace space(topology, equal_breaks(n), 5, 4, topology == Topology::tube ? 3 : 0);
             betas.push_back(inf_sup(space, some_curve(space)));
         }
-        std::printf("inf-sup %d: %.4f %.4f %.4f %.4f\n", static_cast<int>(topology), betas[0], betas[1], betas[2], betas[3]);
+        std::printf("inf-sup %d: %.4f %.4f %.4f %.4f\n", static_cast<int>(topology), betas[0], betas[1], betas[2],
+                    betas[3]);
         EXPECT_GT(betas.back(), 0.1);
         EXPECT_GT(betas.back(), 0.9 * betas.front());
     }

@@ -98,7 +98,8 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"title", "tilte", "3:1: unknown key about.tilte; did you mean 'title'? Allowed here: title, source"},
         Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0"},
         Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
-        Edit{"kind = \"gr", "Re = 1\nkind = \"gr", "8:6: model.Re must be absent: it belongs to kind \"stokes\" or \"fluid\""},
+        Edit{"kind = \"gr", "Re = 1\nkind = \"gr",
+             "8:6: model.Re must be absent: it belongs to kind \"stokes\" or \"fluid\""},
         // Reported as misspelt, not as the missing radius:
         Edit{"radius", "  raduis",
              "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
@@ -124,7 +125,7 @@ TEST(CaseRefusal, UnknownSeries) {
         "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, "
         "r_min, r_max, energy_error, "
         "integral_H2, integral_K, gauss_bonnet_defect, elements, kinetic_energy, speed, momentum_z, "
-             "angular_momentum_z, lambda, mode_<n>";
+        "angular_momentum_z, lambda, mode_<n>";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
         Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
@@ -327,7 +328,8 @@ TEST(CaseRefusal, Overrides) {
         Override{"mode.0.n=1",
                  "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, velocity, "
                  "shape, accuracy, discretisation, time, expect"},
-        Override{"model.kind=honey", "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
+        Override{"model.kind=honey",
+                 "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
         Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},

@@ -100,12 +100,14 @@ TEST(ModelKeys, WhatGoesTogether) {
         return refusal("tier = \"axisym\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n" +
                        time_span + "[model]\n" + model + more);
     };
-    EXPECT_EQ(tube("kind = \"fluid\"\nRe = 2\ngamma = 0.5\n[velocity]\ninitial = \"rotation\"\nomega = 1\n"), "accepted");
+    EXPECT_EQ(tube("kind = \"fluid\"\nRe = 2\ngamma = 0.5\n[velocity]\ninitial = \"rotation\"\nomega = 1\n"),
+              "accepted");
     EXPECT_EQ(tube("kind = \"fluid\"\nRe = 0\n"), "case.toml:12:6: model.Re must be a number > 0, not 0");
     EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 1\n"),
               "case.toml:12:9: model.gamma must be absent: it belongs to kind \"stokes\" or \"fluid\"");
-    EXPECT_EQ(tube("kind = \"stokes\"\n", "[velocity]\ninitial = \"rest\"\n"),
-              "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
+    EXPECT_EQ(
+        tube("kind = \"stokes\"\n", "[velocity]\ninitial = \"rest\"\n"),
+        "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[velocity]\ninitial = \"rotation\"\n"),
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),
