@@ -449,7 +449,8 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
             speed = stdx::max(speed, square);
         }
     out.kinetic = stdx::reduce(kinetic), out.dissipation = stdx::reduce(dissipation);
-    out.momentum_z = stdx::reduce(momentum), out.angular_z = stdx::reduce(angular);
+    out.momentum_z = space().images() == 2 ? 0 : stdx::reduce(momentum);  // the other half has the opposite
+    out.angular_z = stdx::reduce(angular);
     out.acceleration = stdx::reduce(acceleration);
     out.divergence = std::sqrt(stdx::reduce(divergence)), out.speed = std::sqrt(stdx::hmax(speed));
     return out;

@@ -32,6 +32,7 @@ constexpr double seam_size = 0.15, seam_per_accuracy = 5;
 constexpr double steepest = 3;      // curvature times length of an element: beyond that nothing is resolved
 constexpr double stretched = 1e-3;  // least over largest |X_s|
 constexpr int steps_between_looks = 10;
+constexpr int most_crawling = 2000;  // steps by which the time has not grown by a thousandth
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
@@ -194,6 +195,7 @@ private:
     std::optional<StopReport> step();
     std::optional<StopReport> check(double t);
     double what_may_change(double t) const;
+    bool is_stuck(double t);
     void write_outputs(double until);
     void write_row(double t, const Look& l, const double* y, double dissipated);
     void write_frame(double t, const Look& l, const double* y, const double* rate, double dissipated);
@@ -217,6 +219,8 @@ private:
     double observed_at_ = std::numeric_limits<double>::quiet_NaN();
     Look now_;
     double last_row_ = -1, last_frame_ = -1;
+    double crawl_begun_ = 0;
+    int crawl_steps_ = 0;
     std::vector<double> row_;
 };
 
@@ -421,9 +425,18 @@ std::optional<StopReport> CurveAttempt::check(double t) {
     return std::nullopt;
 }
 
+// Steps that lead nowhere: IDA may go on with them for ever.
+bool CurveAttempt::is_stuck(double t) {
+    if (t > 1.001 * crawl_begun_) crawl_begun_ = t, crawl_steps_ = 0;
+    return ++crawl_steps_ > most_crawling && flow_->step_size() < 1e-9 * case_.time.end;
+}
+
 std::optional<StopReport> CurveAttempt::step() {
     const Flow::Outcome outcome = flow_->advance(case_.time.end);
     const double t = flow_->time();
+    if (is_stuck(t))
+        return StopReport{Stop::solver_failed, t, fmt::format("the time integrator is stuck with steps of {:.2g}", flow_->step_size()),
+                          "try another accuracy, discretisation.elements or parametrisation"};
     if (outcome == Flow::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
                           "try another accuracy, discretisation.elements or parametrisation"};
