@@ -18,6 +18,7 @@ import numpy as np
 PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 sys.path.insert(0, str(PLOT))
 import colours  # noqa: E402
+import curves  # noqa: E402
 import energy  # noqa: E402
 import labels  # noqa: E402
 import results  # noqa: E402
@@ -52,8 +53,16 @@ def tube(time, amplitude, length=2.0, points=65):
     return {"z": z, "r": r, "H": (bend / g**2 - 1 / r) / g, "K": -bend / (r * g**4)}
 
 
-def write(path, k42=0.0, sets=(), times=(0, 0.01, 0.05, 0.2, 0.5, 1.0), amplitude=0.2, stop="finished", rows=40):
-    """A result with a frame at each time and `rows` rows of series."""
+def ball(time, points=65):
+    """A unit sphere from pole to pole that begins to move: u_n = 2 t cos(2 a), u_t = t sin(2 a), a the polar angle."""
+    angle = np.linspace(np.pi, 0, points)
+    return {"z": np.cos(angle), "r": np.sin(angle), "H": np.full(points, -2.0), "K": np.ones(points),
+            "u_n": 2 * time * np.cos(2 * angle), "u_t": time * np.sin(2 * angle)}  # fmt: skip
+
+
+def write(path, k42=0.0, sets=(), times=(0, 0.01, 0.05, 0.2, 0.5, 1.0), amplitude=0.2, stop="finished", rows=40,
+          profile=None, kinetic=False):  # fmt: skip
+    """A result with a frame at each time, of tube() or `profile`, and `rows` rows of series."""
     with h5py.File(path, "w") as file:
         for name in ("id", "sequence", "about_begun"):
             file.attrs[name] = np.uint64(1)
@@ -67,6 +76,8 @@ def write(path, k42=0.0, sets=(), times=(0, 0.01, 0.05, 0.2, 0.5, 1.0), amplitud
         time = np.linspace(0, times[-1] if times else 1.0, rows) if rows else np.empty(0)
         bend, gauss = 3 + np.exp(-6 * time), 5 * k42 * np.exp(-6 * time)
         columns = {"time": time, "energy": bend + gauss, "energy_20": bend, "energy_40": 0 * time, "energy_42": gauss}
+        if kinetic:
+            columns["kinetic_energy"] = np.sin(np.pi * time) ** 2
         series = file.create_group("series")
         series.attrs["order"] = np.array(list(columns), dtype=text)
         for name, values in columns.items():
@@ -75,7 +86,7 @@ def write(path, k42=0.0, sets=(), times=(0, 0.01, 0.05, 0.2, 0.5, 1.0), amplitud
         for index, t in enumerate(times):
             frame = file.create_group(f"frames/{index:06d}")
             frame.attrs["time"] = float(t)
-            for name, values in tube(t, amplitude).items():
+            for name, values in (profile(t) if profile else tube(t, amplitude)).items():
                 frame[name] = values
     return path
 
@@ -322,6 +333,98 @@ class Pictures(InFolder):
         self.drawn(file)
 
 
+class Curves(InFolder):
+    """Profiles that are no graphs, or flow."""
+
+    def test_outside_of_a_sphere_is_farther_from_its_centre(self):
+        section = curves.Section(results.Frame(0.0, **ball(0.0, 401)), 2.0)  # radius 2 inches
+        self.assertAlmostEqual(section.length, 2 * np.pi, delta=1e-3)
+        for distance in (0.0, 0.1, -0.1):
+            x, y = section.beside(section.places, distance)
+            np.testing.assert_allclose(np.hypot(x, y), 2 + distance, atol=1e-3)
+
+    def test_arrows_go_with_the_velocity_and_are_as_long(self):
+        section = curves.Section(results.Frame(0.0, **ball(0.0, 401)), 1.0)  # half a turn: pi inches
+        angle = np.pi - section.places  # 0 at the last point
+        found = curves.arrows(section, -3 * np.sin(2 * angle))
+        self.assertGreater(len(found), 10)
+        for places in found:
+            # By the formula: -sin(2 a) of the largest.
+            expected = -curves.LONGEST_ARROW * np.sin(2 * (np.pi - places[4]))
+            self.assertAlmostEqual(places[-1] - places[0], expected, delta=2e-3)
+        slow = curves.arrows(section, np.where(section.places < 0.3, 1.0, 0.01))
+        self.assertLess(max(places[-1] for places in slow), 0.4)  # too short to see elsewhere
+
+    def test_a_flowing_cell_and_its_kinetic_energy(self):
+        file = write(self.folder / "a.hdf", profile=ball, kinetic=True, sets=["model.kind=fluid"], times=[0, 0.5, 1])
+        texts = self.drawn(file)
+        self.assertEqual(texts.count("at rest"), 1)  # t = 0
+        for words in ("|u\u2099| \u2264 2", "|u\u209c| \u2264 1", "|u\u209c| \u2264 0.5", energy.KINETIC, "energy"):
+            self.assertIn(words, "\n".join(texts).split("\n"))
+        self.assertTrue([text for text in texts if text.startswith("normal velocity")])
+        self.assertTrue([text for text in texts if text.startswith("velocity u\u209c along the profile")])
+        self.assertFalse([text for text in texts if "mean curvature" in text])
+
+    def test_kinetic_energy_is_no_part_of_flows_without_inertia(self):
+        texts = self.drawn(write(self.folder / "a.hdf", profile=ball, kinetic=True, sets=["model.kind=stokes"]))
+        self.assertIn("bending energy E", texts)
+        self.assertNotIn(energy.KINETIC, texts)
+
+    def test_swirl_is_written_below(self):
+        def turning(time):
+            return ball(0.0) | {"u_theta": 3 * ball(0.0)["r"]}
+
+        texts = self.drawn(write(self.folder / "a.hdf", profile=turning, times=[0]), "--kind", "profiles")
+        self.assertIn("|u\u03b8| \u2264 3", texts)
+        self.assertNotIn("at rest", texts)
+
+    def test_an_overhanging_tube_without_flow_along_it(self):
+        def overhanging(time):
+            frame = tube(time, 0.2)
+            z = frame["z"] - 0.6 * np.sin(2 * np.pi * frame["z"])  # goes back and forth
+            return frame | {"z": z, "u_n": np.cos(np.pi * frame["z"])}
+
+        texts = self.drawn(write(self.folder / "a.hdf", profile=overhanging, times=[0, 1]))
+        self.assertIn("|u\u2099| \u2264 1", texts)
+        self.assertFalse([text for text in texts if "along the profile" in text])
+
+    def test_a_graph_keeps_its_curvatures_though_it_moves(self):
+        def moving(time):
+            return tube(time, 0.2) | {"u_n": np.ones(65)}
+
+        texts = self.drawn(write(self.folder / "a.hdf", profile=moving))
+        self.assertTrue([text for text in texts if text.startswith("mean curvature")])
+
+    def test_stationary_shapes_have_numbers_and_curvatures(self):
+        def at_rest(time):
+            return {name: values for name, values in ball(0.0).items() if not name.startswith("u_")}
+
+        sets = ["equilibrium.branch.vary=equilibrium.reduced_volume"]
+        file = write(self.folder / "a.hdf", profile=at_rest, sets=sets, times=[0, 1, 2], rows=3)
+        with h5py.File(file, "a") as f:
+            for number, frame in enumerate(f["frames"].values()):
+                frame.attrs["parameter"] = 0.9 - 0.1 * number
+        texts = self.drawn(file)
+        for words in ("shape 2", "mean curvature H (left halves), white: H\u2080 = \u22122", "number of the shape", "= 0.7"):
+            self.assertIn(words, "\n".join(texts).split("\n"))
+        self.assertFalse([text for text in texts if text.startswith("t\u2081")])
+        single = write(self.folder / "b.hdf", profile=at_rest, sets=["equilibrium.area=1"], times=[0], rows=1)
+        self.assertNotIn("bending energy E", self.drawn(single))
+
+    def test_small_changes_of_a_large_energy_are_ticks_from_a_round_number(self):
+        file = write(self.folder / "a.hdf")
+        with h5py.File(file, "a") as f:
+            f["series/energy"][:] = 37.69923 + 1e-5 * f["series/time"][:]
+        texts = self.drawn(file, "--kind", "energy")
+        self.assertIn("(bending energy E \u2212 37.6992) / 10\u207b\u2075", texts)
+        self.assertIn("3", texts)  # 37.69923
+
+    def test_numbers_far_from_one(self):
+        found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
+        expected = ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"]
+        self.assertEqual(found, expected)
+
+
 class Refusals(InFolder):
     def test_files(self):
         text = self.folder / "text.hdf"
@@ -356,7 +459,11 @@ class Refusals(InFolder):
         def text(file):
             file["case"][()] = "[energy"
 
+        def short_velocity(file):
+            file["frames/000001/u_t"] = np.ones(3)
+
         damaged(short, "frame 000001: z, r, H, K must be lists of one length")
+        damaged(short_velocity, "frame 000001: z, r, H, K, u_t must be lists of one length")
         damaged(nan, "frame 000001 holds numbers that are not finite")
         damaged(lack, "frame 000001 lacks K")
         damaged(ragged, "series of different lengths")
@@ -475,7 +582,7 @@ class Command(InFolder):
 def load_tests(loader, suite, pattern):
     if TUBULE:
         return suite
-    cases = (Labels, Columns, Scales, Pictures, Refusals, WorkPrecision)
+    cases = (Labels, Columns, Scales, Pictures, Curves, Refusals, WorkPrecision)
     return unittest.TestSuite(loader.loadTestsFromTestCase(case) for case in cases)
 
 

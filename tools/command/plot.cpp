@@ -81,7 +81,7 @@ int plot(const PlotOptions& options) {
 
 void add_plot(CLI::App& app, int& exit_status) {
     CLI::App* command =
-        app.add_subcommand("plot", "Draw tubes and surfaces at the output times, and energies over time");
+        app.add_subcommand("plot", "Draw profiles and surfaces at the output times, and energies over time");
     const auto options = std::make_shared<PlotOptions>();
     command->add_option("RESULT", options->results, "result files; several are labelled by what differs in their cases")
         ->required();

@@ -53,15 +53,20 @@ def curvature_colours(results, frames, areas):
 
 def draw_bars(figure, bottom, H, K, H_where="", K_where=""):
     """Two colour bars in the 0.5 inches above `bottom`; the words say which part of the picture they are for."""
-    height = figure.get_figheight()
     for left, colours, where in ((0.12, H, H_where), (0.56, K, K_where)):
-        axes = figure.add_axes([left, (bottom + 0.38) / height, 0.34, 0.09 / height])
         mappable = ScalarMappable(colours.norm, colours.map)
-        bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=colours.extend)
-        bar.outline.set_linewidth(0.5)
-        bar.set_label(colours.label.format(where), labelpad=2)
-        bar.ax.tick_params(width=0.5, length=2.5)
-        bar.locator = MaxNLocator(5)
-        bar.formatter = FuncFormatter(lambda value, _: number(value))
-        bar.solids.set_rasterized(True)
-        bar.solids.set_edgecolor("face")
+        draw_bar(figure, bottom, left, 0.34, mappable, colours.label.format(where), colours.extend)
+
+
+def draw_bar(figure, bottom, left, width, mappable, label, extend="neither"):
+    """One colour bar in the 0.5 inches above `bottom`; `left` and `width` are parts of the page."""
+    height = figure.get_figheight()
+    axes = figure.add_axes([left, (bottom + 0.38) / height, width, 0.09 / height])
+    bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=extend)
+    bar.outline.set_linewidth(0.5)
+    bar.set_label(label, labelpad=2)
+    bar.ax.tick_params(width=0.5, length=2.5)
+    bar.locator = MaxNLocator(5)
+    bar.formatter = FuncFormatter(lambda value, _: number(value))
+    bar.solids.set_rasterized(True)
+    bar.solids.set_edgecolor("face")

@@ -1,13 +1,18 @@
-"""Panel (b): bending energy over time, in total and by term, with the times of the tubes marked."""
+"""Panel (b): bending energy over time, in total and by term, with the times of the profiles marked. Where the membrane
+has inertia, its kinetic energy is a band on top. Stationary shapes have their number in place of a time."""
 
 import numpy as np
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from labels import formula
+from labels import formula, number
 from style import DASHES, MARKERS, WIDTH, line_colours, time_name, time_text
 
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
 HEIGHT = 2.15  # inches of the axes
+KINETIC, BAND_ALPHA = "kinetic E\u2096, up to E + E\u2096", 0.25
 VISIBLE = 2e-3  # part of the total below which a term would lie on the zero line
 SETTLED = 0.3  # the initial phase ends when this part of the change is left
 
@@ -45,6 +50,8 @@ def _end_slope(step, secant):
 def settling_time(result):
     """Time after which at most SETTLED of the energy's change is left; infinite where nothing changes."""
     time, energy = result.series["time"], result.series["energy"]
+    if result.has_inertia:
+        energy = energy + result.series["kinetic_energy"]  # bending energy comes and goes
     left = np.abs(energy - energy[-1])
     if left.max() <= 1e-9 * np.abs(energy).max():
         return np.inf
@@ -69,13 +76,27 @@ def _lines_of(words):
     return line if len(line) <= 32 else ",\n".join(words)
 
 
+def relative_ticks(axis, name):
+    """Where an axis shows small changes of a large number, its ticks count from that number; the axis' label, which
+    says so. (Matplotlib would write the number above the axis, where the times are.)"""
+    low, high = sorted(axis.get_view_interval())
+    if high - low > 1e-3 * max(abs(low), abs(high)):
+        return name
+    exponent = int(np.floor(np.log10(high - low)))
+    base = np.floor(low / 10 ** (exponent + 1)) * 10 ** (exponent + 1)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: number((value - base) / 10**exponent)))
+    return f"({name} \u2212 {base:.{max(0, -exponent - 1)}f}) / " + formula(f"10^{{{exponent}}}")
+
+
 class EnergyPanel:
     """Lines of `results` (all with an energy series); `labels` one a result; `times` marked on them."""
 
     def __init__(self, results, labels, times, term_labels):
         self.results, self.times, self.term_labels = results, times, term_labels
         lone = len(results) == 1
-        self.labels = ["total"] if lone else [_lines_of(label) for label in labels]
+        self.numbered = all(result.is_equilibrium for result in results)
+        self.kinetic = any(result.has_inertia for result in results)
+        self.labels = ["bending E" if self.kinetic else "total"] if lone else [_lines_of(label) for label in labels]
         self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run that only has its start
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
@@ -108,8 +129,8 @@ class EnergyPanel:
             axes = [figure.add_axes([left / width, y, (right - left) / width, tall])]
             start = self._first_time() if decades else 0.0
             self._lines(axes[0], start, self.end, decades)
-            axes[0].set_xlabel("time t", labelpad=2)
-        axes[0].set_ylabel("bending energy E", labelpad=3)
+            axes[0].set_xlabel("number of the shape" if self.numbered else "time t", labelpad=2)
+        axes[0].set_ylabel(relative_ticks(axes[0].yaxis, "energy" if self.kinetic else "bending energy E"), labelpad=3)
         axes[-1].legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0, labelspacing=0.45
         )
@@ -126,6 +147,9 @@ class EnergyPanel:
         if log:
             axes.set_xscale("log")
         axes.set_xlim(start, end if log else end + 0.02 * (end - start))
+        if not log:
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         for row, (result, colour) in enumerate(zip(self.results, self.colours)):
             time = result.series["time"]
             grid = (np.geomspace if log else np.linspace)(start, end, 500)
@@ -135,7 +159,12 @@ class EnergyPanel:
                 if several and _matters(result, name):
                     values = monotone_cubic(time, result.series[f"energy_{name}"], grid)
                     axes.plot(grid, values, color=colour, linestyle=dashes, linewidth=0.8)
-            axes.plot(grid, monotone_cubic(time, result.series["energy"], grid), color=colour, zorder=3)
+            bending = monotone_cubic(time, result.series["energy"], grid)
+            axes.plot(grid, bending, color=colour, zorder=3)
+            if result.has_inertia:
+                total = bending + np.maximum(monotone_cubic(time, result.series["kinetic_energy"], grid), 0)
+                axes.fill_between(grid, bending, total, color=colour, linewidth=0, alpha=BAND_ALPHA, zorder=1)
+                axes.plot(grid, total, color=colour, linewidth=0.6, zorder=2)
             marks = np.array([t for t in self.times if time[0] <= t <= time[-1] * (1 + 1e-9) and start <= t <= end])
             values = monotone_cubic(time, result.series["energy"], np.minimum(marks, time[-1]))
             marker = MARKERS[row % len(MARKERS)]
@@ -153,7 +182,7 @@ class EnergyPanel:
                 continue
             axes.axvline(time, color="0.75", linewidth=0.5, zorder=0)
             place = axes.transLimits.transform(axes.transScale.transform((time, 1)))[0] * inches
-            if place - before > 0.11:
+            if place - before > 0.11 and not self.numbered:
                 axes.annotate(time_name(index), (time, 1), (0, 2), xycoords=("data", "axes fraction"),
                               textcoords="offset points", ha="center", va="bottom", fontsize=7)
                 before = place
@@ -164,13 +193,16 @@ class EnergyPanel:
             marker = MARKERS[row % len(MARKERS)]
             handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
             if result.stopped_early:
-                text = f"{result.stopped_early} at t = {time_text(result.about.get('stop_time', result.end_time))}"
+                time = time_text(result.about.get("stop_time", result.end_time))
+                text = result.stopped_early if self.numbered else f"{result.stopped_early} at t = {time}"
                 handles.append(Line2D([], [], label=text, **STOP_MARK))
+        lone = len(self.results) == 1
+        shade = self.colours[0] if lone else "0.3"
+        if self.kinetic:
+            handles.append(Patch(facecolor=to_rgba(shade, BAND_ALPHA), edgecolor=shade, linewidth=0.6, label=KINETIC))
         if len(self.terms) > 1:
-            lone = len(self.results) == 1
-            shade = self.colours[0] if lone else "0.3"
             if not lone:
-                handles.append(Line2D([], [], color=shade, label="total"))
+                handles.append(Line2D([], [], color=shade, label="bending E" if self.kinetic else "total"))
             for dashes, (name, text) in zip(DASHES * len(self.terms), self._term_names().items()):
                 handles.append(Line2D([], [], color=shade, linewidth=0.9, linestyle=dashes, label=text))
         return handles

@@ -4,7 +4,7 @@ import textwrap
 import tomllib
 
 SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
-SUPERSCRIPT = dict(zip("0123456789", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"))
+SUPERSCRIPT = dict(zip("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b"))
 MINUS = "\u2212"
 NOT_SET = object()
 MAX_DIFFERENCES = 4  # cases that differ in more are called by their names
@@ -150,6 +150,15 @@ def _value(value):
 def number(value):
     """Six digits at most, with a true minus sign."""
     return f"{value:.6g}".replace("-", MINUS)
+
+
+def power(value, digits):
+    """That many digits, far from 1 as 3.2\u00b710\u207b\u2075."""
+    text = f"{value:.{digits - 1}e}"
+    mantissa, exponent = text.split("e")
+    if -4 < int(exponent) < 4:
+        return number(float(text))
+    return f"{number(float(mantissa))}\u00b710" + formula(f"^{{{int(exponent)}}}")
 
 
 def wrapped(words, width):

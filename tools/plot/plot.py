@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws results of tubule: tubes and surfaces at the output times, energies over time. See `tubule plot --help`."""
+"""Draws results of tubule: profiles and surfaces at the output times, energies over time. See `tubule plot --help`."""
 
 import argparse
 import os
@@ -25,6 +25,7 @@ def draw(paths, outputs, times, kind, term_labels):
     from matplotlib.figure import Figure
 
     import style
+    from curves import CurvePanel
     from energy import EnergyPanel
     from labels import row_labels
     from results import BadInput, read_result
@@ -39,13 +40,16 @@ def draw(paths, outputs, times, kind, term_labels):
     tubes = surfaces = energy = None
     profile_columns = choose_columns(results, times) if any(r.frames for r in results) else []
     if kind in ("profiles", "all") and profile_columns:
-        tubes = TubePanel(results, labels, profile_columns)
+        shown_frames = [frame for column in profile_columns for frame in column.cells if frame]
+        graphs = all(frame.is_graph and frame.u_t is None for frame in shown_frames)
+        tubes = (TubePanel if graphs else CurvePanel)(results, labels, profile_columns)
     shown = [i for i, r in enumerate(results) if r.surfaces]
     surface_columns = choose_columns([results[i] for i in shown], times, attrgetter("surfaces")) if shown else []
     if kind in ("surface", "all") and surface_columns:
         surfaces = SurfacePanel([results[i] for i in shown], [labels[i] for i in shown], surface_columns)
-    # A surface that was only looked at has one row, which is no curve.
-    drawable = [i for i, r in enumerate(results) if r.has_energy(least=2 if r.surfaces and kind == "all" else 1)]
+    # A surface that was only looked at has one row, which is no curve; so has a single stationary shape.
+    least = [2 if (r.surfaces or r.is_equilibrium) and kind == "all" else 1 for r in results]
+    drawable = [i for i, r in enumerate(results) if r.has_energy(least[i])]
     if kind in ("energy", "all") and drawable:
         marked = [column.time for column in profile_columns or surface_columns if column.time is not None]
         energy = EnergyPanel([results[i] for i in drawable], [labels[i] for i in drawable], marked, term_labels)

@@ -17,14 +17,33 @@ class BadInput(Exception):
 @dataclass
 class Frame:
     time: float
-    z: np.ndarray  # along the axis, one period, both ends included
+    z: np.ndarray  # along the axis, from pole to pole or over one period, both ends included
     r: np.ndarray
     H: np.ndarray
     K: np.ndarray
+    u_n: np.ndarray | None = None  # velocity: outward,
+    u_t: np.ndarray | None = None  # along the profile in the order of the points,
+    u_theta: np.ndarray | None = None  # and around the axis
+    parameter: float | None = None  # on a branch of equilibria
 
     @property
     def length(self):
         return float(np.ptp(self.z))
+
+    @property
+    def is_graph(self):
+        """r(z), a tube: no poles, and z never goes back."""
+        return min(self.r[0], self.r[-1]) > 1e-9 * self.r.max() and bool((np.diff(self.z) >= 0).all())
+
+    def largest(self, name):
+        """Of |u_n|, |u_t| or |u_theta|; 0 where there is none."""
+        values = getattr(self, name)
+        return 0.0 if values is None else float(np.abs(values).max())
+
+    @property
+    def speed(self):
+        """The larger one of |u_n| and |u_t|."""
+        return max(self.largest("u_n"), self.largest("u_t"))
 
 
 @dataclass
@@ -56,6 +75,15 @@ class Result:
     @property
     def H0(self):
         return float(flatten(self.case).get("energy.H0", 0.0))
+
+    @property
+    def is_equilibrium(self):
+        """Stationary shapes, numbered in place of times."""
+        return "equilibrium" in self.case
+
+    @property
+    def has_inertia(self):
+        return flatten(self.case).get("model.kind") == "fluid" and "kinetic_energy" in self.series
 
     @property
     def end_time(self):
@@ -153,10 +181,12 @@ def _arrays(path, name, group, keys):
 
 
 def _profile(path, name, record):
-    arrays = _arrays(path, name, record, ("z", "r", "H", "K"))
-    if any(array.ndim != 1 or array.shape != arrays[0].shape or array.size < 2 for array in arrays):
-        raise BadInput(f"{path}: frame {name}: z, r, H, K must be lists of one length, 2 or more")
-    return Frame(float(record.attrs["time"]), *arrays)
+    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta") if key in record)]
+    arrays = dict(zip(keys, _arrays(path, name, record, keys)))
+    if any(array.ndim != 1 or array.shape != arrays["z"].shape or array.size < 2 for array in arrays.values()):
+        raise BadInput(f"{path}: frame {name}: {', '.join(keys)} must be lists of one length, 2 or more")
+    parameter = float(record.attrs["parameter"]) if "parameter" in record.attrs else None
+    return Frame(float(record.attrs["time"]), **arrays, parameter=parameter)
 
 
 def _surface(path, name, record, mesh):

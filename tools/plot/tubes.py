@@ -1,4 +1,4 @@
-"""Panel (a): one row of tubes a result, one column a time; left halves coloured by H, right halves by K."""
+"""Panel (a): one row of profiles a result, one column a time. Tubes r(z): left halves coloured by H, right halves by K."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -14,7 +14,7 @@ from style import WIDTH, time_name, time_text
 MAX_COLUMNS = 6
 MAX_HEIGHT = 5.6  # inches of all rows together
 MAX_TUBE_WIDTH = 1.5  # inches
-COLUMN_GAP, ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.14, 0.24, 16
+ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.24, 16
 SCALE_BAR = 0.3  # inches right of the last column
 STRIPS = 40  # across half a tube
 MIN_POINTS, POINTS_PER_INCH = 300, 150  # along a tube
@@ -79,21 +79,27 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
     return columns + ([last] if any(last.cells) else [])
 
 
-def caption(column, row):
-    """Why the run of a row ended with the frame in this column, and when unless the column's header says it."""
+def caption(column, row, numbered=False):
+    """Why the run of a row ended with the frame in this column, and when unless the column's header says it, or
+    frames have numbers in place of times."""
     stop, frame = column.stops[row], column.cells[row]
     if not stop:
         return ""
     shown = column.time is not None and same_time(frame.time, column.time, frame.time)
-    return stop if shown else f"{stop}\nt = {time_text(frame.time)}"
+    return stop if shown or numbered else f"{stop}\nt = {time_text(frame.time)}"
 
 
 def _area(frame):
     return np.abs(frame.r) * np.hypot(np.gradient(frame.r), np.gradient(frame.z)) + 1e-300
 
 
-class TubePanel:
-    """Sizes everything in inches first, so that the figure can be made to fit; then draws."""
+class ProfilePanel:
+    """Sizes everything in inches first, so that the figure can be made to fit; then draws. How one profile is drawn
+    and coloured, and what is written below it, is left to those that derive from it."""
+
+    MARGIN = 0.0  # inches around a profile that belong to it
+    COLUMN_GAP = 0.14
+    MAX_LENGTH = MAX_HEIGHT  # inches of the longest profile
 
     def __init__(self, results, labels, columns):
         self.results, self.columns = results, columns
@@ -105,31 +111,44 @@ class TubePanel:
         self.left = 0.2 + 0.062 * max(map(len, lines))
 
         widths = [2 * max(frame.r.max() for frame in column.cells if frame) for column in columns]
-        lengths = [max((f.length for f in cells if f), default=0.0) for cells in zip(*(c.cells for c in columns))]
-        self.captions = [[caption(column, row) for column in columns] for row in range(len(results))]
+        cells_of_rows = zip(*(column.cells for column in columns))
+        self.lengths = lengths = [max((f.length for f in cells if f), default=0.0) for cells in cells_of_rows]
+        self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
         captions = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
-        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - COLUMN_GAP * len(columns)
-        room_y = MAX_HEIGHT - sum(captions) - ROW_GAP * len(results)
-        self.scale = min(room_x / sum(widths), room_y / sum(lengths), MAX_TUBE_WIDTH / max(widths))
+        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - (self.COLUMN_GAP + 2 * self.MARGIN) * len(columns)
+        room_y = MAX_HEIGHT - sum(captions) - (ROW_GAP + 2 * self.MARGIN) * len(results)
+        self.scale = min(
+            room_x / sum(widths),
+            room_y / sum(lengths),
+            MAX_TUBE_WIDTH / max(widths),
+            self.MAX_LENGTH / max(lengths),
+        )
 
         # A label or a column header needs room even where the tube is small.
         cell_widths = [max(self.scale * width, 0.62) for width in widths]
         squeeze = room_x / max(room_x, sum(cell_widths))
-        pitch = [squeeze * width + COLUMN_GAP for width in cell_widths]
-        slack = (room_x + COLUMN_GAP * len(columns) - sum(pitch)) / len(columns)
+        gap = self.COLUMN_GAP + 2 * self.MARGIN
+        pitch = [squeeze * width + gap for width in cell_widths]
+        slack = (room_x + gap * len(columns) - sum(pitch)) / len(columns)
         slack = min(slack, 0.5)
         self.centres = self.left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
         label_heights = [0.14 * (label.count("\n") + 1) for label in self.labels]
-        tube_heights = [max(self.scale * length, label) for length, label in zip(lengths, label_heights)]
+        tube_heights = [max(self.scale * length + 2 * self.MARGIN, label) for length, label in zip(lengths, label_heights)]
         self.height = HEADER + sum(tube_heights) + sum(captions) + ROW_GAP * len(results)
         tops = self.height - HEADER - np.cumsum([0, *(t + c + ROW_GAP for t, c in zip(tube_heights, captions))][:-1])
         self.middles = [top - tall / 2 for top, tall in zip(tops, tube_heights)]
         if lone:
             occupied = self.centres[0] - self.scale * widths[0] / 2, self.centres[-1] + self.scale * widths[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
-        self.right = self.centres[-1] + self.scale * widths[-1] / 2
+        self.right = self.centres[-1] + self.scale * widths[-1] / 2 + self.MARGIN
+        self._choose_colours()
 
-        self.H, self.K = curvature_colours(results, frames, [_area(frame) for frame in frames])
+    def _choose_colours(self):
+        self.H, self.K = curvature_colours(self.results, self.frames, [_area(frame) for frame in self.frames])
+
+    def _words(self, column, row):
+        """Below the profile of that row and column."""
+        return caption(column, row)
 
     def draw(self, figure, bottom):
         """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
@@ -138,20 +157,46 @@ class TubePanel:
         axes.set(xlim=(0, width), ylim=(0, self.height))
         axes.axis("off")
         for index, (column, x) in enumerate(zip(self.columns, self.centres)):
-            title = "last state" if column.time is None else f"{time_name(index)} = {time_text(column.time)}"
-            axes.text(x, self.height - 0.06, title, ha="center", va="top")
+            axes.text(x, self.height - 0.06, self._title(index, column), ha="center", va="top")
             captions = [row[index] for row in self.captions]
-            for frame, caption, y in zip(column.cells, captions, self.middles):
+            for frame, caption, y, length in zip(column.cells, captions, self.middles, self.lengths):
                 if frame:
-                    self._draw_tube(axes, frame, x, y)
+                    self._draw_profile(axes, frame, x, y)
                 if caption:
-                    below = y - self.scale * frame.length / 2 - 0.07
+                    below = y - self.scale * length / 2 - self.MARGIN - 0.07
                     axes.text(x, below, caption, ha="center", va="top", fontsize=6.5, linespacing=1.1)
         for label, y in zip(self.labels, self.middles):
             axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
         self._draw_scale_bar(axes)
 
-    def _draw_tube(self, axes, frame, x, y):
+    def _title(self, index, column):
+        if column.time is None:
+            return "last state"
+        if all(result.is_equilibrium for result in self.results):
+            return f"shape {number(column.time)}" if len(self.columns) > 1 else ""
+        return f"{time_name(index)} = {time_text(column.time)}"
+
+    def _draw_axis(self, axes, frame, x, y):
+        reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
+        axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
+
+    def _draw_scale_bar(self, axes):
+        longest = max(frame.length for frame in self.frames)
+        bar = float(f"{longest / 2:.0e}")
+        size = self.scale * bar
+        x, y = self.right + 0.14, self.middles[-1] - self.scale * longest / 2
+        axes.plot([x, x], [y, y + size], color="0.1", linewidth=1.0, solid_capstyle="butt")
+        axes.text(x + 0.05, y + size / 2, number(bar), ha="left", va="center", fontsize=7)
+
+    def draw_colour_bars(self, figure, bottom):
+        """Two colour bars in the 0.5 inches above `bottom`."""
+        draw_bars(figure, bottom, self.H, self.K, " (left halves)", " (right halves)")
+
+
+class TubePanel(ProfilePanel):
+    """Of tubes r(z), as shaded bodies."""
+
+    def _draw_profile(self, axes, frame, x, y):
         points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))
         place = np.linspace(0, frame.z.size - 1, points)  # as dense as the frame's own samples where those are dense
 
@@ -174,17 +219,4 @@ class TubePanel:
             mesh.set_facecolor(rgb.reshape(-1, 3))
             axes.add_collection(mesh, autolim=False)
             axes.plot(x + side * r, z, color="0.1", linewidth=0.7, solid_capstyle="butt", zorder=3)
-        reach = 0.5 * self.scale * frame.length + 0.05
-        axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
-
-    def _draw_scale_bar(self, axes):
-        longest = max(frame.length for frame in self.frames)
-        bar = float(f"{longest / 2:.0e}")
-        size = self.scale * bar
-        x, y = self.right + 0.14, self.middles[-1] - self.scale * longest / 2
-        axes.plot([x, x], [y, y + size], color="0.1", linewidth=1.0, solid_capstyle="butt")
-        axes.text(x + 0.05, y + size / 2, number(bar), ha="left", va="center", fontsize=7)
-
-    def draw_colour_bars(self, figure, bottom):
-        """Two colour bars in the 0.5 inches above `bottom`."""
-        draw_bars(figure, bottom, self.H, self.K, " (left halves)", " (right halves)")
+        self._draw_axis(axes, frame, x, y)
