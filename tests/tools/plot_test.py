@@ -405,7 +405,8 @@ class Curves(InFolder):
             for number, frame in enumerate(f["frames"].values()):
                 frame.attrs["parameter"] = 0.9 - 0.1 * number
         texts = self.drawn(file)
-        for words in ("shape 2", "mean curvature H (left halves), white: H\u2080 = \u22122", "number of the shape", "= 0.7"):
+        bar = "mean curvature H (left halves), white: H\u2080 = \u22122"
+        for words in (bar, "shape 2", "number of the shape", "= 0.7"):
             self.assertIn(words, "\n".join(texts).split("\n"))
         self.assertFalse([text for text in texts if text.startswith("t\u2081")])
         single = write(self.folder / "b.hdf", profile=at_rest, sets=["equilibrium.area=1"], times=[0], rows=1)

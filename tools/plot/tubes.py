@@ -1,4 +1,4 @@
-"""Panel (a): one row of profiles a result, one column a time. Tubes r(z): left halves coloured by H, right halves by K."""
+"""Panel (a): one row of profiles a result, one column a time. Tubes r(z): left halves coloured by H, right by K."""
 
 from dataclasses import dataclass
 from operator import attrgetter
