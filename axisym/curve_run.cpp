@@ -32,6 +32,7 @@ constexpr double seam_size = 0.15, seam_per_accuracy = 5;
 constexpr double steepest = 3;      // curvature times length of an element: beyond that nothing is resolved
 constexpr double stretched = 1e-3;  // least over largest |X_s|
 constexpr int steps_between_looks = 10;
+constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 constexpr int most_crawling = 2000;  // steps by which the time has not grown by a thousandth
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
@@ -360,6 +361,7 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     control.absolute = 0.1 * settings_.tolerance;
     control.max_order = case_.discretisation.time_order;
     control.first_step = first_step;
+    control.newton = std::clamp(newton_error / settings_.tolerance, 1e-5, 0.01);
     control.two_iterations = true;
     if (flow_) dissipated_before_ += flow_->dissipated(flow_->time()), counters_before_ += flow_->counters();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
