@@ -55,11 +55,10 @@ public:
                                                             "{:.6g} is not found",
                                                             place_.parameter(), next->parameter()));
             place_ = *next;
+            if (!branch_.message.empty()) return end(Stop::self_intersection, branch_.message);
             if (place_.parameter() < low || place_.parameter() > high) return end(Stop::finished, "");
-            if (const auto where = self_intersection(system_->space(), curve(place_.w)))
-                return end(Stop::self_intersection,
-                           fmt::format("the shape meets itself at s = {:.4f} and {:.4f}, parameter {:.6g}", (*where)[0],
-                                       (*where)[1], place_.parameter()));
+            if (met_itself(system_->space(), curve(place_.w), place_.parameter()))
+                return end(Stop::self_intersection, branch_.message);
             if (!remesh_if_needed())
                 return end(Stop::resolution_lost, fmt::format("{} elements do not do any more at parameter {:.6g}",
                                                               settings_.shapes.max_elements, place_.parameter()));
@@ -159,7 +158,7 @@ private:
 
     Eigen::VectorXd spectrum(const Eigen::VectorXd& w) {
         system_->set_problem(problem_at(w[w.size() - 1]));
-        return system_->spectrum(w.head(w.size() - 1));
+        return system_->variation(w.head(w.size() - 1)).eigenvalues;
     }
     int index(const Eigen::VectorXd& w) { return static_cast<int>((spectrum(w).array() < 0).count()); }
 
@@ -218,11 +217,21 @@ private:
         }
         std::sort(found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
         for (auto& [distance, p] : found) {
+            if (met_itself(*p.shape.space, p.shape.x, p.parameter)) break;
             p.index = p.kind == PointKind::regular ? negative_directions(problem_at(p.parameter), p.shape) : before;
             branch_.points.push_back(std::move(p));
         }
         index_ = after;
         return complete;
+    }
+
+    // Whether this shape is no surface any more; what there is to say about it is the branch's message then.
+    bool met_itself(const CurveSpace& space, const Eigen::VectorXd& x, double parameter) {
+        const auto where = self_intersection(space, x);
+        if (where)
+            branch_.message = fmt::format("at the parameter {:.6g} the shape meets itself: s = {:.4f} and {:.4f}",
+                                          parameter, (*where)[0], (*where)[1]);
+        return where.has_value();
     }
 
     void output_at(double parameter) {

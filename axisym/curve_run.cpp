@@ -108,27 +108,6 @@ std::vector<int> tracked_modes(const Case& c) {
     return {waves.begin(), waves.end()};
 }
 
-// Exact, but for quadrature.
-std::array<double, 2> area_and_volume(const Meridian& m) {
-    constexpr int panels = 64;
-    const GaussRule rule = gauss_rule(16);
-    std::vector<double> edges{0};
-    edges.insert(edges.end(), m.seams.begin(), m.seams.end());
-    edges.push_back(1);
-    double area = 0, volume = 0;
-    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
-        const double h = (edges[k + 1] - edges[k]) / panels;
-        for (int i = 0; i < panels; ++i)
-            for (std::size_t q = 0; q < rule.nodes.size(); ++q) {
-                const auto [r, r1, z, z1] = m.at(edges[k] + h * (i + rule.nodes[q]));
-                area += h * rule.weights[q] * 2 * pi * r * std::hypot(r1, z1);
-                volume += h * rule.weights[q] * pi * r * r * z1;
-            }
-    }
-    const int images = m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1;
-    return {images * area, images * volume};
-}
-
 // What a run begins with.
 struct Beginning {
     Meridian meridian;

@@ -125,7 +125,7 @@ double StationarySystem::merit(const Eigen::VectorXd& u) const {
     return value;
 }
 
-Eigen::VectorXd StationarySystem::spectrum(const Eigen::VectorXd& u) const {
+Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) const {
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
@@ -144,15 +144,20 @@ Eigen::VectorXd StationarySystem::spectrum(const Eigen::VectorXd& u) const {
         hessian -= u[P()] * factor * 0.75 / std::sqrt(A) * area * area.transpose();
     }
     if (space_->topology() == Topology::cell) fix(place_);
-    if (fixed.cols() > 0) {
-        const Eigen::HouseholderQR<Eigen::MatrixXd> qr(fixed);
+    const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints > 0 ? fixed : Eigen::MatrixXd::Zero(n, 1));
+    if (constraints > 0) {
         hessian.applyOnTheLeft(qr.householderQ().transpose());
         hessian.applyOnTheRight(qr.householderQ());
     }
-    const int free = n - static_cast<int>(fixed.cols());
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian.bottomRightCorner(free, free),
-                                                               Eigen::EigenvaluesOnly);
-    return eigen.eigenvalues();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+        hessian.bottomRightCorner(free, free), vectors ? Eigen::ComputeEigenvectors : Eigen::EigenvaluesOnly);
+    Variation out{eigen.eigenvalues(), {}};
+    if (!vectors) return out;
+    out.lowest = Eigen::VectorXd::Zero(n);
+    out.lowest.tail(free) = eigen.eigenvectors().col(0);
+    if (constraints > 0) out.lowest.applyOnTheLeft(qr.householderQ());
+    return out;
 }
 
 namespace {
@@ -331,12 +336,23 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         out.reference_energy = system.forms().reference_energy(out.x);
+        const auto converge = [&] {
+            try {
+                return Newton(system, u, out.iterations).converge();
+            } catch (const SolveError&) {
+                return false;
+            }
+        };
         const bool settled = found || !settings.descend;
         found = settled || descend(system, u, out.reference_energy, out.iterations);
-        try {
-            found = Newton(system, u, out.iterations).converge() && found;
-        } catch (const SolveError&) {
-            found = false;
+        found = converge() && found;
+        // Newton's last steps, or a symmetry of the start, may lead to a saddle: leave it downhill.
+        for (int k = 0; k < 3 && found && settings.descend; ++k) {
+            const Variation variation = system.variation(u, true);
+            if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;
+            const double size = std::sqrt(system.forms().observe(u.head(n)).area);
+            u.head(n) += 0.01 * size / variation.lowest.lpNorm<Eigen::Infinity>() * variation.lowest;
+            found = descend(system, u, out.reference_energy, out.iterations) && converge();
         }
         const Eigen::VectorXd x = u.head(n);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
@@ -386,7 +402,7 @@ Eigen::VectorXd unknowns(const Equilibrium& shape) {
 
 int negative_directions(const StationaryProblem& problem, const Equilibrium& shape) {
     const StationarySystem system(shape.space, problem, shape.gauge);
-    return static_cast<int>((system.spectrum(unknowns(shape)).array() < 0).count());
+    return static_cast<int>((system.variation(unknowns(shape)).eigenvalues.array() < 0).count());
 }
 
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
@@ -408,8 +424,8 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     // Fewer elements first, as the mesh that confirms the first one has more: a chain of shapes keeps its size.
     const CurveSpace& old = *nearby.space;
     const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
-    const auto coarser = make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements),
-                                    settings.degree);
+    const auto coarser =
+        make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements), settings.degree);
     Eigen::VectorXd u(coarser->size() + 3);
     u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.P, 0;
     const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);

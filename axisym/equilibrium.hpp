@@ -27,6 +27,11 @@ struct StationaryProblem {
     Constraints constraints;
 };
 
+// Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.
+struct Variation {
+    Eigen::VectorXd eigenvalues, lowest;
+};
+
 // The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve, then sigma, P and
 // the force that holds a whole cell in place along the axis (zero in the end). `gauge` is the weight of the gauge
 // energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
@@ -49,9 +54,9 @@ public:
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
     // E + gauge D + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
     double merit(const Eigen::VectorXd& u) const;
-    // Eigenvalues, ascending, of the second variation of that on the displacements (of coefficients) which keep the
-    // constraints and the place; only their signs have a meaning of their own.
-    Eigen::VectorXd spectrum(const Eigen::VectorXd& u) const;
+    // The second variation of that on the displacements (of coefficients) which keep the constraints and the place;
+    // `lowest` with `vectors` only.
+    Variation variation(const Eigen::VectorXd& u, bool vectors = false) const;
 
 private:
     Weights lagrangian(const Eigen::VectorXd& u) const;

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/case/equilibrium_choices.hpp"
 #include "common/case/surface_choices.hpp"
 #include "common/energy/bending.hpp"
 #include "common/shapes/capsule.hpp"
@@ -105,6 +106,7 @@ struct Case {
     Discretisation discretisation;  // of tier axisym
     SurfaceDiscretisation surface;  // of tier surface3d
     TimeSpan time;
+    std::optional<EquilibriumChoices> equilibrium;  // instead of a motion
     Expect expect;
 };
 

@@ -3,7 +3,7 @@
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
 //   absent     a key that belongs to other cases, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
-//   table, tables (a list of tables), entries (tables under open names)    key, target, description
+//   table, optional_table, tables (a list of tables), entries (tables under open names)    key, target, description
 //   check      a condition beyond a single key: gives "" or what is wrong, worded to follow the key
 // A target that is a std::optional stays empty where the key is absent.
 #pragma once
@@ -51,21 +51,47 @@ struct OpenNames {
     bool (*accepts)(std::string_view name);
 };
 
-// The series a run writes, as far as [expect] knows them; mode_<n> stands for every wave number.
+// The series a run writes, as far as [expect] knows them; mode_<n> and growth_<m> stand for every wave number.
 inline std::vector<std::string> known_series() {
     std::vector<std::string> names{"time", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "energy_error",
-                             "integral_H2", "integral_K", "gauss_bonnet_defect", "elements", "kinetic_energy", "speed",
-                             "momentum_z", "angular_momentum_z", "lambda"})
+    for (const char* name : {"dissipation",
+                             "identity_defect",
+                             "area",
+                             "volume",
+                             "r_min",
+                             "r_max",
+                             "energy_error",
+                             "integral_H2",
+                             "integral_K",
+                             "gauss_bonnet_defect",
+                             "elements",
+                             "kinetic_energy",
+                             "speed",
+                             "momentum_z",
+                             "angular_momentum_z",
+                             "lambda",
+                             "parameter",
+                             "special",
+                             "reduced_volume",
+                             "sigma",
+                             "P",
+                             "negative_directions",
+                             "meridian_length",
+                             "height",
+                             "r_middle",
+                             "pole_curvature",
+                             "distance_to_start"})
         names.push_back(name);
     names.push_back("mode_<n>");
+    names.push_back("growth_<m>");
     return names;
 }
 
 inline bool is_series(std::string_view name) {
-    if (name.starts_with("mode_")) {
-        const std::string_view digits = name.substr(5);
+    const std::size_t prefix = name.starts_with("mode_") ? 5 : name.starts_with("growth_") ? 7 : 0;
+    if (prefix > 0) {
+        const std::string_view digits = name.substr(prefix);
         int n = 0;
         const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
         return error == std::errc{} && n >= 0 && digits == std::to_string(n);
@@ -255,6 +281,22 @@ void check_together(Keys& k, const Case& c) {
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
     });
+    if (c.equilibrium) {
+        k.check("model.volume",
+                [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
+        k.check("model.kind", [&] {
+            const bool told = c.model.kind == ModelKind::gradient_flow || c.model.kind == ModelKind::overdamped;
+            return c.equilibrium->modes && !told ? "must be \"gradient-flow\" or \"overdamped\" with "
+                                                   "equilibrium.modes: other growth rates are not told"
+                                                 : "";
+        });
+        k.check("shape.kind", [&] {
+            return std::holds_alternative<Torus>(c.shape)
+                       ? "must not be \"torus\": equilibria are cells, or tubes that "
+                         "mirror themselves"
+                       : "";
+        });
+    }
     const Tube* tube = std::get_if<Tube>(&c.shape);
     if (!tube) return;
     k.check("accuracy.r_min", [&]() -> std::string {
@@ -281,17 +323,32 @@ void keys(Keys& k, Case& c) {
             k.absent(key, "must be absent: tier \"surface3d\" does not move surfaces yet");
     };
     only_axisym("model", [&](auto& k) { keys(k, c.model); });
-    only_axisym("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
+    if (moves)
+        k.optional_table("equilibrium", c.equilibrium, [](auto& k, EquilibriumChoices& e) { keys(k, e); });
+    else
+        k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
+    const char* no_motion = "must be absent: nothing moves in a case with [equilibrium]";
+    if (c.equilibrium)
+        k.absent("velocity", no_motion);
+    else
+        only_axisym("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
     k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });
     k.table("discretisation", [&](auto& k) {
-        if (c.tier == Tier::axisym)
-            keys(k, c.discretisation);
-        else
+        if (c.tier == Tier::surface3d)
             keys(k, c.surface);
+        else if (c.equilibrium)
+            k.integer("order", c.discretisation.order, {.from = 3, .to = 7, .step = 2});
+        else
+            keys(k, c.discretisation);
     });
-    only_axisym("time", [&](auto& k) { keys(k, c.time); });
-    k.table("expect", [&](auto& k) { keys(k, c.expect, c.time.end); });
+    if (c.equilibrium)
+        k.absent("time", no_motion);
+    else
+        only_axisym("time", [&](auto& k) { keys(k, c.time); });
+    // The shapes of a branch are numbered as if that were their time.
+    const double end = c.equilibrium ? std::numeric_limits<int>::max() : c.time.end;
+    k.table("expect", [&](auto& k) { keys(k, c.expect, end); });
     check_together(k, c);
 }
 

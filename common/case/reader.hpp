@@ -81,6 +81,15 @@ public:
         read(node ? as_table(*node, path_of(key)) : absent, path_of(key), node ? where(*node) : where_, describe);
     }
 
+    // The target stays empty where the table is absent.
+    template <class T, class Describe>
+    void optional_table(const std::string& key, std::optional<T>& target, const Describe& describe) {
+        const toml::node* node = find(key, "a table", false);
+        if (!node) return;
+        read(as_table(*node, path_of(key)), path_of(key), where(*node),
+             [&](Reader& k) { describe(k, target ? *target : target.emplace()); });
+    }
+
     template <class T, class Describe>
     void tables(const std::string& key, std::vector<T>& target, const Describe& describe) {
         const toml::node* node = find(key, "a list of tables", false);

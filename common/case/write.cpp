@@ -59,6 +59,14 @@ public:
     }
 
     template <class T, class Describe>
+    void optional_table(const std::string& key, std::optional<T>& value, const Describe& describe) {
+        if (!value) return;
+        Writer inner(path_of(key));
+        describe(inner, *value);
+        sections_ += fmt::format("\n[{}]\n{}", inner.path_, inner.document());
+    }
+
+    template <class T, class Describe>
     void tables(const std::string& key, std::vector<T>& values, const Describe& describe) {
         for (T& value : values) {
             Writer inner(path_of(key));

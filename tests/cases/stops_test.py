@@ -21,6 +21,7 @@ STATUS = {
     "pinch-off": 3,
     "overhang": 3,
     "ill-posed": 3,
+    "self-intersection": 3,
     "resolution-lost": 4,
     "time-limit": 5,
 }

@@ -1,6 +1,12 @@
 // The subcommands of `tubule`, one file each. add_X registers subcommand X; its callback sets the exit status.
 #pragma once
 
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+
 namespace CLI {
 class App;
 }
@@ -8,8 +14,18 @@ class App;
 namespace tubule {
 
 void add_run(CLI::App& app, int& exit_status);
+void add_equilibrium(CLI::App& app, int& exit_status);
 void add_check(CLI::App& app, int& exit_status);
 void add_show(CLI::App& app, int& exit_status);
 void add_plot(CLI::App& app, int& exit_status);
+
+// What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
+struct RunOptions {
+    std::vector<std::string> cases, sets;
+    std::string output;
+    bool resume = false, quiet = false, expect = false, check_derivatives = false;
+};
+int run_cases(const RunOptions& options);
+std::filesystem::path result_path(const RunOptions& options, const Case& c);
 
 }  // namespace tubule

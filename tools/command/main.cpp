@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
     app.add_flag("--version", version, "what this program is made of");
     int status = 0;
     tubule::add_run(app, status);
+    tubule::add_equilibrium(app, status);
     tubule::add_check(app, status);
     tubule::add_show(app, status);
     tubule::add_plot(app, status);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "axisym/derivatives.hpp"
+#include "axisym/equilibrium_run.hpp"
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
@@ -27,13 +28,12 @@
 
 namespace tubule {
 
-namespace {
+std::filesystem::path result_path(const RunOptions& options, const Case& c) {
+    if (!options.output.empty()) return options.output;
+    return std::filesystem::path(c.path).filename().replace_extension(".hdf");
+}
 
-struct RunOptions {
-    std::vector<std::string> cases, sets;
-    std::string output;
-    bool resume = false, quiet = false, expect = false, check_derivatives = false;
-};
+namespace {
 
 // Hands a run's rows and frames to the result file.
 class Recorder : public RunObserver {
@@ -52,11 +52,6 @@ private:
     ResultWriter& writer_;
     Progress progress_;
 };
-
-std::filesystem::path result_path(const RunOptions& options, const Case& c) {
-    if (!options.output.empty()) return options.output;
-    return std::filesystem::path(c.path).filename().replace_extension(".hdf");
-}
 
 About about_start() {
     About about;
@@ -86,9 +81,11 @@ About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
 
 // Both tiers, by the case.
 std::vector<std::string> series_names(const Case& c) {
+    if (c.equilibrium) return axisym::equilibrium_series_names(c);
     return c.tier == Tier::axisym ? axisym::series_names(c) : surface3d::series_names(c);
 }
 RunSummary run_tier(const Case& c, RunObserver& observer, const Record* restart) {
+    if (c.equilibrium) return axisym::run_equilibrium(c, observer);
     if (c.tier == Tier::axisym) return axisym::run(c, observer, restart);
     return surface3d::run(c, observer);
 }
@@ -166,6 +163,8 @@ std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
                                     file.string(), c.path));
     const auto stop = stop_of(old);
+    if (c.equilibrium && !stop)
+        throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
     if (old.frames.empty() && !old.checkpoint) return create(c, file);
     ResultWriter writer = ResultWriter::resume(file);
@@ -203,7 +202,7 @@ int run_case(Case c, const RunOptions& options) {
     auto& [writer, restart] = *result;
     RunSummary summary;
     {
-        Recorder recorder(c, writer, options.quiet, restart ? restart->time : 0);
+        Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->time : 0);
         summary = run_tier(c, recorder, restart ? &*restart : nullptr);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
@@ -213,6 +212,8 @@ int run_case(Case c, const RunOptions& options) {
     if (!options.quiet || status != 0) report(c, summary, file, seconds);
     return status;
 }
+
+}  // namespace
 
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
@@ -242,8 +243,6 @@ int run_cases(const RunOptions& options) {
     }
     return status;
 }
-
-}  // namespace
 
 void add_run(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("run", "Run cases, each into a result file");

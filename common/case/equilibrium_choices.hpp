@@ -1,0 +1,88 @@
+// Table [equilibrium]: a case whose answer is a stationary shape, or a branch of them, instead of a motion.
+#pragma once
+
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/energy/bending.hpp"
+
+namespace tubule {
+
+// What is held fixed while the energy becomes stationary.
+enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
+
+// What a branch is followed in: the moduli by the index of their term, then these.
+inline constexpr int vary_H0 = static_cast<int>(n_bending_terms), vary_area = vary_H0 + 1, vary_volume = vary_H0 + 2,
+                     vary_reduced_volume = vary_H0 + 3;
+
+struct BranchChoices {
+    std::optional<int> parameter;  // absent: one shape only
+    std::optional<double> to, step;
+};
+
+struct EquilibriumChoices {
+    Held held = Held::area_and_volume;
+    std::optional<double> area, volume, reduced_volume;  // where absent: those of the start
+    bool descend = true;                                 // to a minimum; if not, to a stationary shape near the start
+    std::optional<int> modes;  // stability against e^{i m theta}, m = 0 ... modes, by the dissipation of [model]
+    BranchChoices branch;
+};
+
+// The keys of [equilibrium]; see common/case/keys.hpp.
+template <class Keys>
+void keys(Keys& k, EquilibriumChoices& e) {
+    k.choice("held", e.held,
+             {{"area-and-volume", Held::area_and_volume},
+              {"area", Held::area},
+              {"volume", Held::volume},
+              {"reduced-volume", Held::reduced_volume},
+              {"nothing", Held::nothing}});
+    k.number("area", e.area, {.above = 0});
+    k.number("volume", e.volume, {.above = 0});
+    k.number("reduced_volume", e.reduced_volume, {.above = 0, .to = 1});
+    k.flag("descend", e.descend);
+    k.integer("modes", e.modes, {.from = 0, .to = 100});
+    const auto held_in = [&](std::initializer_list<Held> which) {
+        for (const Held held : which)
+            if (e.held == held) return true;
+        return false;
+    };
+    const char* not_held = "is not held fixed: see equilibrium.held";
+    const bool area = held_in({Held::area, Held::area_and_volume}),
+               volume = held_in({Held::volume, Held::area_and_volume}),
+               reduced = held_in({Held::reduced_volume, Held::area_and_volume});
+    k.check("area", [&] { return e.area && !area ? not_held : ""; });
+    k.check("volume", [&] { return e.volume && !volume ? not_held : ""; });
+    k.check("reduced_volume", [&] {
+        if (e.reduced_volume && !reduced) return not_held;
+        return e.reduced_volume && e.volume ? "and equilibrium.volume exclude each other" : "";
+    });
+    k.table("branch", [&](auto& k) {
+        std::vector<std::pair<std::string, int>> parameters;
+        for_each_bending_term([&](std::size_t i, const auto& term) {
+            parameters.emplace_back(std::string("energy.") + term.key, static_cast<int>(i));
+        });
+        parameters.insert(parameters.end(), {{"energy.H0", vary_H0},
+                                             {"equilibrium.area", vary_area},
+                                             {"equilibrium.volume", vary_volume},
+                                             {"equilibrium.reduced_volume", vary_reduced_volume}});
+        k.choice("vary", e.branch.parameter, parameters);
+        k.number("to", e.branch.to);
+        k.number("step", e.branch.step, {.above = 0});
+        k.check("", [&] {
+            const BranchChoices& b = e.branch;
+            if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
+            if (!b.to || !b.step) return "needs to and step: where the branch ends, and between shapes";
+            const bool held = *b.parameter == vary_area             ? area
+                              : *b.parameter == vary_volume         ? volume && !e.reduced_volume
+                              : *b.parameter == vary_reduced_volume ? reduced && !e.volume
+                                                                    : true;
+            return held ? "" : "varies what is not held fixed: see equilibrium.held";
+        });
+    });
+}
+
+}  // namespace tubule

@@ -1,0 +1,73 @@
+// tubule equilibrium CASE... : stationary shapes and branches of them, into result files and as tables.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/case/read.hpp"
+#include "common/result/result.hpp"
+#include "tools/command/commands.hpp"
+
+namespace tubule {
+
+namespace {
+
+// One line a shape. Growth rates: the largest of all m, and its m.
+void print_table(const Result& result) {
+    const auto has = [&](const char* name) { return result.series.contains(name); };
+    const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
+    const bool branch = has("parameter"), modes = has("growth_0");
+    if (branch) fmt::print("{:>14}  ", "parameter");
+    fmt::print("{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "sigma", "P", "height", "r_max", "neg");
+    if (modes) fmt::print("  {:>10} of m", "growth");
+    fmt::print("\n");
+    const std::size_t rows = result.series.at("time").size();
+    for (std::size_t i = 0; i < rows; ++i) {
+        if (branch) fmt::print("{:>14.9g}  ", value("parameter", i));
+        fmt::print("{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("sigma", i),
+                   value("P", i), value("height", i), value("r_max", i), value("negative_directions", i));
+        if (modes) {
+            int fastest = 0;
+            for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)
+                if (value(fmt::format("growth_{}", m), i) > value(fmt::format("growth_{}", fastest), i)) fastest = m;
+            fmt::print("  {:>10.4g} {:>4}", value(fmt::format("growth_{}", fastest), i), fastest);
+        }
+        const int special = branch ? static_cast<int>(value("special", i)) : 0;
+        fmt::print("{}\n", special == 1 ? "  fold" : special == 2 ? "  bifurcation" : "");
+    }
+}
+
+int find(const RunOptions& options) {
+    std::vector<Case> cases;
+    for (const std::string& path : options.cases) {
+        cases.push_back(read_case(path, options.sets));
+        if (!cases.back().equilibrium)
+            throw CaseError(fmt::format("{}: is a case of motion: an equilibrium needs a table [equilibrium]", path));
+    }
+    const int status = run_cases(options);
+    if (options.quiet) return status;
+    for (const Case& c : cases) {
+        const Result result = read_result(result_path(options, c));
+        if (result.series.contains("time") && !result.series.at("time").empty()) print_table(result);
+    }
+    return status;
+}
+
+}  // namespace
+
+void add_equilibrium(CLI::App& app, int& exit_status) {
+    CLI::App* command =
+        app.add_subcommand("equilibrium", "Find stationary shapes, follow branches of them, print them");
+    const auto o = std::make_shared<RunOptions>();
+    command->add_option("CASE", o->cases, "case files with a table [equilibrium]")->required();
+    command->add_option("--set", o->sets, "override a key, such as --set equilibrium.modes=5")->allow_extra_args(false);
+    command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
+    command->add_flag("--quiet", o->quiet, "no table; words only if something went wrong");
+    command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
+    command->callback([o, &exit_status] { exit_status = find(*o); });
+}
+
+}  // namespace tubule
