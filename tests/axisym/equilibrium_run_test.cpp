@@ -1,0 +1,197 @@
+// Cases with [equilibrium]: what they may say, and the rows and frames that come out.
+#include "axisym/equilibrium_run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+const std::string good = R"(tier = "axisym"
+[energy]
+k20 = 0.125
+H0 = -2.0
+k42 = 0.12
+[shape]
+kind = "capsule"
+radius = 0.5
+length = 2.0
+[accuracy]
+energy = 1e-8
+[equilibrium]
+modes = 1
+[equilibrium.branch]
+vary = "energy.k42"
+to = 0.0
+step = 0.05
+)";
+
+std::string with(const std::string& old_text, const std::string& new_text) {
+    std::string text = good;
+    return text.replace(text.find(old_text), old_text.size(), new_text);
+}
+
+std::string refusal(const std::string& text) {
+    try {
+        RunObserver nobody;
+        run_equilibrium(parse_case(text, {}, "case.toml"), nobody);
+    } catch (const CaseError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+struct Recorder : RunObserver {
+    std::vector<std::vector<double>> rows;
+    std::vector<Record> frames;
+    bool stop = false;
+    void row(std::span<const double> values) override { rows.emplace_back(values.begin(), values.end()); }
+    void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
+    bool interrupted() override { return stop && !rows.empty(); }
+};
+
+struct Outcome {
+    RunSummary summary;
+    Recorder log;
+    std::vector<std::string> names;
+    double at(const std::string& name, int row) const {
+        const auto it = std::find(names.begin(), names.end(), name);
+        EXPECT_NE(it, names.end()) << name;
+        return log.rows[row < 0 ? log.rows.size() + row : row][it - names.begin()];
+    }
+    const std::vector<double>& array(const std::string& name, int frame) const {
+        for (const Array& a : log.frames.at(frame).arrays)
+            if (a.name == name) return a.data;
+        throw std::runtime_error(name);
+    }
+};
+Outcome outcome(const std::string& text, const std::vector<std::string>& sets = {}, bool stop = false) {
+    const Case c = parse_case(text, sets, "case.toml");
+    Outcome out;
+    out.log.stop = stop;
+    out.names = equilibrium_series_names(c);
+    out.summary = run_equilibrium(c, out.log);
+    for (const auto& row : out.log.rows) EXPECT_EQ(row.size(), out.names.size());
+    EXPECT_EQ(out.log.rows.size(), out.log.frames.size());
+    return out;
+}
+
+TEST(EquilibriumCase, refusals) {
+    const auto expect = [](const std::string& old_text, const std::string& new_text, const std::string& message) {
+        EXPECT_EQ(refusal(with(old_text, new_text)), "case.toml:" + message) << new_text;
+    };
+    const std::string held = "equilibrium.held";
+    expect("modes = 1", "held = \"area\"\nvolume = 2.0",
+           "14:10: equilibrium.volume is not held fixed: see " + held + "");
+    expect("modes = 1", "held = \"volume\"\narea = 2.0", "14:8: equilibrium.area is not held fixed: see " + held);
+    expect("modes = 1", "held = \"nothing\"\nreduced_volume = 0.8",
+           "14:18: equilibrium.reduced_volume is not held fixed: see " + held);
+    expect("modes = 1", "volume = 2.0\nreduced_volume = 0.8",
+           "14:18: equilibrium.reduced_volume and equilibrium.volume exclude each other");
+    expect("modes = 1", "modes = -1", "13:9: equilibrium.modes must be an integer >= 0 and <= 100, not -1");
+    expect("vary = \"energy.k42\"\n", "", "14:1: equilibrium.branch needs vary: the key that changes along the branch");
+    expect("step = 0.05\n", "",
+           "14:1: equilibrium.branch needs to and step: where the branch ends, and between shapes");
+    expect("energy.k42", "energy.k43",
+           "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
+           "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", not "
+           "\"energy.k43\"; did you mean 'energy.k40'?");
+    const std::string varies = "14:1: equilibrium.branch varies what is not held fixed: see " + held;
+    expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
+           "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.volume\"", varies);
+    expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
+           "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.reduced_volume\"", varies);
+    expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
+           "held = \"volume\"\n[equilibrium.branch]\nvary = \"equilibrium.area\"", varies);
+    expect("[accuracy]", "[time]\nend = 1.0\n[accuracy]",
+           "10:1: time must be absent: nothing moves in a case with [equilibrium]");
+    expect("kind = \"capsule\"\nradius = 0.5\nlength = 2.0", "kind = \"torus\"\nradius = 2.0\ntube_radius = 1.0",
+           "7:8: shape.kind must not be \"torus\": equilibria are cells, or tubes that mirror themselves");
+    expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
+           "11:10: model.volume must be absent: equilibrium.held says what is held fixed");
+    expect(
+        "[accuracy]", "[model]\nkind = \"stokes\"\n[accuracy]",
+        "11:8: model.kind must be \"gradient-flow\" or \"overdamped\" with equilibrium.modes: other growth rates are "
+        "not told");
+    expect("to = 0.0", "to = 0.12", " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; 1 to 10000 are possible");
+    expect("modes = 1", "area = 1.0", " equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1");
+}
+
+TEST(EquilibriumCase, branchOfShapes) {
+    // Expected: independent spectral reference (tests/axisym/equilibrium_test.cpp).
+    const Outcome o = outcome(good);
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished);
+    EXPECT_EQ(o.summary.stop.time, 3);
+    ASSERT_EQ(o.log.rows.size(), 4u);  // 0.12, 0.07, 0.02, 0
+    EXPECT_NEAR(o.at("parameter", 1), 0.07, 1e-12);
+    EXPECT_NEAR(o.at("energy", 0), 6.3849499091967346, 1e-6);
+    EXPECT_NEAR(o.at("energy", -1), 1.2568365089070843, 1e-6);
+    EXPECT_NEAR(o.at("distance_to_start", -1), 0.055235900332553545, 1e-6);
+    EXPECT_EQ(o.at("special", -1), 0);
+    EXPECT_LT(o.at("growth_0", -1), 0);
+    EXPECT_LT(o.at("growth_1", -1), 0);
+    EXPECT_EQ(o.array("displacement_1", 0).size(), 201u);
+    const auto &r = o.array("r", 3), &z = o.array("z", 3), &H = o.array("H", 3);
+    EXPECT_EQ(r.front(), 0);
+    EXPECT_EQ(r.back(), 0);
+    EXPECT_NEAR(z.back() - z.front(), 2.93276235152434, 1e-6);
+    EXPECT_NEAR(H.front(), -2 * 2.017056842618144, 1e-3);
+}
+
+TEST(EquilibriumCase, whatIsHeld) {
+    const std::string single = good.substr(0, good.find("[equilibrium.branch]"));
+    const Outcome given = outcome(single, {"equilibrium.reduced_volume=0.8"});
+    EXPECT_NEAR(given.at("reduced_volume", 0), 0.8, 1e-11);
+    EXPECT_NEAR(given.at("area", 0), 9.42477796076938, 1e-10);  // that of the start: 2 pi r l + 4 pi r^2
+    const Outcome size = outcome(single, {"equilibrium.held=reduced-volume"});
+    EXPECT_NEAR(size.at("reduced_volume", 0), 0.7698003589195009, 1e-10);  // of the start
+    EXPECT_NEAR(2 * size.at("sigma", 0) * size.at("area", 0) + 3 * size.at("P", 0) * size.at("volume", 0), 0, 1e-7);
+    EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("P", 0), 0);
+    EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("sigma", 0), 0, 0);
+}
+
+TEST(EquilibriumCase, tubesMirrorThemselves) {
+    // Exact: E = (k20/R^2 + k40/R^4) A for the tube of radius R = A/(2 pi length) that the wavy one relaxes to.
+    const std::string tube = R"(tier = "axisym"
+[energy]
+k20 = -1.0
+k40 = 0.5
+[shape]
+kind = "tube"
+radius = 1.0
+length = 4.0
+[[shape.mode]]
+amplitude = 0.02
+n = 1
+[accuracy]
+energy = 1e-9
+[equilibrium]
+held = "area"
+)";
+    const Outcome o = outcome(tube);
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const auto &z = o.array("z", 0), &r = o.array("r", 0);
+    EXPECT_NEAR(z.back() - z.front(), 4, 1e-12);
+    EXPECT_NEAR(*std::max_element(r.begin(), r.end()) - *std::min_element(r.begin(), r.end()), 0, 1e-5);
+    const double A = o.at("area", 0), R = A / (8 * pi);
+    EXPECT_GT(R, 1.0001);
+    EXPECT_NEAR(o.at("energy", 0), (-1 / (R * R) + 0.5 / std::pow(R, 4)) * A, 1e-8);
+    const std::string slanted = std::string(tube).replace(tube.find("n = 1"), 5, "n = 1\nphase = 0.3");
+    EXPECT_EQ(refusal(slanted), "case.toml: shape: the curve does not mirror itself about the middle of its parameter");
+}
+
+TEST(EquilibriumCase, canBeInterrupted) {
+    const Outcome o = outcome(good, {}, true);
+    EXPECT_EQ(o.summary.stop.reason, Stop::interrupted);
+    EXPECT_EQ(o.log.rows.size(), 1u);
+}
+
+}  // namespace
+}  // namespace tubule::axisym
