@@ -124,6 +124,14 @@ TEST(EquilibriumCase, refusals) {
     expect("modes = 1", "area = 1.0", " equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1");
 }
 
+TEST(EquilibriumCase, writtenOutItIsTheSame) {
+    const std::string text = effective_toml(parse_case(good, {"equilibrium.reduced_volume=0.75"}, "case.toml"));
+    EXPECT_NE(text.find("reduced_volume = 0.75"), std::string::npos) << text;
+    EXPECT_NE(text.find("[equilibrium.branch]"), std::string::npos) << text;
+    EXPECT_EQ(text.find("[time]"), std::string::npos) << text;
+    EXPECT_EQ(effective_toml(parse_case(text, {}, "again.toml")), text);
+}
+
 TEST(EquilibriumCase, branchOfShapes) {
     // Expected: independent spectral reference (tests/axisym/equilibrium_test.cpp).
     const Outcome o = outcome(good);
