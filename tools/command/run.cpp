@@ -194,6 +194,7 @@ int run_case(Case c, const RunOptions& options) {
 
     const auto started = std::chrono::steady_clock::now();
     if (c.tier == Tier::surface3d) surface3d::check_start(c);
+    if (c.equilibrium) axisym::check_equilibrium(c);
     std::optional<Opened> result = open_result(c, file, options.resume);
     if (!result) {
         if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());

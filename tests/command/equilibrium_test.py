@@ -1,0 +1,79 @@
+#!/usr/bin/python3
+"""`tubule equilibrium`: its table, its result, results as starts, what it refuses. Argument: the program."""
+import unittest
+
+from program import ProgramTest, about, series
+
+CAPSULE = """tier = "axisym"
+[energy]
+k20 = 0.125
+H0 = -2.0
+k42 = 0.12
+[shape]
+kind = "capsule"
+radius = 0.5
+length = 2.0
+[accuracy]
+energy = 1e-8
+[equilibrium]
+modes = 2
+"""
+BRANCH = """[equilibrium.branch]
+vary = "energy.k42"
+to = 0.0
+step = 0.06
+"""
+# Independent spectral reference (tests/axisym/equilibrium_test.cpp), k42 = 0.12, 0.06, 0.
+ENERGIES = (6.3849499091967346, 3.831523408595685, 1.2568365089070843)
+
+
+class Equilibrium(ProgramTest):
+    def test_one_shape(self):
+        case = self.write("cell.toml", CAPSULE)
+        out, _ = self.tubule("equilibrium", case)
+        header, row = out.splitlines()[-2:]
+        self.assertEqual(header.split(), ["energy", "sigma", "P", "height", "r_max", "neg", "growth", "of", "m"])
+        self.assertAlmostEqual(float(row.split()[0]), ENERGIES[0], delta=1e-6)
+        result = self.folder / "cell.hdf"
+        self.assertEqual(about(result)["stop"], "finished")
+        self.assertAlmostEqual(series(result)["energy"][0], ENERGIES[0], delta=1e-6)
+        shown, _ = self.tubule("show", result)
+        self.assertIn("distance_to_start", shown)
+        self.tubule("equilibrium", case, "--quiet", "-o", "other.hdf")
+        self.assertIn("other.hdf", self.files())
+
+    def test_branch_and_shapes_as_starts(self):
+        case = self.write("branch.toml", CAPSULE + BRANCH)
+        out, _ = self.tubule("equilibrium", case)
+        rows = [line.split() for line in out.splitlines()[-3:]]
+        for row, k42, energy in zip(rows, (0.12, 0.06, 0), ENERGIES):
+            self.assertAlmostEqual(float(row[0]), k42, delta=1e-9)
+            self.assertAlmostEqual(float(row[1]), energy, delta=1e-6)
+        # The shape at k42 = 0.06 is at rest already, with the area and volume it has.
+        again = CAPSULE.replace('kind = "capsule"\nradius = 0.5\nlength = 2.0', 'kind = "result"\npath = "branch.hdf"\nframe = 1')
+        self.tubule("equilibrium", "--quiet", self.write("again.toml", again), "--set", "energy.k42=0.06")
+        found = series(self.folder / "again.hdf")
+        self.assertAlmostEqual(found["energy"][0], ENERGIES[1], delta=1e-6)
+        self.assertLess(found["distance_to_start"][0], 1e-5)
+
+    def test_the_surface_meets_itself(self):
+        text = CAPSULE.replace("k42 = 0.12", "").replace("H0 = -2.0", "").replace("modes = 2", "reduced_volume = 0.55")
+        text = text.replace('kind = "capsule"\nradius = 0.5\nlength = 2.0', 'kind = "ellipsoid"\na = 1.0\nb = 1.0\nc = 0.5')
+        case = self.write(
+            "oblate.toml", text + '[equilibrium.branch]\nvary = "equilibrium.reduced_volume"\nto = 0.4\nstep = 0.02\n'
+        )
+        out, _ = self.tubule("equilibrium", case, status=3)
+        self.assertIn("bifurcation", out)
+        self.assertEqual(about(self.folder / "oblate.hdf")["stop"], "self-intersection")
+
+    def test_refusals(self):
+        _, err = self.tubule("equilibrium", self.case, status=2)
+        self.assertEqual(err, f"{self.case}: is a case of motion: an equilibrium needs a table [equilibrium]\n")
+        cell = self.write("cell.toml", CAPSULE)
+        _, err = self.tubule("equilibrium", cell, "--set", "equilibrium.area=1.0", status=2)
+        self.assertEqual(err, f"{cell}: equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1\n")
+        self.assertEqual(self.files(), {"case.toml", "cell.toml"})
+
+
+if __name__ == "__main__":
+    unittest.main(argv=["equilibrium_test.py"])
