@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "axisym/curve_measures.hpp"
@@ -166,17 +167,62 @@ namespace {
 class Newton {
 public:
     Newton(const StationarySystem& system, Eigen::VectorXd& u, int& iterations)
-        : system_(system), u_(u), iterations_(iterations), size_(std::sqrt(system.forms().observe(curve()).area)) {}
+        : system_(system),
+          u_(u),
+          iterations_(iterations),
+          size_(std::sqrt(system.forms().observe(curve()).area)),
+          scale_(system.forms().reference_energy(curve())),
+          damping_start_(10 * scale_ / std::pow(size_, 4)),
+          damping_(damping_start_) {}
 
-    // Plain steps, to rounding. False if they do not converge.
-    bool converge() {
+    // Plain steps, to rounding. False, and u as it was, if they do not converge or one is longer than `longest`.
+    bool converge(double longest) {
+        const Eigen::VectorXd start = u_;
+        try {
+            if (plain_steps(longest)) return true;
+        } catch (const SolveError&) {
+        }
+        u_ = start;
+        return false;
+    }
+
+    // Damped steps towards a minimum, until they are shorter than `tolerance`. A step solves the equations of the
+    // implicit Euler method for the descent, of a duration that grows while the model predicts the energy well. Far
+    // from the area and volume asked for, a step brings them nearer, and the energy may do what it must. False if no
+    // step makes progress any more.
+    bool descend(double tolerance, int most = 200) {
+        for (int k = 0; k < most; ++k) {
+            ++iterations_;
+            const Attempt step = attempt();
+            if (!step.sound) {
+                damping_ *= 5;
+                if (damping_ > 1e12 * damping_start_) return false;
+                continue;
+            }
+            const double length = relative(step.to - u_);
+            const double gain = merit_at(curve(), step.to) - system_.merit(step.to), noise = 1e-13 * scale_;
+            if (step.feasible && gain < 0.1 * step.predicted - noise) {
+                damping_ *= 5;
+                if (damping_ > 1e12 * damping_start_) return false;
+                continue;
+            }
+            u_ = step.to;
+            if (!step.feasible) continue;
+            if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
+            if (length < tolerance || gain > 0.6 * step.predicted) damping_ /= 6;
+        }
+        return false;
+    }
+
+private:
+    bool plain_steps(double longest) {
         double before = std::numeric_limits<double>::infinity();
         for (int k = 0; k < 25; ++k) {
             lu_.factor(system_.jacobian(u_));
             ++iterations_;
             const Eigen::VectorXd step = -lu_.solve(system_.residual(u_));
             const double length = relative(step);
-            if (!(length < 0.5) || !system_.forms().admissible(head(u_ + step))) return false;
+            if (!(length < longest) || !system_.forms().admissible(head(u_ + step))) return false;
             u_ += step;
             if (length < 1e-7 || (length < 1e-5 && length > before / 4)) return true;  // quadratic; or rounding reached
             before = length;
@@ -184,41 +230,17 @@ public:
         return false;
     }
 
-    // Damped steps towards a minimum, until they are shorter than `tolerance`. A step solves the equations of the
-    // implicit Euler method for the descent, of a duration that grows while the model predicts the energy well. False
-    // if no step makes progress any more.
-    bool descend(double tolerance) {
-        for (int k = 0; k < 200; ++k) {
-            Eigen::VectorXd to;
-            double predicted = 0;
-            ++iterations_;
-            const bool sound = attempt(to, predicted);
-            const double length = sound ? relative(to - u_) : 0;
-            const double gain = sound ? merit_at(curve(), to) - system_.merit(to) : 0;
-            const double noise = 1e-13 * scale_;
-            if (sound && gain >= 0.1 * predicted - noise) {
-                u_ = to;
-                if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
-                damping_ = length < tolerance || gain > 0.6 * predicted ? damping_ / 6 : damping_;
-            } else {
-                damping_ *= 5;
-                if (damping_ > 1e12 * damping_start_) return false;
-            }
-        }
-        return false;
-    }
-
-    void begin_descent(double scale) {
-        scale_ = scale;
-        damping_start_ = 10 * scale / std::pow(size_, 4);
-        damping_ = damping_start_;
-    }
-
-private:
     Eigen::VectorXd head(const Eigen::VectorXd& u) const { return u.head(system_.space().size()); }
     Eigen::VectorXd curve() const { return head(u_); }
     double relative(const Eigen::VectorXd& step) const {
         return step.head(system_.space().size()).lpNorm<Eigen::Infinity>() / size_;
+    }
+    // Area and volume off what is asked, in units of the size. (What is not held is off by nothing that matters here.)
+    double constraint_error(const Eigen::VectorXd& F) const {
+        const Constraints& c = system_.problem().constraints;
+        const double area = c.area ? std::abs(F[system_.sigma()]) / (size_ * size_) : 0;
+        const double volume = c.volume || c.reduced_volume ? std::abs(F[system_.P()]) / (size_ * size_ * size_) : 0;
+        return std::max(area, volume);
     }
     // The merit of a curve with the multipliers of u.
     double merit_at(const Eigen::VectorXd& x, Eigen::VectorXd u) const {
@@ -226,36 +248,51 @@ private:
         return system_.merit(u);
     }
 
-    // One damped step, then corrections that bring the constraints back. False if it is not downhill or leads nowhere.
-    bool attempt(Eigen::VectorXd& to, double& predicted) {
+    struct Attempt {
+        bool sound = false;     // downhill, not too far, and to a curve
+        bool feasible = false;  // area and volume are as asked, or nearly
+        double predicted = 0;   // gain of the merit
+        Eigen::VectorXd to;
+    };
+
+    // One damped step, then corrections that bring area and volume to what they were meant to be.
+    Attempt attempt() {
+        constexpr double farthest = 0.05;  // for the sake of area and volume
         const int n = system_.space().size();
+        Attempt out;
         try {
             const Eigen::SparseMatrix<double> J = system_.jacobian(u_, damping_);
             lu_.factor(J);
-            Eigen::VectorXd step = -lu_.solve(system_.residual(u_));
-            const Eigen::VectorXd dx = step.head(n);
+            const Eigen::VectorXd F = system_.residual(u_);
+            Eigen::VectorXd force = F, off = F;
+            force.tail(3).setZero(), off.head(n).setZero();
+            const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
+            const double off_before = constraint_error(F), part = std::min(1.0, farthest / relative(back));
+            const Eigen::VectorXd step = down + part * back, dx = step.head(n);
             const double curvature = dx.dot(J.topLeftCorner(n, n) * dx);
-            if (!(curvature >= 0) || !(relative(step) < 0.3)) return false;
-            predicted = curvature / 2;
-            to = u_ + step;
+            if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
+            out.predicted = curvature / 2;
+            out.to = u_ + step;
             for (int k = 0; k < 2; ++k) {
-                if (!system_.forms().admissible(head(to))) return false;
-                Eigen::VectorXd off = system_.residual(to);
-                off.head(n).setZero();
-                const Eigen::VectorXd back = lu_.solve(off);
-                to.head(n) -= back.head(n);
+                if (!system_.forms().admissible(head(out.to))) return out;
+                Eigen::VectorXd still = system_.residual(out.to) - (1 - part) * off;
+                still.head(n).setZero();
+                out.to.head(n) -= lu_.solve(still).head(n);
             }
-            return system_.forms().admissible(head(to));
+            const double off_after = constraint_error(system_.residual(out.to));
+            out.feasible = off_before < 1e-3 && part == 1;
+            out.sound = system_.forms().admissible(head(out.to)) &&
+                        off_after <= (out.feasible ? 1e-3 : (1 - part / 2) * off_before);
         } catch (const SolveError&) {
-            return false;
         }
+        return out;
     }
 
     const StationarySystem& system_;
     Eigen::VectorXd& u_;
     int& iterations_;
     double size_;
-    double scale_ = 1, damping_ = 0, damping_start_ = 0;
+    double scale_, damping_start_, damping_;
     SparseLu lu_;
 };
 
@@ -276,34 +313,6 @@ void scale_to(const CurveForms& forms, const Constraints& c, Eigen::VectorXd& x)
     x *= c.area ? std::sqrt(*c.area / o.area) : std::cbrt(*c.volume / o.volume);
 }
 
-// Descends on one mesh; area and volume go from those of the start to the asked ones in steps.
-bool descend(StationarySystem& system, Eigen::VectorXd& u, double scale, int& iterations) {
-    const StationaryProblem goal = system.problem();
-    const CurveObservation o = system.forms().observe(u.head(system.space().size()));
-    const double v = reduced_volume(o.area, o.volume);
-    const auto off = [](const std::optional<double>& wanted, double is) {
-        return wanted ? std::abs(std::log(*wanted / is)) : 0;
-    };
-    const double distance = std::max({off(goal.constraints.area, o.area), off(goal.constraints.volume, o.volume),
-                                      off(goal.constraints.reduced_volume, v)});
-    const int stages = 1 + static_cast<int>(distance / 0.03);
-    bool done = false;
-    for (int k = 1; k <= stages; ++k) {
-        const auto between = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
-            if (!wanted) return wanted;
-            return k < stages ? is * std::pow(*wanted / is, static_cast<double>(k) / stages) : *wanted;
-        };
-        StationaryProblem stage = goal;
-        stage.constraints = {between(goal.constraints.area, o.area), between(goal.constraints.volume, o.volume),
-                             between(goal.constraints.reduced_volume, v)};
-        system.set_problem(stage);
-        Newton newton(system, u, iterations);
-        newton.begin_descent(scale);
-        done = newton.descend(k < stages ? 0.03 : 1e-3);
-    }
-    return done;
-}
-
 }  // namespace
 
 std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
@@ -320,76 +329,134 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
 
 namespace {
 
-// Newton on meshes that follow the shape found on the one before, until two of them, the second with half as many
-// elements again, agree in the energy.
+// Descends on one mesh; area and volume go from those of the start to the asked ones in steps, and the shape follows.
+bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
+    const StationaryProblem goal = system.problem();
+    const CurveObservation o = system.forms().observe(u.head(system.space().size()));
+    if (!(o.area > 0 && o.volume > 0)) return false;  // turned inside out by an attempt before
+    const double v = reduced_volume(o.area, o.volume);
+    const auto off = [](const std::optional<double>& wanted, double is) {
+        return wanted ? std::abs(std::log(*wanted / is)) : 0;
+    };
+    const double distance = std::max({off(goal.constraints.area, o.area), off(goal.constraints.volume, o.volume),
+                                      off(goal.constraints.reduced_volume, v)});
+    const int stages = 1 + static_cast<int>(distance / 0.03);
+    for (int k = 1; k < stages; ++k) {
+        const auto between = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
+            if (!wanted) return wanted;
+            return is * std::pow(*wanted / is, static_cast<double>(k) / stages);
+        };
+        StationaryProblem stage = goal;
+        stage.constraints = {between(goal.constraints.area, o.area), between(goal.constraints.volume, o.volume),
+                             between(goal.constraints.reduced_volume, v)};
+        system.set_problem(stage);
+        Newton(system, u, iterations).descend(std::max(0.03, tolerance), 30);
+    }
+    system.set_problem(goal);
+    return Newton(system, u, iterations).descend(tolerance);
+}
+
+// The stationary shape on one mesh; with `from_afar`, and wherever plain Newton steps fail, after a descent. False, and
+// u somewhere on the way, if there is none to be found.
+bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const EquilibriumSettings& settings,
+            Equilibrium& out) {
+    const int n = system.space().size();
+    if (!settings.descend) return Newton(system, u, out.iterations).converge(0.5);
+    bool found = !from_afar && Newton(system, u, out.iterations).converge(0.1);
+    for (double tolerance = 1e-3; !found && tolerance > 1e-6; tolerance *= 0.03)
+        found = descend(system, u, tolerance, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
+    // Newton's last steps, or a symmetry of the start, may lead to a saddle: leave it downhill.
+    for (int k = 0; k < 3 && found; ++k) {
+        const Variation variation = system.variation(u, true);
+        if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;
+        const double size = std::sqrt(system.forms().observe(u.head(n)).area);
+        u.head(n) += 0.01 * size / variation.lowest.lpNorm<Eigen::Infinity>() * variation.lowest;
+        found = descend(system, u, 1e-3, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
+    }
+    return found;
+}
+
+// What energies on a sequence of meshes tell of the error of the last but one.
+class MeshComparison {
+public:
+    // Infinite until there are two in a row.
+    double operator()(double energy, int elements, int degree) {
+        double error = std::numeric_limits<double>::infinity();
+        if (elements_ > 0) {
+            const double change = std::abs(energy - energy_);
+            // Two energies may be close by accident. By the order of convergence, or 8, the change before tells too.
+            const int order = std::min(2 * (degree - 1), 8);
+            error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, order));
+            change_ = change;
+        }
+        energy_ = energy, elements_ = elements;
+        return error;
+    }
+    void restart() { elements_ = 0, change_ = 0; }
+
+private:
+    double energy_ = 0, change_ = 0;
+    int elements_ = 0;
+};
+
+// A mesh for the shape that has been found on the present one. The jumps that the defect is read from tell less than
+// there is to lose on a coarse mesh: half as many elements again at least.
+std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
+                                int max_elements) {
+    const int elements = space.splines().elements();
+    const std::vector<double> breaks =
+        adapted_breaks(space.splines(), defect, 0.1 * allowed, std::max(coarsest / space.images(), elements));
+    const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (elements + 1) / 2);
+    return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
+}
+
+// Newton on meshes that follow the shape found on the one before, until their energies agree.
 Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveSpace> space, Eigen::VectorXd u,
                   double gauge, const EquilibriumSettings& settings) {
     Equilibrium out;
-    const auto fail = [&](Stop stop, std::string message) {
+    const auto end = [&](Stop stop, std::string message) {
         out.stop = stop, out.message = std::move(message);
         return out;
     };
-    std::optional<double> energy_before;
+    MeshComparison compare;
     bool found = false;
     for (int round = 0; round < 16; ++round) {
         StationarySystem system(space, problem, gauge);
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         out.reference_energy = system.forms().reference_energy(out.x);
-        const auto converge = [&] {
-            try {
-                return Newton(system, u, out.iterations).converge();
-            } catch (const SolveError&) {
-                return false;
-            }
-        };
-        const bool settled = found || !settings.descend;
-        found = settled || descend(system, u, out.reference_energy, out.iterations);
-        found = converge() && found;
-        // Newton's last steps, or a symmetry of the start, may lead to a saddle: leave it downhill.
-        for (int k = 0; k < 3 && found && settings.descend; ++k) {
-            const Variation variation = system.variation(u, true);
-            if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;
-            const double size = std::sqrt(system.forms().observe(u.head(n)).area);
-            u.head(n) += 0.01 * size / variation.lowest.lpNorm<Eigen::Infinity>() * variation.lowest;
-            found = descend(system, u, out.reference_energy, out.iterations) && converge();
-        }
+        found = settle(system, u, !found, settings, out);
         const Eigen::VectorXd x = u.head(n);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
         std::vector<double> defect;
         out.x = x, out.sigma = u[n], out.P = u[n + 1];
         out.observed = system.forms().observe(x, &defect);
-        double lost = 0;
-        for (double d : defect) lost += d;
-        if (energy_before) lost = std::max(lost, std::abs(out.observed.energy - *energy_before));
-        out.estimated_error = lost / out.reference_energy;
-        if (found && energy_before && out.estimated_error <= settings.accuracy) {
+        if (!found) compare.restart();
+        const double error =
+            found ? compare(out.observed.energy, elements, settings.degree) : std::numeric_limits<double>::infinity();
+        // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
+        const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
+        out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
+        if (out.estimated_error <= settings.accuracy) {
             if (const auto where = self_intersection(*space, x))
-                return fail(Stop::self_intersection,
-                            fmt::format("the stationary shape meets itself at s = {:.4f} and {:.4f}", (*where)[0],
-                                        (*where)[1]));
-            out.stop = Stop::finished;
-            return out;
+                return end(Stop::self_intersection,
+                           fmt::format("the stationary shape meets itself at s = {:.4f} and {:.4f}", (*where)[0],
+                                       (*where)[1]));
+            return end(Stop::finished, "");
         }
         if (elements >= settings.max_elements)
-            return fail(Stop::resolution_lost, fmt::format("{} elements leave an error of {:.1e} of the energy",
-                                                           elements, out.estimated_error));
-        // The jumps that the defect is read from tell less than there is to lose on a coarse mesh: never fewer
-        // elements than before, and half as many again to compare with.
-        const double target = 0.1 * settings.accuracy * out.reference_energy;
-        std::vector<double> breaks =
-            adapted_breaks(space->splines(), defect, target, std::max(coarsest / space->images(), elements));
-        const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (elements + 1) / 2);
-        breaks = regraded(breaks, std::min({wanted, 2 * elements, settings.max_elements}));
-        energy_before = std::nullopt;
-        if (found) energy_before = out.observed.energy;
-        const auto finer = make_space(space->topology(), space->length(), breaks, settings.degree);
+            return end(Stop::resolution_lost, fmt::format("{} elements leave an error of {:.1e} of the energy",
+                                                          elements, out.estimated_error));
+        const auto finer =
+            make_space(space->topology(), space->length(),
+                       next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements),
+                       settings.degree);
         Eigen::VectorXd next(finer->size() + 3);
         next << finer->prolong(*space, x), u.tail(3);
         space = finer, u = next;
     }
-    return fail(Stop::solver_failed,
-                fmt::format("Newton's method does not converge ({} iterations); try another start", out.iterations));
+    return end(Stop::solver_failed,
+               fmt::format("Newton's method does not converge ({} iterations); try another start", out.iterations));
 }
 
 }  // namespace
