@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -87,6 +88,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     };
     const Vector n_r = space.r().project([&](double s) { return normal(s)[0]; });
     const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
+    std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
     for (int e = 0; e < splines.elements(); ++e)
         for (int group = 0; group < splines.groups(); ++group) {
             const auto& b = splines.basis(e, group);
@@ -107,8 +109,41 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
                 for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
                 points_.push_back(p);
+                first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q]});
             }
         }
+    set_force(first_variation);
+}
+
+// (force, phi) = -first variation by phi, for all phi of a scalar field.
+void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_variation) {
+    const ProfileSpace& splines = shape_.space->splines();
+    const Field field(splines, shape_.space->scalar_parity());
+    const int n = field.size(), width = splines.width(), per_element = splines.groups() * lanes;
+    Matrix mass = Matrix::Zero(n, n);
+    Vector load = Vector::Zero(n);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto& d = first_variation[k];
+        for (int a = 0; a < width; ++a) {
+            const int i = field.dofs(e)[a];
+            const double sign = field.signs(e)[a], f0 = sign * b.by_spline[q][0][a];
+            load[i] -= p.weight * (d[0] * f0 + sign * (d[1] * b.by_spline[q][1][a] + d[2] * b.by_spline[q][2][a]));
+            for (int c = 0; c < width; ++c)
+                mass(field.dofs(e)[c], i) +=
+                    p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
+        }
+    }
+    const Vector force = Eigen::PartialPivLU<Matrix>(mass).solve(load);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        points_[k].force = 0;
+        for (int a = 0; a < width; ++a)
+            points_[k].force += field.signs(e)[a] * force[field.dofs(e)[a]] * b.by_spline[q][0][a];
+    }
 }
 
 std::vector<Parity> ModeStability::parities(int m) const {
@@ -193,6 +228,7 @@ void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int
                 const double ds = p.weight, dS = ds * p.r * p.g;
                 Eigen::Matrix3d C;
                 C(0, 0) = Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t);
+                C(0, 0) -= p.force * p.H * p.along * p.along * p.r * p.g;
                 C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
                 C(0, 2) = C(2, 0) = Q(W, W_ss) - m2 * Q(W_ss, W_tt);
                 C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);

@@ -23,8 +23,9 @@ struct ModeRates {
 };
 
 // The second variation of E + sigma A + P V as a quadratic form in (w, w_s, w_theta, w_ss, w_s_theta, w_theta_theta),
-// at each quadrature point of the shape. It holds for stationary shapes: for others the choice of the displacement at
-// second order would matter.
+// at each quadrature point of the shape. A shape that is not stationary moves, and the rates are those of the flow
+// linearised about that motion at this instant, of the gradient flow only (maths 5, last line): the force b on it adds
+// -INT b H w^2 dS to the form of displacements along straight normals.
 class ModeStability {
 public:
     ModeStability(const StationaryProblem& problem, const Equilibrium& shape);
@@ -35,6 +36,7 @@ public:
     ModeRates rates(int m, Dissipation dissipation, int count = 3) const;
 
 private:
+    void set_force(const std::vector<std::array<double, 3>>& first_variation);
     // What the pole, or a plane of symmetry, makes of w.
     std::vector<Parity> parities(int m) const;
     void add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const;
@@ -43,6 +45,7 @@ private:
         double weight, r, g, normal_r, normal_z, H;  // weight: ds r g, of the curve and not of its mirror image
         double along;                                // n . nu, of the displacement w n
         std::array<double, 21> Q;                    // packed, per ds and dtheta
+        double force;  // b and the multipliers: what drives the shape, 0 if it is stationary
     };
 
     StationaryProblem problem_;

@@ -107,6 +107,45 @@ TEST(ModeStability, tube) {
     }
 }
 
+TEST(ModeStability, shapesThatMove) {
+    // Exact: the same rates without tension (maths 5, 6): of the flow linearised about a sphere or a tube that shrinks
+    // or grows. Nothing is held, so the change of radius counts, l = 0 or q = m = 0: d(dR/dt)/dR.
+    const Law law;
+    const Bending energy = law.bending();
+    {
+        const double R = 1.2, h = -2 / R - law.H0;
+        const Equilibrium e = held(meridian(Sphere{R, {}}), energy, 24, 5, 0, 0);
+        const ModeStability stability({energy, {}}, e);
+        for (int mode = 0; mode <= 3; ++mode) {
+            std::vector<double> expected;
+            for (int l = std::max(mode, mode == 1 ? 2 : 0); l < mode + 4; ++l) {
+                const double Lam = l * (l + 1), L = Lam - 2;
+                if (l != 1)
+                    expected.push_back(-(L / (R * R)) *
+                                       (law.F2(h) * L / (R * R) + law.f(h) + law.k42 * (2 * Lam - 5) / std::pow(R, 4)));
+            }
+            std::sort(expected.begin(), expected.end(), std::greater<>());
+            const auto found = stability.rates(mode, Dissipation::gradient_flow, 2).rates;
+            for (int i = 0; i < 2; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 1e-6) << mode << " " << i;
+        }
+    }
+    const double R = 0.8, length = 3, h = -1 / R - law.H0;
+    const Equilibrium e = held(meridian(Tube{R, length, {}}), energy, 24, 5, 0, 0);
+    const ModeStability stability({energy, {}}, e);
+    for (int mode = 0; mode <= 2; ++mode) {
+        std::vector<double> expected;
+        for (int n = mode == 1 ? 1 : 0; n <= 2; ++n) {
+            const double q = 2 * pi * n / length, Z = q * q + (mode * mode - 1) / (R * R);
+            expected.push_back(-(law.F2(h) * Z * Z + (law.f(h) + law.F1(h) / R) * Z - 2 * law.F1(h) * q * q / R +
+                                 2 * law.k42 * std::pow(q, 4) / (R * R)));
+            if (n > 0) expected.push_back(expected.back());
+        }
+        std::sort(expected.begin(), expected.end(), std::greater<>());
+        const auto found = stability.rates(mode, Dissipation::gradient_flow, 3).rates;
+        for (int i = 0; i < 3; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 1e-6) << mode << " " << i;
+    }
+}
+
 double rate_of_mode_two(const StationaryProblem& problem, const Meridian& start) {
     EquilibriumSettings settings;
     settings.accuracy = 1e-8;
