@@ -123,6 +123,17 @@ Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
     return {south || north ? 0 : at.r, at.z, p.H, p.K};
 }
 
+Dissipation dissipation(const Model& model) {
+    switch (model.kind) {
+        case ModelKind::gradient_flow:
+            return Dissipation::gradient_flow;
+        case ModelKind::overdamped:
+            return Dissipation::overdamped;
+        default:  // the reader allows no fluid here
+            return Dissipation::stokes(model.Re, model.gamma);
+    }
+}
+
 class Writer {
 public:
     Writer(const Case& c, const Task& task, RunObserver& observer)
@@ -133,10 +144,7 @@ public:
         StationaryProblem problem = task_.problem;
         if (task_.set) task_.set(problem, point.parameter);
         std::vector<ModeRates> modes;
-        if (c_.equilibrium->modes)
-            modes = mode_stability(
-                problem, e, *c_.equilibrium->modes,
-                c_.model.kind == ModelKind::overdamped ? Dissipation::overdamped : Dissipation::gradient_flow);
+        if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, dissipation(c_.model));
         observer_.row(row(point, modes));
         observer_.frame([&] { return frame(point, modes); });
         observer_.progress(point.parameter, e.observed.energy, 0);

@@ -103,8 +103,10 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
-                p.r = r[0][q], p.g = 1 / base.inverse_speed[q], p.H = base.H[q];
-                p.weight = b.weight[q];
+                p.weight = b.weight[q], p.r = r[0][q], p.z = z[0][q], p.g = 1 / base.inverse_speed[q];
+                p.kappa_s = base.kappa_s[q], p.kappa_theta = base.kappa_theta[q], p.H = base.H[q];
+                p.slope = r[1][q] / p.g;
+                p.stretching = (r[1][q] * r[2][q] + z[1][q] * z[2][q]) / (p.g * p.g);
                 p.normal_r = z[1][q] / p.g, p.normal_z = -r[1][q] / p.g;
                 p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
                 for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
@@ -210,107 +212,188 @@ Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
 
 }  // namespace
 
-void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const {
-    const CurveSpace& space = *shape_.space;
-    const ProfileSpace& splines = space.splines();
-    const Field field(splines, parity);
-    const int n = field.size(), width = splines.width();
+// Under reflection at a plane of symmetry; 0 if the curve ends at none.
+int ModeStability::mirror(Parity parity) const {
+    const Topology t = shape_.space->topology();
+    return t == Topology::cell || t == Topology::tube ? 0 : parity.end;
+}
+
+struct ModeStability::Forms {
+    Matrix second_variation, mass, gradients, source;  // INT |grad f|^2, INT H f w
+    Vector area, volume, mean;
+    Vector rigid[2];  // translation along or across the axis, tilt
+
+    explicit Forms(int n)
+        : second_variation(Matrix::Zero(n, n)),
+          mass(second_variation),
+          gradients(second_variation),
+          source(second_variation),
+          area(Vector::Zero(n)),
+          volume(area),
+          mean(area),
+          rigid{area, area} {}
+};
+
+ModeStability::Forms ModeStability::assemble(int m, const Field& field) const {
+    const ProfileSpace& splines = field.splines();
+    const int width = splines.width(), per_element = splines.groups() * lanes;
     const double m2 = m * m;
-    Matrix A = Matrix::Zero(n, n), mass = A, stiffness = A, source = A;
-    Vector area = Vector::Zero(n), volume = area, mean = area, rigid[2] = {area, area};
-    const Point* point = points_.data();
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int group = 0; group < splines.groups(); ++group) {
-            const auto& b = splines.basis(e, group);
-            for (int q = 0; q < lanes; ++q, ++point) {
-                const Point& p = *point;
-                const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
-                const double ds = p.weight, dS = ds * p.r * p.g;
-                Eigen::Matrix3d C;
-                C(0, 0) = Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t);
-                C(0, 0) -= p.force * p.H * p.along * p.along * p.r * p.g;
-                C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
-                C(0, 2) = C(2, 0) = Q(W, W_ss) - m2 * Q(W_ss, W_tt);
-                C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);
-                C(1, 2) = C(2, 1) = Q(W_s, W_ss);
-                C(2, 2) = Q(W_ss, W_ss);
-                // Translations along and across the axis, and the tilt, as normal displacements over cos(m theta).
-                const double z = space.evaluate(shape_.x, b.z[q]).z;
-                const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, z * p.normal_r - p.r * p.normal_z};
-                for (int a = 0; a < width; ++a) {
-                    const int i = field.dofs(e)[a];
-                    const double sign = field.signs(e)[a];
-                    const Eigen::Vector3d v(sign * b.by_spline[q][0][a], sign * b.by_spline[q][1][a],
-                                            sign * b.by_spline[q][2][a]);
-                    const Eigen::Vector3d Cv = ds * (C * v);
-                    area[i] -= dS * p.H * p.along * v[0];
-                    volume[i] += dS * p.along * v[0];
-                    mean[i] += dS * v[0];
-                    for (int k = 0; k < 2; ++k) rigid[k][i] += dS * p.along * motion[k] * v[0];
-                    for (int c = 0; c < width; ++c) {
-                        const int j = field.dofs(e)[c];
-                        const double other = field.signs(e)[c];
-                        const double f0 = other * b.by_spline[q][0][c], f1 = other * b.by_spline[q][1][c],
-                                     f2 = other * b.by_spline[q][2][c];
-                        A(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2];
-                        mass(j, i) += dS * p.along * p.along * f0 * v[0];
-                        stiffness(j, i) += dS * (f1 * v[1] / (p.g * p.g) + m2 / (p.r * p.r) * f0 * v[0]);
-                        source(j, i) += dS * p.H * p.along * f0 * v[0];
-                    }
-                }
+    Forms forms(field.size());
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
+        const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
+        Eigen::Matrix3d C;
+        C(0, 0) =
+            Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t) - p.force * p.H * n2 * p.r * p.g;
+        C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
+        C(0, 2) = C(2, 0) = Q(W, W_ss) - m2 * Q(W_ss, W_tt);
+        C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);
+        C(1, 2) = C(2, 1) = Q(W_s, W_ss);
+        C(2, 2) = Q(W_ss, W_ss);
+        // Rigid motions as normal displacements over cos(m theta).
+        const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, p.z * p.normal_r - p.r * p.normal_z};
+        for (int a = 0; a < width; ++a) {
+            const int i = field.dofs(e)[a];
+            const double sign = field.signs(e)[a];
+            const Eigen::Vector3d v(sign * b.by_spline[q][0][a], sign * b.by_spline[q][1][a],
+                                    sign * b.by_spline[q][2][a]);
+            const Eigen::Vector3d Cv = p.weight * (C * v);
+            forms.area[i] -= dS * p.H * p.along * v[0];
+            forms.volume[i] += dS * p.along * v[0];
+            forms.mean[i] += dS * v[0];
+            for (int l = 0; l < 2; ++l) forms.rigid[l][i] += dS * p.along * motion[l] * v[0];
+            for (int c = 0; c < width; ++c) {
+                const int j = field.dofs(e)[c];
+                const double other = field.signs(e)[c], f0 = other * b.by_spline[q][0][c],
+                             f1 = other * b.by_spline[q][1][c], f2 = other * b.by_spline[q][2][c];
+                forms.second_variation(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2];
+                forms.mass(j, i) += dS * n2 * f0 * v[0];
+                forms.gradients(j, i) += dS * (f1 * v[1] / (p.g * p.g) + m2 / (p.r * p.r) * f0 * v[0]);
+                forms.source(j, i) += dS * p.H * p.along * f0 * v[0];
             }
         }
-    // Functions that are regular at a pole begin with the power m of the distance: parity does it for m = 0 and 1; even
-    // ones must vanish, odd ones be flat.
-    Matrix pole(n, 0);
-    const auto regular_at = [&](int e, double s) {
+    }
+    return forms;
+}
+
+// A basis of the functions that begin with the power m of the distance at a pole. Parity does it for m = 0 and 1; of
+// the others the even ones must vanish, the odd ones be flat.
+Matrix ModeStability::regular(int m, const Field& field) const {
+    const ProfileSpace& splines = field.splines();
+    Matrix at_poles(field.size(), 0);
+    const auto require = [&](int e, double s) {
         double values[3 * ProfileSpace::max_width];
         splines.splines(e, s, 2, values);
-        Vector functional = Vector::Zero(n);
-        for (int a = 0; a < width; ++a) functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * width + a];
-        append(pole, functional.normalized());
+        Vector functional = Vector::Zero(field.size());
+        for (int a = 0; a < splines.width(); ++a)
+            functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * splines.width() + a];
+        append(at_poles, functional.normalized());
     };
-    if (space.closed() && m >= 2) {
-        regular_at(0, 0);
-        if (space.topology() == Topology::cell) regular_at(splines.elements() - 1, 1);
+    if (shape_.space->closed() && m >= 2) {
+        require(0, 0);
+        if (shape_.space->topology() == Topology::cell) require(splines.elements() - 1, 1);
     }
-    const Matrix regular = complement(pole);
+    return complement(at_poles);
+}
 
-    // Under reflection at a plane of symmetry, if the curve ends at one.
-    const int mirror = space.topology() == Topology::cell || space.topology() == Topology::tube ? 0 : parity.end;
-    Matrix M = mass;
-    const bool overdamped = dissipation == Dissipation::overdamped;
-    if (overdamped) {
-        // The tangential velocity of least norm with div u_T = H w is a gradient: u_T = grad chi, Lap chi = H w.
-        Matrix potential = regular;
-        if (m == 0 && mirror >= 0) potential = complement(mean);
-        const Matrix L = potential.transpose() * stiffness * potential, S = potential.transpose() * source;
-        M += S.transpose() * Eigen::LDLT<Matrix>(L).solve(S);
+// The dissipation of w nu with the best tangential velocity, as a quadratic form in w. That velocity is grad chi + nu x
+// grad psi, w and chi going with cos(m theta), psi with sin: inextensibility is Lap chi = H w, and psi is free.
+Matrix ModeStability::dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+                                       const Forms& forms) const {
+    if (!dissipation.flows) return dissipation.friction * forms.mass;
+    const bool constants = m == 0 && mirror(parity) >= 0;
+    const Matrix basis = constants ? complement(forms.mean) : regular(m, field);
+    const Matrix L = basis.transpose() * forms.gradients * basis, S = basis.transpose() * forms.source;
+    const Matrix X = -Eigen::LDLT<Matrix>(L).solve(S);  // chi of w, in the basis
+    Matrix M = dissipation.friction * (forms.mass + X.transpose() * L * X);
+    if (dissipation.viscosity == 0) return M;
+
+    // sigma at each point as a linear map of (w, chi, psi): its components ss, theta theta, s theta times sqrt 2.
+    const Parity turned{mirror(parity) == 0      ? parity.start
+                        : shape_.space->closed() ? parity.start
+                                                 : -parity.start,
+                        mirror(parity) == 0 ? parity.end : -parity.end};
+    const Field psi(field.splines(), turned);
+    const ProfileSpace& splines = field.splines();
+    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = splines.width(),
+              per_element = splines.groups() * lanes;
+    Matrix sigma = Matrix::Zero(3 * static_cast<Eigen::Index>(points_.size()), 2 * n + swirls);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const double root = std::sqrt(p.weight * p.r * p.g), sqrt2 = std::sqrt(2.0), rate = p.slope / p.r, mr = m / p.r;
+        const auto add = [&](int column, double factor, double ss, double tt, double st) {
+            const Eigen::Index row = 3 * static_cast<Eigen::Index>(k);
+            sigma(row, column) += factor * ss;
+            sigma(row + 1, column) += factor * tt;
+            sigma(row + 2, column) += factor * st;
+        };
+        for (int a = 0; a < width; ++a) {
+            const double f = root * b.by_spline[q][0][a], f1 = root * b.by_spline[q][1][a], f_s = f1 / p.g,
+                         f_ss = (root * b.by_spline[q][2][a] - p.stretching * f1) / (p.g * p.g);
+            const double twist = mr * (f_s - rate * f);
+            const int i = field.dofs(e)[a];
+            add(i, -field.signs(e)[a] * p.along * f, p.kappa_s, p.kappa_theta, 0);
+            add(n + i, field.signs(e)[a], f_ss, rate * f_s - mr * mr * f, -sqrt2 * twist);
+            if (swirls > 0)
+                add(2 * n + psi.dofs(e)[a], psi.signs(e)[a], -twist, twist, (mr * mr * f + f_ss - rate * f_s) / sqrt2);
+        }
     }
-    Matrix fixed = pole;
-    if (m == 0 && mirror >= 0) {
+    const Matrix of_w = sigma.leftCols(n) + sigma.middleCols(n, n) * (basis * X);
+    M += 2 * dissipation.viscosity * of_w.transpose() * of_w;
+    if (swirls == 0) return M;
+    // The best psi. Motions of the whole that cost nothing may be among its choices: least squares then.
+    const Matrix basis_psi = regular(m, psi), of_psi = sigma.rightCols(swirls) * basis_psi;
+    const Matrix cross = 2 * dissipation.viscosity * of_psi.transpose() * of_w;
+    const Matrix own = 2 * dissipation.viscosity * of_psi.transpose() * of_psi +
+                       dissipation.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
+    return M - cross.transpose() * Eigen::CompleteOrthogonalDecomposition<Matrix>(own).solve(cross);
+}
+
+// What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
+// rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a tilt are odd, a
+// translation across it is even.
+Matrix ModeStability::fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+                                        const Matrix& M) const {
+    const CurveSpace& space = *shape_.space;
+    Matrix fixed(forms.mean.size(), 0);
+    if (m == 0 && mirror(parity) >= 0) {
         const Constraints& c = problem_.constraints;
-        if (overdamped || c.area) append(fixed, area.normalized());
-        if (overdamped || c.volume) append(fixed, volume.normalized());
-        if (!overdamped && c.reduced_volume) {
+        if (dissipation.flows || c.area) append(fixed, forms.area.normalized());
+        if (dissipation.flows || c.volume) append(fixed, forms.volume.normalized());
+        if (!dissipation.flows && c.reduced_volume) {
             // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
             const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;
             const double whole = 2 * pi * space.images();
-            append(fixed, (volume - slope * area).normalized());
-            A -= whole * shape_.P * slope / (2 * shape_.observed.area) * area * area.transpose();
+            append(fixed, (forms.volume - slope * forms.area).normalized());
+            forms.second_variation -=
+                whole * shape_.P * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
         }
     }
-    // Rigid motions: the displacements orthogonal to them in M are left. At a plane of symmetry a translation along the
-    // axis and a tilt are odd, a translation across it is even.
-    const Eigen::LDLT<Matrix> projection(mass);
+    const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
-        if (!exists || mirror == (across ? -1 : 1)) continue;
-        const Vector coefficients = projection.solve(rigid[k]);
-        if (coefficients.dot(mass * coefficients) > 1e-12 * mass.sum()) append(fixed, (M * coefficients).normalized());
+        if (!exists || mirror(parity) == (across ? -1 : 1)) continue;
+        const Vector motion = projection.solve(forms.rigid[k]);
+        if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
+        // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.
+        append(fixed, ((dissipation.friction > 0 ? M : forms.mass) * motion).normalized());
     }
-    const Matrix free = complement(fixed);
-    const Spectrum found = smallest(free.transpose() * A * free, free.transpose() * M * free, count);
+    return fixed;
+}
+
+void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const {
+    const Field field(shape_.space->splines(), parity);
+    Forms forms = assemble(m, field);
+    const Matrix M = dissipation_form(m, dissipation, parity, field, forms), basis = regular(m, field);
+    const Matrix fixed = fixed_functionals(m, dissipation, parity, forms, M);
+    const Matrix free = basis * complement(basis.transpose() * fixed);
+    const Spectrum found =
+        smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);
 
     const double fastest_before = out.rates.empty() ? -std::numeric_limits<double>::infinity() : out.rates[0];
     for (double value : found.values) out.rates.push_back(-value);

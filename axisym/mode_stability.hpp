@@ -10,10 +10,18 @@
 
 namespace tubule::axisym {
 
-enum class Dissipation {
-    gradient_flow,  // INT w^2: the constraints of the problem hold (for m = 0; for others they hold by themselves)
-    overdamped      // INT |u|^2 with local inextensibility: the least over all tangential velocities; volume fixed
+// What the rate of a displacement is paid with: the dissipation 2 viscosity INT |sigma(u)|^2 + friction INT |u|^2
+// (maths 3). Without flow u is w nu alone, and the constraints of the problem hold (for m = 0; for others they hold by
+// themselves). With flow the membrane is locally inextensible, its volume fixed, and the tangential velocity the one of
+// least dissipation.
+struct Dissipation {
+    bool flows = false;
+    double viscosity = 0, friction = 1;  // viscosity 1/Re
+    static const Dissipation gradient_flow, overdamped;
+    static Dissipation stokes(double Re, double gamma) { return {true, 1 / Re, gamma}; }
 };
+inline constexpr Dissipation Dissipation::gradient_flow{};
+inline constexpr Dissipation Dissipation::overdamped{.flows = true};
 
 struct ModeRates {
     int m = 0;
@@ -36,17 +44,26 @@ public:
     ModeRates rates(int m, Dissipation dissipation, int count = 3) const;
 
 private:
-    void set_force(const std::vector<std::array<double, 3>>& first_variation);
-    // What the pole, or a plane of symmetry, makes of w.
-    std::vector<Parity> parities(int m) const;
-    void add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const;
-
     struct Point {
-        double weight, r, g, normal_r, normal_z, H;  // weight: ds r g, of the curve and not of its mirror image
-        double along;                                // n . nu, of the displacement w n
-        std::array<double, 21> Q;                    // packed, per ds and dtheta
-        double force;  // b and the multipliers: what drives the shape, 0 if it is stationary
+        double weight, r, g, kappa_s, kappa_theta, H, slope, stretching;  // slope dr/ds of arc length, d log g / d s
+        double normal_r, normal_z, z;
+        double along;              // n . nu, of the displacement w n
+        std::array<double, 21> Q;  // packed, per ds and dtheta
+        double force;              // b and the multipliers: what drives the shape, 0 if it is stationary
     };
+    // Quadratic and linear forms of one m, per dtheta and over the curve alone, not its mirror image.
+    struct Forms;
+
+    void set_force(const std::vector<std::array<double, 3>>& first_variation);
+    std::vector<Parity> parities(int m) const;
+    int mirror(Parity parity) const;
+    Forms assemble(int m, const Field& field) const;
+    Eigen::MatrixXd regular(int m, const Field& field) const;
+    Eigen::MatrixXd dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+                                     const Forms& forms) const;
+    Eigen::MatrixXd fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+                                      const Eigen::MatrixXd& M) const;
+    void add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const;
 
     StationaryProblem problem_;
     Equilibrium shape_;

@@ -285,10 +285,9 @@ void check_together(Keys& k, const Case& c) {
         k.check("model.volume",
                 [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
         k.check("model.kind", [&] {
-            const bool told = c.model.kind == ModelKind::gradient_flow || c.model.kind == ModelKind::overdamped;
-            return c.equilibrium->modes && !told ? "must be \"gradient-flow\" or \"overdamped\" with "
-                                                   "equilibrium.modes: other growth rates are not told"
-                                                 : "";
+            return c.equilibrium->modes && c.model.kind == ModelKind::fluid
+                       ? "must not be \"fluid\" with equilibrium.modes: growth rates are told without inertia"
+                       : "";
         });
         k.check("shape.kind", [&] {
             return std::holds_alternative<Torus>(c.shape)

@@ -116,10 +116,8 @@ TEST(EquilibriumCase, refusals) {
            "7:8: shape.kind must not be \"torus\": equilibria are cells, or tubes that mirror themselves");
     expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
            "11:10: model.volume must be absent: equilibrium.held says what is held fixed");
-    expect(
-        "[accuracy]", "[model]\nkind = \"stokes\"\n[accuracy]",
-        "11:8: model.kind must be \"gradient-flow\" or \"overdamped\" with equilibrium.modes: other growth rates are "
-        "not told");
+    expect("[accuracy]", "[model]\nkind = \"fluid\"\n[accuracy]",
+           "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates are told without inertia");
     expect("to = 0.0", "to = 0.12", " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; 1 to 10000 are possible");
     expect("modes = 1", "area = 1.0", " equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1");
 }
@@ -151,6 +149,20 @@ TEST(EquilibriumCase, branchOfShapes) {
     EXPECT_EQ(r.back(), 0);
     EXPECT_NEAR(z.back() - z.front(), 2.93276235152434, 1e-6);
     EXPECT_NEAR(H.front(), -2 * 2.017056842618144, 1e-3);
+}
+
+TEST(EquilibriumCase, growthRatesByTheModel) {
+    // Theorem: in the metric of more dissipation the same second variation decays more slowly; Re = 1 and gamma = 1
+    // dissipate more than gamma = 1 alone, which is the overdamped model.
+    const std::string single = good.substr(0, good.find("[equilibrium.branch]"));
+    const double gradient = outcome(single).at("growth_1", 0),
+                 overdamped = outcome(single, {"model.kind=overdamped"}).at("growth_1", 0),
+                 stokes = outcome(single, {"model.kind=stokes", "model.Re=1.0", "model.gamma=1.0"}).at("growth_1", 0),
+                 viscous = outcome(single, {"model.kind=stokes", "model.Re=0.1", "model.gamma=1.0"}).at("growth_1", 0);
+    EXPECT_LT(gradient, overdamped);
+    EXPECT_LT(overdamped, stokes);
+    EXPECT_LT(stokes, viscous);
+    EXPECT_LT(viscous, 0);
 }
 
 TEST(EquilibriumCase, whatIsHeld) {

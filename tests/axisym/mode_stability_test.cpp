@@ -53,13 +53,13 @@ TEST(ModeStability, sphere) {
             const Equilibrium e = held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, degree, law.sigma, P);
             const ModeStability stability(fixed(law.bending(), e), e);
             for (int mode = 0; mode <= 5; ++mode)
-                for (const Dissipation model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+                for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
                     const auto found = stability.rates(mode, model, 3);
                     ASSERT_EQ(found.rates.size(), 3u);
                     EXPECT_TRUE(found.stable());
                     for (int i = 0; i < 3; ++i) {
                         const int l = std::max(mode, 2) + i, Lam = l * (l + 1);
-                        const double factor = model == Dissipation::overdamped ? Lam / (Lam + 4.0) : 1;
+                        const double factor = model.flows ? Lam / (Lam + 4.0) : 1;
                         EXPECT_NEAR(found.rates[i] / (factor * rate(l)), 1, 1e-7) << mode << " " << l << " " << degree;
                     }
                 }
@@ -89,14 +89,14 @@ TEST(ModeStability, tube) {
         const Equilibrium e = held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, P);
         const ModeStability stability(fixed(law.bending(), e), e);
         for (int mode = 0; mode <= 3; ++mode)
-            for (const Dissipation model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+            for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
                 std::vector<double> expected;
                 for (int n = 0; n <= 3; ++n) {
                     const double q = 2 * pi * n / length, Q = q * q + mode * mode / (R * R), Z = Q - 1 / (R * R);
                     if (n == 0 && mode < 2) continue;  // excluded, or rigid
                     const double s = -(law.F2(h) * Z * Z + (law.f(h) + law.F1(h) / R + law.sigma) * Z -
                                        2 * law.F1(h) * q * q / R + 2 * law.k42 * std::pow(q, 4) / (R * R));
-                    const double factor = model == Dissipation::overdamped ? Q * R * R / (Q * R * R + 1) : 1;
+                    const double factor = model.flows ? Q * R * R / (Q * R * R + 1) : 1;
                     expected.insert(expected.end(), n > 0 ? 2 : 1, factor * s);
                 }
                 std::sort(expected.begin(), expected.end(), std::greater<>());
@@ -104,6 +104,63 @@ TEST(ModeStability, tube) {
                 for (int i = 0; i < 4; ++i)
                     EXPECT_NEAR(found.rates[i] / expected[i], 1, 1e-6) << "m " << mode << ", rate " << i;
             }
+    }
+}
+
+TEST(ModeStability, stokesFlow) {
+    // Exact (maths 5, 6, with p0 = -sigma, G = -s of the gradient flow with tension): sphere s = -Lam G/[gamma (Lam +
+    // 4) + 4 mu L/R^2]; tube s = -Q R^2 G / {gamma (Q R^2 + 1) + 4 mu q^2 - 4 mu^2 q^2 (m/R)^2/(gamma + mu Q)}.
+    const Law law;
+    for (const double gamma : {0.0, 0.8}) {
+        const double mu = 0.6;
+        const Dissipation stokes = Dissipation::stokes(1 / mu, gamma);
+        {
+            const double R = 1.2, h = -2 / R - law.H0;
+            const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4));
+            for (const Meridian& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))}) {
+                const Equilibrium e = held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, 5, law.sigma,
+                                           b0 - 2 * law.sigma / R);
+                const ModeStability stability(fixed(law.bending(), e), e);
+                for (int mode = 0; mode <= 4; ++mode) {
+                    const auto found = stability.rates(mode, stokes, 2).rates;
+                    for (int i = 0; i < 2; ++i) {
+                        const int l = std::max(mode, 2) + i;
+                        const double Lam = l * (l + 1), L = Lam - 2;
+                        const double G =
+                            L / (R * R) *
+                            (law.F2(h) * L / (R * R) + law.f(h) + law.k42 * (2 * Lam - 5) / std::pow(R, 4) + law.sigma);
+                        const double s = -Lam * G / (gamma * (Lam + 4) + 4 * mu * L / (R * R));
+                        EXPECT_NEAR(found[i] / s, 1, 1e-6) << "m " << mode << ", l " << l << ", gamma " << gamma;
+                    }
+                }
+            }
+        }
+        const double R = 0.8, length = 3, h = -1 / R - law.H0;
+        const double b0 = -(law.f(h) + law.F1(h) / R) / R;
+        for (const Meridian& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
+            const Equilibrium e =
+                held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, b0 - law.sigma / R);
+            const ModeStability stability(fixed(law.bending(), e), e);
+            for (int mode = 0; mode <= 2; ++mode) {
+                std::vector<double> expected;
+                for (int n = 0; n <= 4; ++n) {
+                    const double q = 2 * pi * n / length, Q = q * q + mode * mode / (R * R), Z = Q - 1 / (R * R);
+                    if (n == 0 && (mode < 2 || gamma == 0)) continue;  // excluded, rigid, or without dissipation
+                    const double G = law.F2(h) * Z * Z + (law.f(h) + law.F1(h) / R + law.sigma) * Z -
+                                     2 * law.F1(h) * q * q / R + 2 * law.k42 * std::pow(q, 4) / (R * R);
+                    const double twist = gamma + mu * Q, mode_R = mode / R;
+                    const double drag =
+                        gamma * (Q * R * R + 1) + 4 * mu * q * q - 4 * mu * mu * q * q * mode_R * mode_R / twist;
+                    expected.insert(expected.end(), n > 0 ? 2 : 1, -Q * R * R * G / drag);
+                }
+                if (gamma == 0 && mode > 1) continue;  // a tube flattens without any shear in q = 0: infinitely fast
+                std::sort(expected.begin(), expected.end(), std::greater<>());
+                const auto found = stability.rates(mode, stokes, 2).rates;
+                for (int i = 0; i < 2; ++i)
+                    EXPECT_NEAR(found[i] / expected[i], 1, 1e-5)
+                        << "m " << mode << ", rate " << i << ", gamma " << gamma;
+            }
+        }
     }
 }
 
@@ -196,7 +253,7 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
     const Equilibrium &before = branch.points[0].shape, &after = branch.points[2].shape;
     EXPECT_EQ(negative_directions(at(0.655), before), 0);
     EXPECT_EQ(negative_directions(at(0.655), after), 1);
-    for (const Dissipation model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+    for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
         EXPECT_TRUE(ModeStability(at(0.655), before).rates(0, model).stable());
         const auto found = ModeStability(at(0.655), after).rates(0, model);
         EXPECT_FALSE(found.stable());
