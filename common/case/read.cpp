@@ -33,7 +33,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         if (sets.empty() || message.starts_with("--set ")) throw;
         throw CaseError(fmt::format("{} (with --set {})", message, fmt::join(sets, " --set ")));
     }
-    if (!c.model.keeps_volume) c.model.keeps_volume = c.model.kind != ModelKind::gradient_flow;
+    if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = c.model.kind != ModelKind::gradient_flow;
     if (root.contains("expect") && !c.expect.stop) c.expect.stop = Stop::finished;
     return c;
 }

@@ -89,7 +89,7 @@ TEST(CaseRefusal, TextThatIsNoToml) {
 }
 
 TEST(CaseRefusal, UnknownKeysAndTables) {
-    const std::string tables = "tier, about, energy, model, velocity, shape, accuracy, discretisation, time, expect";
+    const std::string tables = "tier, about, energy, model, equilibrium, velocity, shape, accuracy, discretisation, time, expect";
     expect_refused({
         Edit{"tier =", "teir =", "1:1: unknown key teir; did you mean 'tier'? Allowed here: " + tables},
         Edit{"[discretisation]", "[speed]", "18:2: unknown key speed. Allowed here: " + tables},
@@ -125,7 +125,8 @@ TEST(CaseRefusal, UnknownSeries) {
         "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, "
         "r_min, r_max, energy_error, "
         "integral_H2, integral_K, gauss_bonnet_defect, elements, kinetic_energy, speed, momentum_z, "
-        "angular_momentum_z, lambda, mode_<n>";
+        "angular_momentum_z, lambda, parameter, special, reduced_volume, sigma, P, negative_directions, "
+        "meridian_length, height, r_middle, pole_curvature, distance_to_start, mode_<n>, growth_<m>";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
         Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
@@ -326,7 +327,7 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
         Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
         Override{"mode.0.n=1",
-                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, velocity, "
+                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, equilibrium, velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
                  "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
