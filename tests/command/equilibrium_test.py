@@ -1,6 +1,8 @@
 #!/usr/bin/python3
 """`tubule equilibrium`: its table, its result, results as starts, what it refuses. Argument: the program."""
+import subprocess
 import unittest
+from pathlib import Path
 
 from program import ProgramTest, about, series
 
@@ -25,6 +27,9 @@ step = 0.06
 """
 # Independent spectral reference (tests/axisym/equilibrium_test.cpp), k42 = 0.12, 0.06, 0.
 ENERGIES = (6.3849499091967346, 3.831523408595685, 1.2568365089070843)
+
+
+PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 
 
 class Equilibrium(ProgramTest):
@@ -65,6 +70,27 @@ class Equilibrium(ProgramTest):
         out, _ = self.tubule("equilibrium", case, status=3)
         self.assertIn("bifurcation", out)
         self.assertEqual(about(self.folder / "oblate.hdf")["stop"], "self-intersection")
+
+    def test_pictures(self):
+        case = self.write("branch_cell.toml", CAPSULE + BRANCH)
+        for length in (2, 3, 4):
+            self.tubule("equilibrium", "--quiet", case, "--set", f"shape.length={length}.0", "-o", f"l{length}.hdf")
+        single = self.write("single.toml", CAPSULE)
+        for k42 in (0, 0.06, 0.12):
+            for i, length in enumerate((2.0, 2.5)):
+                sets = ("--set", f"energy.k42={k42}", "--set", f"shape.length={length}")
+                self.tubule("equilibrium", "--quiet", single, *sets, "-o", f"length_{k42:g}_{i:02}.hdf")
+        for script, inputs, words in (
+            ("tubular.py", [self.folder], ("l = 4", "distance to the capsule")),
+            ("vesicles.py", [self.folder / "l2.hdf", self.folder / "l3.hdf"], ("reduced volume", "bifurcation")),
+        ):
+            picture = self.folder / f"{script}.svg"
+            done = subprocess.run([PLOT / script, *inputs, "-o", picture], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            for word in words:
+                self.assertIn(word, picture.read_text())
+            done = subprocess.run([PLOT / script, *inputs, "-o", "picture.txt"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2)
 
     def test_refusals(self):
         _, err = self.tubule("equilibrium", self.case, status=2)
