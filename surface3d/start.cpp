@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <stdexcept>
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/result.hpp"
+#include "common/shapes/profile_curve.hpp"
 #include "common/shapes/revolution.hpp"
+#include "surface3d/exact_curvature.hpp"
 #include "surface3d/graded_mesh.hpp"
 #include "surface3d/import_fit.hpp"
 #include "surface3d/mapped_mesh.hpp"
@@ -40,21 +44,36 @@ TriangleMesh uniform_tube(double radius, double length, int triangles) {
                       std::max(static_cast<int>(std::lround(around / side)), 3));
 }
 
+// The shape map(base), with its curvatures where the case wants the exact ones.
+template <class Map>
+StartMesh mapped(const Case& c, const TriangleMesh& base, const Map& map) {
+    const int order = c.surface.order;
+    StartMesh start{mapped_mesh(base, order, map), true, {}, {}};
+    if (c.surface.recovery == Recovery::exact) start.exact = exact_curvature(start.mesh, exact_nodes(base, order, map));
+    return start;
+}
+
 // The shape `map` over the profile's surface, in the kind of mesh that the case asks for.
 template <class Map, class Uniform>
 StartMesh meshed(const Case& c, int triangles, const Map& map, const Profile& profile, const Uniform& uniform) {
-    const int order = c.surface.order;
     const auto base = [&] {
         switch (c.surface.mesh) {
             case MeshKind::graded:
-                return graded_rings(resolution_of(map, profile, order), profile, triangles);
+                return graded_rings(resolution_of(map, profile, c.surface.order), profile, triangles);
             case MeshKind::irregular:
                 return jittered(uniform(), jitter, seed);
             default:
                 return uniform();
         }
     };
-    return {mapped_mesh(base(), order, map), true, {}};
+    return mapped(c, base(), map);
+}
+
+// The same where equal triangles need rings that follow the surface.
+template <class Map>
+StartMesh meshed_in_rings(const Case& c, int triangles, const Map& map, const Profile& profile) {
+    return meshed(c, triangles, map, profile,
+                  [&] { return uniform_rings(resolution_of(map, profile, c.surface.order), profile, triangles); });
 }
 
 std::filesystem::path beside(const Case& c, const std::string& path) {
@@ -100,9 +119,24 @@ struct MakeStart {
     const Case& c;
     int triangles;
 
-    void refuse_choice_of_triangles() const {
+    void refuse_what_needs_a_shape() const {
         if (c.surface.mesh != MeshKind::uniform || c.surface.elements)
             refuse(c, "discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+        if (c.surface.recovery == Recovery::exact)
+            refuse(
+                c,
+                "discretisation.recovery must not be \"exact\": of a surface made of triangles only points are known");
+    }
+    void refuse_grading(const char* shape) const {
+        if (c.surface.mesh == MeshKind::graded)
+            refuse(c, fmt::format("discretisation.mesh must be \"uniform\" or \"irregular\" for {}, not \"graded\"",
+                                  shape));
+    }
+    template <class Map>
+    StartMesh on_torus(const Torus& base, const Map& map) const {
+        refuse_grading("a torus");
+        const TriangleMesh grid = uniform_torus(base, triangles);
+        return mapped(c, c.surface.mesh == MeshKind::irregular ? jittered(grid, jitter, seed) : grid, map);
     }
 
     template <class SphereLike>
@@ -117,30 +151,30 @@ struct MakeStart {
             [&] { return uniform_tube(tube.radius, tube.length, triangles); });
     }
     StartMesh operator()(const Capsule& capsule) const {
-        const auto map = [&](const auto& p) { return position(capsule, p); };
-        const Profile profile = capsule_profile(capsule);
-        return meshed(c, triangles, map, profile,
-                      [&] { return uniform_rings(resolution_of(map, profile, c.surface.order), profile, triangles); });
+        return meshed_in_rings(
+            c, triangles, [&](const auto& p) { return position(capsule, p); }, capsule_profile(capsule));
     }
     StartMesh operator()(const Torus& torus) const {
-        if (c.surface.mesh == MeshKind::graded)
-            refuse(c, "discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
-        const auto map = [&](const auto& p) { return position(torus, p); };
-        const TriangleMesh base = uniform_torus(torus, triangles);
-        return {mapped_mesh(c.surface.mesh == MeshKind::irregular ? jittered(base, jitter, seed) : base,
-                            c.surface.order, map),
-                true,
-                {}};
+        return on_torus(torus, [&](const auto& p) { return position(torus, p); });
+    }
+    StartMesh operator()(const ProfileCurve& curve) const {
+        // Where the torus is only a base, its grid must be one of cells about as long as wide.
+        const Torus base{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
+        const auto map = [&](const auto& p) { return position(curve, base, p); };
+        if (curve.kind == ProfileCurve::Kind::ring) return on_torus(base, map);
+        const bool tube = curve.kind == ProfileCurve::Kind::tube;
+        return meshed_in_rings(c, triangles, map,
+                               tube ? tube_profile(curve.mean_radius, curve.length) : sphere_profile());
     }
     StartMesh operator()(const MeshFile& file) const {
-        refuse_choice_of_triangles();
+        refuse_what_needs_a_shape();
         try {
             ImportedMesh imported = read_mesh(beside(c, file.path), file.weld);
             close_mesh(imported);
             Fit fit = fit_surface(imported, {.order = c.surface.order, .smoothing = file.smoothing});
             std::vector<std::string> notes = imported.notes;
             notes.insert(notes.end(), fit.report.notes.begin(), fit.report.notes.end());
-            return {std::move(fit.surface), false, notes};
+            return {std::move(fit.surface), false, notes, {}};
         } catch (const MeshError& error) {
             refuse(c, fmt::format("shape.path: {}", error.what()));
         }
@@ -149,15 +183,22 @@ struct MakeStart {
         Result result;
         const Record frame = frame_of(c, from, result);
         if (frame.mesh) {
-            refuse_choice_of_triangles();
+            refuse_what_needs_a_shape();
             const CurvedMesh mesh = curved_mesh(result.meshes.at(*frame.mesh), *find_array(frame, "points"));
-            return {mesh.order == c.surface.order ? mesh : with_order(mesh, c.surface.order), false, {}};
+            return {mesh.order == c.surface.order ? mesh : with_order(mesh, c.surface.order), false, {}, {}};
         }
-        const Array *knots = find_array(frame, "knots"), *coefficients = find_array(frame, "coefficients");
-        if (!knots || !coefficients || !(number(frame, "length") > 0))
-            refuse(c, fmt::format("shape.path: {} holds no shape of a tube or surface", from.path));
-        const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data,
-                              coefficients->data};
+        if (find_array(frame, "knots") && find_array(frame, "coefficients")) return of_graph(frame);
+        const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");
+        if (!r || !z) refuse(c, fmt::format("shape.path: {} holds no surface and no profile of one", from.path));
+        try {
+            return (*this)(profile_curve(r->data, z->data, number(frame, "length")));
+        } catch (const std::invalid_argument& error) {
+            refuse(c, fmt::format("shape.path: {}: {}", from.path, error.what()));
+        }
+    }
+    StartMesh of_graph(const Record& frame) const {
+        const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"),
+                              find_array(frame, "knots")->data, find_array(frame, "coefficients")->data};
         double radius = 0;
         for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
         return meshed(

@@ -204,5 +204,11 @@ Jet<T, N, O> cos(const Jet<T, N, O>& a) {
     const T f = cos(a.v);
     return chain(a, f, T(-sin(a.v)), T(-f));
 }
+template <class T, int N, int O>
+Jet<T, N, O> atan2(const Jet<T, N, O>& y, const Jet<T, N, O>& x) {
+    using std::atan2;
+    const T q = inverse(T(x.v * x.v + y.v * y.v)), fy = x.v * q, fx = -(y.v * q);
+    return chain(y, x, T(atan2(y.v, x.v)), fy, fx, T(2.0 * fx * fy), T(fx * fx - fy * fy), T(-2.0 * fx * fy));
+}
 
 }  // namespace tubule
