@@ -167,6 +167,8 @@ CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recove
             return lifted(space, mesh);
         case Recovery::patch_nodal:
             return PatchRecovery(mesh).nodal(mesh);
+        case Recovery::exact:
+            throw std::invalid_argument("exact curvatures belong to a surface, not to the nodes of a mesh");
         default:
             return PatchRecovery(mesh).projected(space, mesh);
     }

@@ -21,7 +21,8 @@ struct CurvatureField {
     Eigen::VectorXd H, K;  // not in general those of the interpolated B
 };
 
-// All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate.
+// All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate. std::invalid_argument for
+// `exact`, which nodes do not tell (exact_curvature.hpp).
 CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recovery recovery = Recovery::patch);
 
 // The paper's smoothing, one implicit step of length eps >= 0 of heat flow on the surface: H and K are replaced by

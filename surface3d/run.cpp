@@ -36,7 +36,7 @@ Measured measure(const Case& c, StartMesh start, Recovery recovery) {
     const SurfaceSpace space(mesh);
     if ((out.stop = find_fold(space, mesh))) return out;
     try {
-        out.curvature = recover(space, mesh, recovery);
+        out.curvature = out.start.exact ? *out.start.exact : recover(space, mesh, recovery);
         if (c.surface.smoothing > 0) smooth(space, mesh, c.surface.smoothing, out.curvature);
     } catch (const SolveError& error) {
         out.stop = StopReport{Stop::solver_failed, 0, fmt::format("curvature: {}", error.what()), "use another mesh"};
@@ -69,7 +69,7 @@ struct Answer {
 // A mesh that is given: compared with the same triangles one order lower, or at the lowest with another recovery.
 Answer on_given_mesh(const Case& c, StartMesh start) {
     const int order = start.mesh.order;
-    const Measured other = order > 2 ? measure(c, {with_order(start.mesh, order - 1), false, {}}, c.surface.recovery)
+    const Measured other = order > 2 ? measure(c, {with_order(start.mesh, order - 1), false, {}, {}}, c.surface.recovery)
                                      : measure(c, start, Recovery::normal);
     Answer answer{measure(c, std::move(start), c.surface.recovery), 0, 1};
     answer.error = given_mesh_margin * std::abs(answer.measured.o.energy - other.o.energy);

@@ -1,22 +1,25 @@
 // The curved mesh that a case begins with.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "surface3d/curved_mesh.hpp"
+#include "surface3d/curvature.hpp"
 
 namespace tubule::surface3d {
 
 struct StartMesh {
     CurvedMesh mesh;
-    bool resizable = true;           // whether the number of triangles can be chosen; a file brings its own
-    std::vector<std::string> notes;  // what was changed on the way, in whole sentences
+    bool resizable = true;                // whether the number of triangles can be chosen; a file brings its own
+    std::vector<std::string> notes;       // what was changed on the way, in whole sentences
+    std::optional<CurvatureField> exact;  // where the case asks for Recovery::exact
 };
 
 // The shape of the case with about this many triangles, where that can be chosen. Throws CaseError that names the key
-// to blame: a file that cannot be read or used, a result without such a frame, a mesh that this shape has not.
+// to blame: a file that cannot be read or used, a result without such a frame, a mesh or exact curvatures that this
+// shape has not.
 StartMesh start_mesh(const Case& c, int triangles);
 
 }  // namespace tubule::surface3d

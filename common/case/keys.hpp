@@ -183,7 +183,8 @@ void keys(Keys& k, SurfaceDiscretisation& d) {
               {"weak", Recovery::weak},
               {"lifted", Recovery::lifted},
               {"patch-nodal", Recovery::patch_nodal},
-              {"patch", Recovery::patch}});
+              {"patch", Recovery::patch},
+              {"exact", Recovery::exact}});
     k.number("smoothing", d.smoothing, {.from = 0});
 }
 

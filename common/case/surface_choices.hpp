@@ -10,7 +10,8 @@ enum class Recovery {
     weak,         // (H nu, Z) = -(grad X, grad Z), and B likewise from nu by parts
     lifted,       // element by element plus the kinks between elements, projected
     patch_nodal,  // from polynomial graphs through the nodes around each vertex, at the nodes
-    patch         // the same, projected: the default
+    patch,        // the same, projected: the default
+    exact         // at the nodes, of a shape that is known exactly
 };
 
 // How a mesh is made for a shape.

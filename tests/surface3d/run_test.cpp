@@ -95,6 +95,19 @@ TEST(SurfaceRun, FrameIsTheSurface) {
     }
 }
 
+TEST(SurfaceRun, ExactCurvatureOfExactShapes) {
+    const Outcome o = run_case("kind = \"sphere\"\nradius = 2\n", {"discretisation.recovery=exact"});
+    for (const double H : o.watch.frames.at(0).arrays[2].data) EXPECT_NEAR(H, -1, 1e-13);
+    for (const double K : o.watch.frames.at(0).arrays[3].data) EXPECT_NEAR(K, 0.25, 1e-13);
+    expect_honest(o, 16 * pi);
+    expect_honest(run_case("kind = \"torus\"\nradius = 1.5\ntube_radius = 0.5\n",
+                           {"discretisation.recovery=exact", "discretisation.mesh=irregular", "accuracy.energy=1e-3"}),
+                  integral_H2(Torus{1.5, 0.5}));
+    expect_honest(run_case("kind = \"ellipsoid\"\na = 1\nb = 1.3\nc = 0.7\n",
+                           {"energy.k20=0", "energy.k42=1", "discretisation.recovery=exact", "accuracy.energy=1e-3"}),
+                  integral_K2(Ellipsoid{1, 1.3, 0.7}));
+}
+
 TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
     const Outcome coarse = run_case(perturbed, {"discretisation.elements=80", "discretisation.recovery=elementwise"});
     EXPECT_EQ(coarse.summary.stop.reason, Stop::resolution_lost);
@@ -123,6 +136,10 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "case.toml: shape.path: cannot open none.hdf: No such file or directory");
     EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.elements=100"}),
               "case.toml: discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+    EXPECT_EQ(
+        refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.recovery=exact"}),
+        "case.toml: discretisation.recovery must not be \"exact\": of a surface made of triangles only points are "
+        "known");
 }
 
 }  // namespace
