@@ -27,6 +27,22 @@ frame = {frame}
 energy = {accuracy}
 """
 
+PROFILE = """
+tier = "axisym"
+[energy]
+k20 = 0.2
+k42 = 0.06
+H0 = -2.0
+[shape]
+{shape}
+[accuracy]
+energy = {accuracy}
+[time]
+end = {end}
+[discretisation]
+parametrisation = "even"
+"""
+
 
 def run(directory, *arguments):
     return subprocess.run([PROGRAM, "run", "--quiet", *map(str, arguments)], cwd=directory, capture_output=True, text=True)
@@ -61,6 +77,37 @@ class Surface(unittest.TestCase):
         self.assertAlmostEqual(last(self.directory / "surface.hdf", "energy") / expected, 1, delta=2e-5)
         self.assertAlmostEqual(last(self.directory / "surface.hdf", "volume") / volume, 1, delta=1e-5)
 
+    def agree(self, shape, end, accuracy):
+        """The last frame of a run of tier 1 that holds no spline but points, as a surface: energies within what both
+        tiers state, area and volume."""
+        (self.directory / "profile.toml").write_text(PROFILE.format(shape=shape, end=end, accuracy=accuracy))
+        done = run(self.directory, "profile.toml", "-o", "profile.hdf")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run(self.directory, self.case("surface.toml", path="profile.hdf", frame=-1, accuracy=accuracy))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        profile, surface = self.directory / "profile.hdf", self.directory / "surface.hdf"
+        with h5py.File(profile) as f:
+            self.assertNotIn("knots", f["frames/000001"])
+        stated = last(surface, "energy_error")  # of the surface; the frame's energy is that of its profile
+        self.assertLess(abs(last(surface, "energy") - last(profile, "energy")), stated)
+        for series in ("area", "volume"):
+            self.assertAlmostEqual(last(surface, series) / last(profile, series), 1, delta=2e-5, msg=series)
+        return last(profile, "energy")
+
+    def test_tiers_agree_on_a_closed_cell(self):
+        energy = self.agree('kind = "capsule"\nradius = 0.5\nlength = 2.0', end=0.01, accuracy=1e-5)
+        self.assertLess(energy, 5.0)  # it has moved: the capsule itself has 4 pi (k20 + k42/r^2) = 5.529
+
+    def test_tiers_agree_on_a_tube_that_overhangs(self):
+        self.agree('kind = "tube"\nradius = 1.0\nlength = 1.0\nmode = [{amplitude = 0.45, n = 1}]', end=0.0092,
+                   accuracy=1e-4)
+        with h5py.File(self.directory / "profile.hdf") as f:
+            heights = f["frames/000001/z"][:]
+        self.assertTrue((heights[1:] < heights[:-1]).any(), "it does not overhang")
+
+    def test_tiers_agree_on_a_torus(self):
+        self.agree('kind = "torus"\nradius = 1.5\ntube_radius = 0.5', end=0.01, accuracy=1e-5)
+
     def test_a_surface_begins_where_another_ended(self):
         """A frame of tier surface3d as a start is the same mesh: the same energies to rounding."""
         done = run(self.directory, CASES / "surface_tube_modes.toml", "-o", "tube.hdf", "--set", "energy.H0=-2.0",
@@ -81,6 +128,12 @@ class Surface(unittest.TestCase):
         done = run(self.directory, self.case("gone.toml", path="gone.hdf", frame=0, accuracy=0.01))
         self.assertEqual(done.returncode, 2)
         self.assertIn("gone.toml: shape.path: cannot open", done.stderr)
+
+    def test_no_derivatives_to_check(self):
+        for case in (CASES / "surface_dumbbell.toml", self.case("any.toml", path="none.hdf", frame=0, accuracy=0.01)):
+            done = run(self.directory, case, "--check-derivatives")
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(f"{case}: --check-derivatives must be absent: it checks tubes", done.stderr)
 
     def test_folded_mesh_is_kept_to_be_looked_at(self):
         done = run(self.directory, CASES / "surface_folded.toml", "-o", "folded.hdf")

@@ -137,6 +137,10 @@ void report(const Case& c, const RunSummary& s, const std::filesystem::path& fil
     fmt::print("    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
 }
 
+bool derivatives_can_be_checked(const Case& c) {
+    return c.tier == Tier::axisym && std::holds_alternative<Tube>(c.shape);
+}
+
 // Prints the Taylor slopes of every term at the start; whether all are as they should be.
 bool derivatives_pass(const Case& c) {
     bool pass = true;
@@ -223,6 +227,8 @@ int run_cases(const RunOptions& options) {
     std::set<std::filesystem::path> files;
     for (const std::string& path : options.cases) {
         cases.push_back(read_case(path, options.sets));
+        if (options.check_derivatives && !derivatives_can_be_checked(cases.back()))
+            throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
         const auto file = result_path(options, cases.back());
         if (!files.insert(file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, file.string()));
