@@ -69,27 +69,42 @@ struct Answer {
 // A mesh that is given: compared with the same triangles one order lower, or at the lowest with another recovery.
 Answer on_given_mesh(const Case& c, StartMesh start) {
     const int order = start.mesh.order;
-    const Measured other = order > 2 ? measure(c, {with_order(start.mesh, order - 1), false, {}, {}}, c.surface.recovery)
-                                     : measure(c, start, Recovery::normal);
+    const Measured other = order > 2
+                               ? measure(c, {with_order(start.mesh, order - 1), false, {}, {}}, c.surface.recovery)
+                               : measure(c, start, Recovery::normal);
     Answer answer{measure(c, std::move(start), c.surface.recovery), 0, 1};
     answer.error = given_mesh_margin * std::abs(answer.measured.o.energy - other.o.energy);
     return answer;
 }
 
-// So many triangles, compared with a quarter and a sixteenth of them.
-Answer on_elements(const Case& c, int elements) {
-    std::vector<double> energies;
-    for (int part = 16; part > 1; part /= 4)
-        if (elements / part >= fewest_triangles)
-            energies.push_back(measure(c, start_mesh(c, elements / part), c.surface.recovery).o.energy);
-    Answer answer{measure(c, start_mesh(c, elements), c.surface.recovery), 0, static_cast<int>(energies.size()) + 1};
-    energies.push_back(answer.measured.o.energy);
-    answer.error = energies.size() > 1 ? estimated_error(energies) : std::abs(energies[0]);
-    return answer;
-}
-
 double reference_energy(const Observables& o) {
     return std::max(std::abs(o.energy), o.magnitude);
+}
+
+// An estimate, or if there is none as yet, all of the energy.
+double error_or_all(double error, const Observables& o) {
+    return std::isfinite(error) ? error : reference_energy(o);
+}
+
+StopReport interruption() {
+    return {Stop::interrupted, 0, "interrupted by a signal", ""};
+}
+
+// So many triangles, compared with a quarter and a sixteenth of them.
+Answer on_elements(const Case& c, int elements, RunObserver& observer) {
+    std::vector<double> energies;
+    for (int part = 16;; part /= 4) {
+        if (part > 1 && elements / part < fewest_triangles) continue;
+        Answer answer{measure(c, start_mesh(c, elements / part), c.surface.recovery), 0,
+                      static_cast<int>(energies.size()) + 1};
+        energies.push_back(answer.measured.o.energy);
+        answer.error = error_or_all(estimated_error(energies), answer.measured.o);
+        if (part == 1) return answer;
+        if (observer.interrupted()) {
+            answer.measured.stop = interruption();
+            return answer;
+        }
+    }
 }
 
 // Twice as many triangles again and again, until the energy is as accurate as asked. Every other mesh has half the
@@ -102,24 +117,21 @@ Answer as_accurate_as_asked(const Case& c, RunObserver& observer) {
         std::vector<double>& same = energies[count % 2];
         same.push_back(answer.measured.o.energy);
         const double error = estimated_error(same);
-        answer.error = std::max(error, std::sqrt(fastest_fall) * before);
+        answer.error = error_or_all(std::max(error, std::sqrt(fastest_fall) * before), answer.measured.o);
         before = error;
         if (observer.interrupted()) {
-            answer.measured.stop = StopReport{Stop::interrupted, 0, "interrupted by a signal", ""};
+            answer.measured.stop = interruption();
             return answer;
         }
         const bool enough = answer.error <= c.accuracy.energy * reference_energy(answer.measured.o);
-        if ((enough && !answer.measured.stop) || 2 * triangles > most_triangles) {
-            if (!std::isfinite(answer.error)) answer.error = std::abs(answer.measured.o.energy);
-            return answer;
-        }
+        if ((enough && !answer.measured.stop) || 2 * triangles > most_triangles) return answer;
     }
 }
 
 Answer answer_to(const Case& c, RunObserver& observer) {
     StartMesh first = start_mesh(c, c.surface.elements.value_or(fewest_triangles));
     if (!first.resizable) return on_given_mesh(c, std::move(first));
-    return c.surface.elements ? on_elements(c, *c.surface.elements) : as_accurate_as_asked(c, observer);
+    return c.surface.elements ? on_elements(c, *c.surface.elements, observer) : as_accurate_as_asked(c, observer);
 }
 
 std::vector<double> row(const Answer& answer, double seconds) {

@@ -3,9 +3,11 @@
 
 Arguments: the program, the directory of the cases.
 """
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -134,6 +136,21 @@ class Surface(unittest.TestCase):
             done = run(self.directory, case, "--check-derivatives")
             self.assertEqual(done.returncode, 2)
             self.assertIn(f"{case}: --check-derivatives must be absent: it checks tubes", done.stderr)
+
+    def test_resumed_from_the_beginning(self):
+        """What an interrupted run has written is replaced, not continued: there is one row, one frame."""
+        with subprocess.Popen([PROGRAM, "run", "--quiet", CASES / "surface_slow.toml"], cwd=self.directory) as process:
+            while not (self.directory / "surface_slow.hdf").exists():  # from then on, signals are caught
+                time.sleep(0.01)
+            process.send_signal(signal.SIGINT)
+        self.assertEqual(process.returncode, 130)
+        with h5py.File(self.directory / "surface_slow.hdf") as f:
+            few = f["series/elements"][-1]
+        done = run(self.directory, CASES / "surface_slow.toml", "--resume", "--expect")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with h5py.File(self.directory / "surface_slow.hdf") as f:
+            self.assertEqual((len(f["series/time"]), len(f["frames"]), len(f["meshes"])), (1, 1, 1))
+            self.assertGreater(f["series/elements"][-1], few)
 
     def test_folded_mesh_is_kept_to_be_looked_at(self):
         done = run(self.directory, CASES / "surface_folded.toml", "-o", "folded.hdf")

@@ -79,6 +79,14 @@ TEST(SurfaceRun, EveryKindOfMesh) {
     }
 }
 
+TEST(SurfaceRun, AnEnergyOfZeroIsNoAccuracy) {
+    // A sphere of radius 1 has H = -2 everywhere. One mesh says nothing of the error, however small its energy is.
+    const Outcome o = run_case("kind = \"sphere\"\nradius = 1\n", {"energy.H0=-2.0", "discretisation.elements=80"});
+    EXPECT_LT(o.summary.energy, 1e-3);
+    EXPECT_EQ(o.summary.estimated_error, 1);
+    EXPECT_EQ(o.summary.warnings.size(), 1u);
+}
+
 TEST(SurfaceRun, FrameIsTheSurface) {
     const Outcome o = run_case("kind = \"sphere\"\nradius = 2\n", {"discretisation.elements=320"});
     ASSERT_EQ(o.watch.frames.size(), 1u);
@@ -118,6 +126,22 @@ TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
                                     {"discretisation.elements=80"});
     EXPECT_EQ(folded.summary.stop.reason, Stop::mesh_lost);
     EXPECT_NE(folded.summary.stop.message.find("folds at ("), std::string::npos) << folded.summary.stop.message;
+}
+
+TEST(SurfaceRun, InterruptedAtOnce) {
+    struct Impatient : Watch {
+        bool interrupted() override { return true; }
+    };
+    for (const char* elements : {"", "[discretisation]\nelements = 2000\n"}) {
+        Impatient watch;
+        const Case c =
+            parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\n" + perturbed + elements, {}, "case.toml");
+        const RunSummary s = run(c, watch);
+        EXPECT_EQ(s.stop.reason, Stop::interrupted);
+        EXPECT_EQ(s.estimated_error, 1);  // one mesh tells nothing
+        for (const double value : watch.values) EXPECT_TRUE(std::isfinite(value));
+        EXPECT_EQ(watch.frames.size(), 1u);
+    }
 }
 
 TEST(SurfaceRun, ShapesThatCannotBeMade) {

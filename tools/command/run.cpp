@@ -87,6 +87,7 @@ std::vector<std::string> series_names(const Case& c) {
 RunSummary run_tier(const Case& c, RunObserver& observer, const Record* restart) {
     if (c.equilibrium) return axisym::run_equilibrium(c, observer);
     if (c.tier == Tier::axisym) return axisym::run(c, observer, restart);
+    if (restart) observer.discard();  // nothing moves: there is no half of it to go on from
     return surface3d::run(c, observer);
 }
 
