@@ -48,14 +48,14 @@ Measured measure(const Case& c, StartMesh start, Recovery recovery) {
 }
 
 // The error of the last of these energies, each on a mesh of half the width of the one before it.
-double estimated_error(const std::vector<double>& energies) {
+double estimated_error(const std::vector<double>& energies, double least_fall = fastest_fall) {
     const std::size_t n = energies.size();
     if (n < 2) return std::numeric_limits<double>::infinity();
     const double change = std::abs(energies[n - 1] - energies[n - 2]);
     double fall = slowest_fall;
     if (n > 2) {
         const double before = std::abs(energies[n - 2] - energies[n - 3]);
-        fall = std::clamp(before > 0 ? change / before : slowest_fall, fastest_fall, slowest_fall);
+        fall = std::clamp(before > 0 ? change / before : slowest_fall, least_fall, slowest_fall);
     }
     return change * fall / (1 - fall);
 }
@@ -90,7 +90,8 @@ StopReport interruption() {
     return {Stop::interrupted, 0, "interrupted by a signal", ""};
 }
 
-// So many triangles, compared with a quarter and a sixteenth of them.
+// So many triangles, compared with a quarter and a sixteenth of them. No others have a say, so errors that change sign
+// are to be feared more.
 Answer on_elements(const Case& c, int elements, RunObserver& observer) {
     std::vector<double> energies;
     for (int part = 16;; part /= 4) {
@@ -98,7 +99,7 @@ Answer on_elements(const Case& c, int elements, RunObserver& observer) {
         Answer answer{measure(c, start_mesh(c, elements / part), c.surface.recovery), 0,
                       static_cast<int>(energies.size()) + 1};
         energies.push_back(answer.measured.o.energy);
-        answer.error = error_or_all(estimated_error(energies), answer.measured.o);
+        answer.error = error_or_all(estimated_error(energies, 1.0 / 4), answer.measured.o);
         if (part == 1) return answer;
         if (observer.interrupted()) {
             answer.measured.stop = interruption();

@@ -199,6 +199,9 @@ struct MakeStart {
     StartMesh of_graph(const Record& frame) const {
         const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"),
                               find_array(frame, "knots")->data, find_array(frame, "coefficients")->data};
+        if (tube.degree < 1 || tube.degree > 7 || tube.length <= 0 || tube.coefficients.empty() ||
+            tube.knots.size() != tube.coefficients.size() + tube.degree + 1)
+            refuse(c, "shape.path: the spline of the frame is damaged");
         double radius = 0;
         for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
         return meshed(

@@ -10,16 +10,20 @@
 namespace tubule {
 
 double harmonic_scale(int l, int m) {
-    double square = (2 * l + 1) / (4 * pi);
-    for (int i = l - m + 1; i <= l + m; ++i) square /= i;
-    double scale = std::sqrt(square);
-    for (int i = 1; i <= m; ++i) scale *= -(2 * i - 1);
+    double scale = std::sqrt((2 * l + 1) / (4 * pi));
+    // Factorials overflow beyond 170: each odd number goes with two factors of (l-m)!/(l+m)!.
+    for (int i = 1; i <= m; ++i) scale *= -(2 * i - 1) / std::sqrt((l - m + 2 * i - 1.0) * (l - m + 2 * i));
     return scale;
 }
 
 std::string complaint(const Sphere& sphere) {
     int waves = 1;
-    for (const SphereMode& mode : sphere.modes) waves = std::max(waves, mode.l);
+    double most = 0;  // of the modes together, as |Y_l^m| <= Y_l^0(pole)
+    for (const SphereMode& mode : sphere.modes) {
+        waves = std::max(waves, mode.l);
+        most += std::abs(mode.amplitude) * harmonic_scale(mode.l, 0);
+    }
+    if (most < 1) return {};
     const int rows = 8 * waves;  // 16 points a wave: a radius that reaches zero is seen unless it barely does
     for (int i = 0; i <= rows; ++i)
         for (int j = 0; j < 2 * rows; ++j) {

@@ -54,8 +54,12 @@ Neck narrowest(const Tube& tube) {
 
 std::string complaint(const Tube& tube) {
     int around = 0, along = 0;
-    for (const TubeMode& mode : tube.modes)
+    double most = 0;  // of the modes together
+    for (const TubeMode& mode : tube.modes) {
         around = std::max(around, std::abs(mode.m)), along = std::max(along, mode.n);
+        most += std::abs(mode.amplitude);
+    }
+    if (most < tube.radius) return {};
     if (around == 0) {
         const Neck neck = narrowest(tube);
         if (neck.radius > 0) return {};

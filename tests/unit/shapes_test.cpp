@@ -1,6 +1,9 @@
 // The shapes a case may begin with: what each tier accepts, what is refused, and that a case reads back as written.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+
 #include "common/case/read.hpp"
 
 namespace tubule {
@@ -45,6 +48,27 @@ TEST(ShapeKeys, EveryShapeReadsBackAsWritten) {
                 EXPECT_NE(written.find(value), std::string::npos) << written;
             }
     }
+}
+
+TEST(ShapeKeys, HarmonicsOfHighDegree) {
+    // Against the standard library, which too has the sign (-1)^m of Condon and Shortley. (2 l)! is no double here.
+    for (const auto [l, m] : {std::array{100, 100}, std::array{120, 60}, std::array{300, 3}})
+        for (const double theta : {0.3, 1.2, 2.0}) {
+            const double expected = std::sph_legendre(l, m, theta);
+            EXPECT_NEAR(real_harmonic<double>(l, m, {std::sin(theta), 0, std::cos(theta)}), expected,
+                        1e-10 * std::abs(expected) + 1e-12)
+                << l << " " << m << " " << theta;
+        }
+}
+
+TEST(ShapeKeys, ManyWavesAreCheckedInNoTime) {
+    // So small that no sum of them reaches zero: 10^8 points and more would have to be looked at otherwise.
+    EXPECT_EQ(
+        refusal(surface + shape("kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 1e-3, l = 1000, m = 500}]\n")),
+        "accepted");
+    EXPECT_EQ(refusal(surface + shape("kind = \"tube\"\nradius = 1\nlength = 1\n"
+                                      "mode = [{amplitude = 0.9, n = 10000, m = 10000}]\n")),
+              "accepted");
 }
 
 TEST(ShapeKeys, ChoicesOfTheSurface) {
