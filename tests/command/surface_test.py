@@ -131,6 +131,15 @@ class Surface(unittest.TestCase):
         self.assertEqual(done.returncode, 2)
         self.assertIn("gone.toml: shape.path: cannot open", done.stderr)
 
+    def test_a_start_is_not_replaced(self):
+        run(self.directory, CASES / "surface_ellipsoid.toml", "-o", "start.hdf")
+        before = (self.directory / "start.hdf").read_bytes()
+        for path in ("start.hdf", self.directory / "start.hdf"):  # the name of a case is that of its result
+            done = run(self.directory, self.case("start.toml", path=path, frame=0, accuracy=0.01))
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("start.hdf is where the run starts (shape.path) and must not be its result", done.stderr)
+            self.assertEqual((self.directory / "start.hdf").read_bytes(), before)
+
     def test_no_derivatives_to_check(self):
         for case in (CASES / "surface_dumbbell.toml", self.case("any.toml", path="none.hdf", frame=0, accuracy=0.01)):
             done = run(self.directory, case, "--check-derivatives")

@@ -219,6 +219,16 @@ int run_case(Case c, const RunOptions& options) {
     return status;
 }
 
+// A run would destroy the result that it starts from before it has read it.
+void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& file) {
+    const auto* start = std::get_if<ResultFrame>(&c.shape);
+    std::error_code none;
+    if (start && std::filesystem::equivalent(std::filesystem::path(c.path).parent_path() / start->path, file, none))
+        throw CaseError(fmt::format("{}: {} is where the run starts (shape.path) and must not be its result as well: "
+                                    "choose another one with -o",
+                                    c.path, file.string()));
+}
+
 }  // namespace
 
 int run_cases(const RunOptions& options) {
@@ -231,6 +241,7 @@ int run_cases(const RunOptions& options) {
         if (options.check_derivatives && !derivatives_can_be_checked(cases.back()))
             throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
         const auto file = result_path(options, cases.back());
+        refuse_to_replace_the_start(cases.back(), file);
         if (!files.insert(file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, file.string()));
     }
