@@ -90,8 +90,9 @@ Meridian of_record(const Case& c, const Record& frame) {
     if (!r || !z) throw CaseError(fmt::format("{}: shape.path: holds no profile of tier \"axisym\"", c.path));
     std::vector<std::array<double, 2>> points;
     for (std::size_t i = 0; i < r->data.size(); ++i) points.push_back({r->data[i], z->data[i]});
-    const double length = number(frame, "length");
-    return meridian(points, length > 0 ? Topology::tube : Topology::cell, length);
+    const double r_max = *std::max_element(r->data.begin(), r->data.end());
+    const bool has_poles = std::abs(r->data.front()) < 1e-9 * r_max && std::abs(r->data.back()) < 1e-9 * r_max;
+    return meridian(points, has_poles ? Topology::cell : Topology::tube, number(frame, "length"));
 }
 
 struct MakeMeridian {

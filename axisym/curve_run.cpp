@@ -438,6 +438,9 @@ std::optional<StopReport> CurveAttempt::step() {
 
 StopReport CurveAttempt::go() {
     std::optional<StopReport> stop;
+    const Guards at_start = guards(now_);  // IDA sees only those that change their sign later
+    for (int guard = 0; guard < n_guards && !stop; ++guard)
+        if (!(at_start[guard] > 0)) stop = guard_report(guard);
     while (!stop) stop = step();
     const double t = flow_->time();
     summary.stop = *stop;
