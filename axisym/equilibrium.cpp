@@ -194,18 +194,14 @@ public:
         for (int k = 0; k < most; ++k) {
             ++iterations_;
             const Attempt step = attempt();
-            if (!step.sound) {
+            const double gain = step.sound ? merit_at(curve(), step.to) - system_.merit(step.to) : 0;
+            const double noise = 1e-13 * scale_;
+            if (!step.sound || (step.feasible && gain < 0.1 * step.predicted - noise)) {
                 damping_ *= 5;
                 if (damping_ > 1e12 * damping_start_) return false;
                 continue;
             }
             const double length = relative(step.to - u_);
-            const double gain = merit_at(curve(), step.to) - system_.merit(step.to), noise = 1e-13 * scale_;
-            if (step.feasible && gain < 0.1 * step.predicted - noise) {
-                damping_ *= 5;
-                if (damping_ > 1e12 * damping_start_) return false;
-                continue;
-            }
             u_ = step.to;
             if (!step.feasible) continue;
             if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
@@ -295,10 +291,6 @@ private:
     double scale_, damping_start_, damping_;
     SparseLu lu_;
 };
-
-}  // namespace
-
-namespace {
 
 constexpr int coarsest = 8;  // elements of a whole cell or period
 
