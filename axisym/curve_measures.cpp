@@ -61,6 +61,10 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
     const int first = space.closed() ? 1 : 0, last = space.topology() == Topology::cell ? n - 2 : n - 1;
     for (int i = first; i <= last; ++i)
         if (!(p[i][0] > 0)) return std::array{s[i], s[i]};
+    // A half that crosses a plane of symmetry away from its ends meets its mirror image there.
+    const bool half_cell = space.topology() == Topology::half_cell, half_tube = space.topology() == Topology::half_tube;
+    for (int i = half_tube ? 1 : 0; i + 1 < n && (half_cell || half_tube); ++i)
+        if (half_cell ? p[i][1] > 0 : p[i][1] < 0 || p[i][1] > space.rise()) return std::array{s[i], s[i]};
     const auto side = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     };
