@@ -62,7 +62,7 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
     for (int i = first; i <= last; ++i)
         if (!(p[i][0] > 0)) return std::array{s[i], s[i]};
     // A half that crosses a plane of symmetry away from its ends meets its mirror image there.
-    const bool half_cell = space.topology() == Topology::half_cell, half_tube = space.topology() == Topology::half_tube;
+    const bool half_cell = space.topology() == Topology::half_cell, half_tube = space.topology() == Topology::half_tube && space.rise() > 0;
     for (int i = half_tube ? 1 : 0; i + 1 < n && (half_cell || half_tube); ++i)
         if (half_cell ? p[i][1] > 0 : p[i][1] < 0 || p[i][1] > space.rise()) return std::array{s[i], s[i]};
     const auto side = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {

@@ -103,8 +103,6 @@ TEST(CurveMotion, pressuresAreInfSupStable) {
             const CurveSpace space(topology, equal_breaks(n), 5, 4, topology == Topology::tube ? 3 : 0);
             betas.push_back(inf_sup(space, some_curve(space)));
         }
-        std::printf("inf-sup %d: %.4f %.4f %.4f %.4f\n", static_cast<int>(topology), betas[0], betas[1], betas[2],
-                    betas[3]);
         EXPECT_GT(betas.back(), 0.1);
         EXPECT_GT(betas.back(), 0.9 * betas.front());
     }
