@@ -25,6 +25,7 @@ import results  # noqa: E402
 import tubes  # noqa: E402
 import validation  # noqa: E402
 import work_precision  # noqa: E402
+import work_precision_fluid  # noqa: E402
 
 TUBULE = None
 CASE = """tier = "axisym"
@@ -560,6 +561,44 @@ class WorkPrecision(InFolder):
             ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,fast\n", "must have the columns"),
             ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,-1\n", "negative or not finite"),
             ("series,energy_asked,error,estimate,cpu_ms\n", "has no rows"),
+        ):
+            done = self.draw(text)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, done.stderr)
+
+
+class WorkPrecisionFluid(InFolder):
+    HEADER = "model,series,asked,error,estimate,cpu_s\n"
+    ROWS = (
+        "{0},reference,0,1e-5,1e-5,9\n"
+        "{0},accuracy asked for,1e-3,2e-4,4e-4,3\n"
+        '{0},"material, order 5",0,1e-3,2e-3,1\n'
+        '{0},"even, order 5",0,1e-2,2e-3,0.5\n'
+    )
+
+    def draw(self, text):
+        table = self.folder / "table.csv"
+        table.write_text(text)
+        command = [sys.executable, "-B", PLOT / "work_precision_fluid.py", table, "-o", self.folder / "w.svg"]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_chart(self):
+        done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        texts = svg_texts(self.folder / "w.svg")
+        for words in ("fluid, with inertia", "Stokes flow", "material, order 5", "even, order 5", "accuracy asked for"):
+            self.assertIn(words, texts)
+
+    def test_only_runs_that_none_beats_are_drawn(self):
+        runs = [work_precision_fluid.Run("", 0, error, 0, cpu) for error, cpu in ((1, 1), (2, 2), (0.5, 3), (0.6, 1.5))]
+        self.assertEqual([(run.error, run.cpu_s) for run in work_precision_fluid.best(runs)], [(1, 1), (0.6, 1.5), (0.5, 3)])
+
+    def test_refusals(self):
+        for text, words in (
+            ("a,b\n1,2\n", "must have the columns"),
+            (self.HEADER + "fluid,reference,0,1e-5,fast,9\n", "must have the columns"),
+            (self.HEADER + "gas,reference,0,1e-5,1e-5,9\n", "must have the columns"),
+            (self.HEADER + self.ROWS.format("fluid"), "has no reference, or no other run, of stokes"),
         ):
             done = self.draw(text)
             self.assertEqual(done.returncode, 2)

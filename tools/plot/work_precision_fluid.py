@@ -1,0 +1,133 @@
+#!/usr/bin/python3
+"""Draws error against CPU time of a fluid and of Stokes flow, from the table of tests/benchmark/work_precision_fluid.py."""
+
+import argparse
+import csv
+import os
+import sys
+from dataclasses import dataclass, replace
+
+MODELS = {"fluid": "fluid, with inertia", "stokes": "Stokes flow"}
+NUMBERS = ("asked", "error", "estimate", "cpu_s")
+REFERENCE = "reference"  # the run that the others are compared with; its error is its distance to the next finest
+
+STAR = {"color": "k", "marker": "*", "markersize": 6.5, "mew": 0.7, "ls": ""}
+
+
+@dataclass
+class Run:
+    series: str
+    asked: float  # 0 where settings are given instead
+    error: float
+    estimate: float
+    cpu_s: float
+
+
+def read_table(path):
+    """{model: list of Run}. Raises BadInput."""
+    from results import BadInput
+
+    runs = {model: [] for model in MODELS}
+    try:
+        with open(path, newline="") as file:
+            for row in csv.DictReader(file):
+                values = [float(row[name]) for name in NUMBERS]
+                if not all(0 <= value < float("inf") for value in values):
+                    raise ValueError(f"a value is negative or not finite in {values}")
+                runs[row["model"]].append(Run(row["series"], *values))
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        columns = ", ".join(("model", "series", *NUMBERS))
+        raise BadInput(f"{path}: must have the columns {columns} with numbers ({error})") from error
+    for model, rows in runs.items():
+        if not any(run.series == REFERENCE for run in rows) or len(rows) == 1:
+            raise BadInput(f"{path}: has no reference, or no other run, of {model}")
+    return runs
+
+
+def best(runs):
+    """Those that no other run beats in both error and time, cheapest first."""
+    front = []
+    for run in sorted(runs, key=lambda run: (run.cpu_s, run.error)):
+        if not front or run.error < front[-1].error:
+            front.append(run)
+    return front
+
+
+def draw_model(axes, runs, styles):
+    reference = next(run for run in runs if run.series == REFERENCE)
+    # Nothing is known below the error of the reference.
+    runs = [replace(run, error=max(run.error, reference.error)) for run in runs if run is not reference]
+    axes.axhspan(reference.error * 1e-6, reference.error, color="0.93", zorder=0)
+    axes.annotate("the reference is no better known", (1, reference.error), (-3, -3), ha="right", va="top",
+                  xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=6.5, color="0.35")
+    for series, style in styles.items():
+        every = [run for run in runs if run.series == series]
+        front = best(every)
+        faint = {**style, "ls": "", "alpha": 0.3, "markersize": 2.5}
+        axes.loglog([run.cpu_s for run in every], [run.error for run in every], zorder=1, **faint)
+        axes.loglog([run.cpu_s for run in front], [run.error for run in front], zorder=2, **style)
+    for run in runs:
+        if run.asked > 0:
+            axes.loglog([run.cpu_s] * 2, [run.error, run.estimate], color="k", lw=0.6, zorder=2)
+            axes.loglog(run.cpu_s, run.error, zorder=4, **STAR)
+            axes.loglog(run.cpu_s, run.estimate, mfc="white", zorder=3, **STAR)
+    axes.set_ylim(bottom=reference.error / 2)
+
+
+def draw(path, outputs):
+    """All runs, faint, and a line through the best of each kind. Stars: accuracies asked for, hollow the estimates."""
+    import style
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    style.check_outputs(outputs)
+    table = read_table(path)
+    given = [run for runs in table.values() for run in runs if run.asked == 0 and run.series != REFERENCE]
+    names = list(dict.fromkeys(run.series for run in given))
+    kinds = list(dict.fromkeys(name.split(",")[0] for name in names))
+    orders = sorted({name.split(",")[1] for name in names})
+    colours = dict(zip(orders, style.line_colours(len(orders))))
+    markers = dict(zip(orders, style.MARKERS))
+    styles = {}
+    for name in names:
+        kind, order = name.split(",")
+        even = kinds.index(kind) > 0
+        styles[name] = {"color": colours[order], "marker": markers[order], "ls": "--" if even else "-"}
+        if even:
+            styles[name]["mfc"] = "white"
+    figure = Figure(figsize=(style.WIDTH, 3.6))
+    for left, (model, title) in zip((0.085, 0.575), MODELS.items()):
+        axes = figure.add_axes([left, 0.255, 0.415, 0.69])
+        draw_model(axes, table[model], styles)
+        axes.set_title(title)
+        axes.set_xlabel("CPU time of a whole run (s)")
+        if left < 0.5:
+            axes.set_ylabel("largest error of the energy, relative to E_ref")
+    handles = [Line2D([], [], label=name, **styles[name]) for name in names]
+    handles.append(Line2D([], [], label="accuracy asked for", **STAR))
+    handles.append(Line2D([], [], label="estimate by the run itself", mfc="white", **STAR))
+    figure.legend(handles=handles, loc="lower center", ncol=4)
+    style.save(figure, outputs)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("table")
+    parser.add_argument("-o", "--output", action="append", required=True)
+    options = parser.parse_args()
+    from results import BadInput
+
+    try:
+        draw(options.table, options.output)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return 2
+    for path in options.output:
+        print(os.path.relpath(path))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
