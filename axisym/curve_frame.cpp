@@ -140,7 +140,8 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     for (const Array& more :
          {array("restart_breaks", breaks), array("restart_y", state.y), array("restart_rate", state.rate)})
         out.arrays.push_back(more);
-    out.numbers.insert(out.numbers.end(), {{"restart_tolerance", state.tolerance},
+    out.numbers.insert(out.numbers.end(), {{"restart_elements", static_cast<double>(state.elements)},
+                                           {"restart_tolerance", state.tolerance},
                                            {"restart_total_start", state.total_start},
                                            {"restart_dissipated", state.dissipated},
                                            {"restart_error", state.error},
@@ -165,6 +166,7 @@ CurveRestart curve_restart(const Record& record) {
     return {values("restart_breaks"),
             vector("restart_y"),
             vector("restart_rate"),
+            static_cast<int>(number(record, "restart_elements")),
             number(record, "restart_tolerance"),
             number(record, "restart_total_start"),
             number(record, "restart_dissipated"),

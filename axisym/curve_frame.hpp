@@ -12,6 +12,7 @@ namespace tubule::axisym {
 struct CurveRestart {
     std::vector<double> breaks;
     Eigen::VectorXd y, rate;
+    int elements = 0;  // asked for, of one cell; there are more at seams
     double tolerance = 0, total_start = 0, dissipated = 0, error = 0, reference_energy = 0;
 };
 

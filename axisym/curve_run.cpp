@@ -33,7 +33,7 @@ constexpr double steepest = 3;      // curvature times length of an element: bey
 constexpr double stretched = 1e-3;  // least over largest |X_s|
 constexpr int steps_between_looks = 10;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
-constexpr int most_crawling = 2000;  // steps by which the time has not grown by a thousandth
+constexpr int most_crawling = 2000;    // steps by which the time has not grown by a thousandth
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
@@ -134,12 +134,9 @@ struct Settings {
 
 // `excess` is how many times more than asked the two runs before differed; 1 to begin with. The error of the mesh falls
 // at least with the sixth power of its width, unless the shape is not smooth.
-Settings finer(const Settings& s, const Case& c, double excess) {
-    Settings out = s;
+Settings finer(const Settings& s, double excess) {
     const double mesh = std::clamp(finer_mesh * std::pow(excess, 1.0 / 6), finer_mesh, 2.5);
-    if (!c.discretisation.elements) out.elements = static_cast<int>(std::ceil(mesh * s.elements));
-    if (!c.discretisation.time_tolerance) out.tolerance = std::max(finer_time * s.tolerance, 1e-13);
-    return out;
+    return {static_cast<int>(std::ceil(mesh * s.elements)), std::max(finer_time * s.tolerance, 1e-13)};
 }
 
 struct CurveState {
@@ -416,7 +413,8 @@ std::optional<StopReport> CurveAttempt::step() {
     const Flow::Outcome outcome = flow_->advance(case_.time.end);
     const double t = flow_->time();
     if (is_stuck(t))
-        return StopReport{Stop::solver_failed, t, fmt::format("the time integrator is stuck with steps of {:.2g}", flow_->step_size()),
+        return StopReport{Stop::solver_failed, t,
+                          fmt::format("the time integrator is stuck with steps of {:.2g}", flow_->step_size()),
                           "try another accuracy, discretisation.elements or parametrisation"};
     if (outcome == Flow::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
@@ -522,6 +520,7 @@ void CurveAttempt::write_frame(double t, const Look& l, const double* y, const d
     const CurveRestart state{space_->splines().breaks(),
                              Eigen::Map<const Eigen::VectorXd>(y, n),
                              Eigen::Map<const Eigen::VectorXd>(rate, n),
+                             settings_.elements,
                              settings_.tolerance,
                              total_start_,
                              dissipated,
@@ -535,15 +534,14 @@ Settings coarser(const Settings& s) {
     return {std::max(4, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time};
 }
 
+// The finer run of the first pair: as given by the case, else by the asked accuracy.
 Settings first_settings(const Case& c, const Beginning& start) {
     const int images =
         start.meridian.topology == Topology::half_cell || start.meridian.topology == Topology::half_tube ? 2 : 1;
     const bool waves = c.model.kind == ModelKind::fluid;
-    Settings s{first_elements, (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy};
-    const Settings given{(c.discretisation.elements.value_or(0) + images - 1) / images,
-                         c.discretisation.time_tolerance.value_or(0)};
-    if (c.discretisation.elements) s.elements = coarser(given).elements;
-    if (c.discretisation.time_tolerance) s.tolerance = coarser(given).tolerance;
+    Settings s = finer({first_elements, (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy}, 1);
+    if (c.discretisation.elements) s.elements = (*c.discretisation.elements + images - 1) / images;
+    if (c.discretisation.time_tolerance) s.tolerance = *c.discretisation.time_tolerance;
     return s;
 }
 
@@ -599,7 +597,7 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
     std::optional<CurveRestart> state;
     if (restart) {
         state = curve_restart(*restart);
-        settings = coarser({static_cast<int>(state->breaks.size()) - 1, state->tolerance});
+        settings = {state->elements, state->tolerance};
     }
     const auto run_one = [&](bool recorded, const Settings& with, const Trace* coarser) {
         auto attempt = std::make_unique<CurveAttempt>(c, observer, recorded, start, with, coarser, started);
@@ -610,26 +608,25 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
         attempt->go();
         return attempt;
     };
-    auto coarse = run_one(false, settings, nullptr);
-    double excess = 1;
+    auto coarse = run_one(false, coarser(settings), nullptr);
     for (int pair = 1;; ++pair) {
-        const Stop early = coarse->summary.stop.reason;
-        if (early == Stop::interrupted || early == Stop::time_limit) return coarse->summary;
-        const Settings next = finer(settings, c, excess);
-        auto fine = run_one(true, next, &coarse->trace);
+        if (Stop early = coarse->summary.stop.reason; early == Stop::interrupted || early == Stop::time_limit) {
+            describe(coarse->summary, c, coarse->summary.reference_energy, pair);  // nothing is known of the error yet
+            return coarse->summary;
+        }
+        auto fine = run_one(true, settings, &coarse->trace);
         describe(fine->summary, c, fine->error, pair);
         const bool agrees = fine->summary.as_accurate_as_asked && comparable(coarse->summary.stop, fine->summary.stop);
-        const bool given = c.discretisation.elements && c.discretisation.time_tolerance;
+        const bool given = c.discretisation.elements || c.discretisation.time_tolerance;
         const Stop reason = fine->summary.stop.reason;
-        if (agrees || given || pair == most_pairs || next.elements > most_elements || reason == Stop::interrupted ||
+        if (agrees || given || pair == most_pairs || settings.elements > most_elements || reason == Stop::interrupted ||
             reason == Stop::time_limit) {
             accept(fine->summary, c);
             return fine->summary;
         }
-        excess = fine->summary.estimated_error / c.accuracy.energy;
+        settings = finer(settings, fine->summary.estimated_error / c.accuracy.energy);
         observer.discard();
         state.reset();
-        settings = next;
         coarse = std::move(fine);
     }
 }

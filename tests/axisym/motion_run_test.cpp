@@ -225,13 +225,13 @@ TEST(CurveRun, whatIsStatedHolds) {
 }
 
 TEST(CurveRun, convergesInSpace) {
-    // Quintic splines: the energy of a shape converges with the eighth power of the width of the elements, that of a run,
-    // which also errs in how it gets there, with about the sixth. Expected: the run with 40 elements of a half.
+    // Quintic splines: the energy of a shape converges with the eighth power of the width of the elements, that of a
+    // run, which also errs in how it gets there, with about the sixth. Expected: the run with 40 elements of a half.
     for (const char* model : {"gradient-flow", "stokes"}) {
         const auto energy = [&](int elements) {
-            const Outcome o = run_text(spheroid, {std::string("model.kind=") + model, "time.end=0.01",
-                                                  "discretisation.time_tolerance=1e-10",
-                                                  "discretisation.elements=" + std::to_string(2 * elements)});
+            const Outcome o = run_text(
+                spheroid, {std::string("model.kind=") + model, "time.end=0.01", "discretisation.time_tolerance=1e-10",
+                           "discretisation.elements=" + std::to_string(2 * elements)});
             EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
             return o.summary.energy / o.summary.reference_energy;
         };
@@ -257,6 +257,33 @@ TEST(CurveRun, goesOnAfterAnInterruption) {
         EXPECT_GE(second.rows.front()[0], half.stop.time);
         EXPECT_NEAR(rest.energy, expected.energy, 1e-5 * expected.reference_energy);
     }
+}
+
+TEST(CurveRun, goesOnWithElementsGradedAtSeams) {
+    const std::string capsule =
+        "tier = \"axisym\"\n[energy]\nk20 = 0.125\nk42 = 0.06\nH0 = -2.0\n[model]\nkind = \"stokes\"\n[shape]\n"
+        "kind = \"capsule\"\nradius = 0.5\nlength = 2.0\n[accuracy]\nenergy = 1e-3\n[time]\nend = 1.0\n";
+    const Case c = parse_case(capsule, {}, "case.toml");
+    Watch whole, first, second;
+    const RunSummary expected = run(c, whole);
+    first.interrupt_at = 0.01;
+    ASSERT_EQ(run(c, first).stop.reason, Stop::interrupted);
+    const RunSummary rest = run(c, second, &first.frames.back());
+    EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
+    EXPECT_EQ(rest.elements, expected.elements);
+    EXPECT_NEAR(rest.energy, expected.energy, 1e-3 * expected.reference_energy);
+}
+
+TEST(CurveRun, givenSettingsAreUsed) {
+    const Outcome o = run_text(spheroid, {"model.kind=stokes", "discretisation.elements=20",
+                                          "discretisation.time_tolerance=1e-5", "time.end=0.1"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_EQ(o.summary.elements, 20);  // in two halves
+    EXPECT_EQ(o.summary.time_tolerance, 1e-5);
+    const Outcome exact = run_text(spheroid, {"model.kind=stokes", "accuracy.energy=1e-7", "time.end=0.1"});
+    const double error = std::abs(o.summary.energy - exact.summary.energy) / o.summary.reference_energy;
+    EXPECT_GT(o.summary.estimated_error, 0);
+    EXPECT_LE(error, o.summary.estimated_error);
 }
 
 TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
