@@ -531,7 +531,7 @@ void CurveAttempt::write_frame(double t, const Look& l, const double* y, const d
 
 // The settings of the run that those of a case, or of a restart, are compared with.
 Settings coarser(const Settings& s) {
-    return {std::max(4, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time};
+    return {std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time};
 }
 
 // The finer run of the first pair: as given by the case, else by the asked accuracy.
@@ -615,12 +615,21 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
             return coarse->summary;
         }
         auto fine = run_one(true, settings, &coarse->trace);
-        describe(fine->summary, c, fine->error, pair);
-        const bool agrees = fine->summary.as_accurate_as_asked && comparable(coarse->summary.stop, fine->summary.stop);
+        const bool coarser_mesh = coarse->summary.elements < fine->summary.elements;
+        const bool known = coarser_mesh && comparable(coarse->summary.stop, fine->summary.stop);
+        describe(fine->summary, c, known ? fine->error : fine->summary.reference_energy, pair);
+        const bool agrees = fine->summary.as_accurate_as_asked;
         const bool given = c.discretisation.elements || c.discretisation.time_tolerance;
         const Stop reason = fine->summary.stop.reason;
         if (agrees || given || pair == most_pairs || settings.elements > most_elements || reason == Stop::interrupted ||
             reason == Stop::time_limit) {
+            if (!coarser_mesh)
+                fine->summary.warnings.push_back(
+                    "so few elements leave no coarser run to compare with: the error is not known");
+            else if (!known)
+                fine->summary.warnings.push_back(
+                    fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is not known",
+                                coarse->summary.stop.time, name(coarse->summary.stop.reason)));
             accept(fine->summary, c);
             return fine->summary;
         }

@@ -286,6 +286,16 @@ TEST(CurveRun, givenSettingsAreUsed) {
     EXPECT_LE(error, o.summary.estimated_error);
 }
 
+TEST(CurveRun, anErrorThatIsNotKnownIsNotStatedAsSmall) {
+    // Four elements are two of a half, and there is no mesh of fewer to compare with.
+    const Outcome o = run_text(spheroid, {"model.kind=stokes", "discretisation.elements=4",
+                                          "discretisation.time_tolerance=1e-3", "time.end=1e-3"});
+    EXPECT_EQ(o.summary.estimated_error, 1);
+    EXPECT_FALSE(o.summary.as_accurate_as_asked);
+    ASSERT_FALSE(o.summary.warnings.empty());
+    EXPECT_NE(o.summary.warnings[0].find("the error is not known"), std::string::npos) << o.summary.warnings[0];
+}
+
 TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
     // An independent spectral curve code finds the profile vertical at t = .0086943.
     std::ifstream file(std::string(TUBULE_CASES) + "/overhang.toml");
