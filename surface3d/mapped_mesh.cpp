@@ -9,7 +9,7 @@
 namespace tubule::surface3d {
 
 CurvedMesh flat_mesh(const TriangleMesh& base, int order) {
-    if (order < 2 || order > max_order) throw std::invalid_argument("the order of a curved mesh must be 2, 3 or 4");
+    if (order < 1 || order > max_order) throw std::invalid_argument("the order of a mesh must be 1, 2, 3 or 4");
     const auto nodes = lattice(order);
     CurvedMesh mesh{.order = order, .nodes = base.points, .cells = {}, .period = base.period, .shifts = {}};
     // Nodes inside an edge: first one and the triangle that made them, by the edge's corners. On a narrow tube two

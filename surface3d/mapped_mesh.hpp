@@ -8,7 +8,7 @@
 namespace tubule::surface3d {
 
 // The flat triangles of `base` with the nodes of P_k on them. Throws std::invalid_argument for another order than
-// 2 ... 4.
+// 1 ... 4.
 CurvedMesh flat_mesh(const TriangleMesh& base, int order);
 
 // The interpolant of another order of the same triangles.

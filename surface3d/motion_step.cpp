@@ -1,0 +1,194 @@
+#include "surface3d/motion_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tubule::surface3d {
+namespace {
+
+template <class AtPoint>
+Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
+    Eigen::Matrix2Xd of_cell(2, space.cells());  // so that the sum does not depend on the number of threads
+    const Tabulation& table = space.tabulation();
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            sum += table.weight[q] * p.area * at_point(cell, p, q);
+        }
+        of_cell.col(cell) = sum;
+    });
+    const Eigen::Vector2d total = of_cell.rowwise().sum();
+    return {total[0], total[1]};
+}
+
+}  // namespace
+
+Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh) {
+    return sum_over(space, mesh, [](int, const SurfacePoint<double>& p, int) {
+        return Eigen::Vector2d(1, p.x.head<2>().dot(p.normal.head<2>()) / 2);  // the flux of (x, y, 0)/2
+    });
+}
+
+Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d) {
+    const Tabulation& table = space.tabulation();
+    return sum_over(space, mesh, [&](int cell, const SurfacePoint<double>& p, int q) {
+        const CellColumns<3> D = space.gather(d, cell);
+        const double divergence = gradients(p, table, q).cwiseProduct(D).sum();
+        return Eigen::Vector2d(divergence, (D * table.value.col(q)).dot(p.normal));
+    });
+}
+
+MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending,
+                             const MotionControl& control)
+    : mesh_(mesh),
+      space_(mesh),
+      law_(law),
+      bending_(bending),
+      control_(control),
+      unknowns_(mesh, law, bending),
+      mesh_motion_(mesh),
+      solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {}
+
+CurvedMesh MotionStepper::mesh(const VectorField& X) const {
+    CurvedMesh out = mesh_;
+    for (int i = 0; i < out.size(); ++i) out.nodes[i] = X.col(i);
+    return out;
+}
+
+MotionState MotionStepper::start(const CurvedMesh& mesh) const {
+    MotionState s;
+    s.X.resize(3, mesh.size());
+    for (int i = 0; i < mesh.size(); ++i) s.X.col(i) = mesh.nodes[i];
+    s.X_past = s.X;
+    s.w.setZero(3, mesh.size());
+    s.w_past = s.w;
+    s.u.setZero(law_.components() * mesh.size());
+    s.u_past = s.u;
+    s.p.setZero(unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
+    return s;
+}
+
+MotionFields MotionStepper::fields(const CurvedMesh& mesh) {
+    if (projection_)
+        projection_->update(space_, mesh);
+    else
+        projection_.emplace(space_, mesh);
+    return motion_fields(space_, mesh, *projection_);
+}
+
+Eigen::VectorXd MotionStepper::flux(const Eigen::VectorXd& u, const CurvedMesh& mesh,
+                                    const MotionFields& fields) const {
+    const Tabulation& table = space_.tabulation();
+    const auto out = load<1>(space_, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<1>& sum) {
+        const SurfacePoint<double> p = tangent_point(X, table, q);
+        const auto phi = table.value.col(q);
+        const Eigen::Vector3d normal = (space_.gather(fields.normal, cell) * phi).normalized();
+        double speed = 0;
+        for (int a = 0; a < space_.width(); ++a) {
+            const int i = space_.node(cell, a);
+            if (law_.flows)
+                for (int d = 0; d < 3; ++d) speed += phi[a] * normal[d] * u[d * unknowns_.nodes() + i];
+            else
+                speed += phi[a] * u[i];
+        }
+        sum += (table.weight[q] * p.area * speed) * phi.transpose();
+    });
+    return out.transpose();
+}
+
+VectorField MotionStepper::velocity(const MotionState& state, const MotionFields& fields) const {
+    const int n = unknowns_.nodes();
+    VectorField out(3, n);
+    if (law_.flows) {
+        for (int d = 0; d < 3; ++d) out.row(d) = state.u.segment(d * n, n).transpose();
+        return out;
+    }
+    for (int i = 0; i < n; ++i) out.col(i) = state.u[i] * fields.normal.col(i);
+    if (!law_.inextensible) return out;
+    const Tabulation& table = space_.tabulation();
+    return out - (*projection_)(load<3>(space_, mesh(state.X), [&](int cell, const CellColumns<3>& X, int q,
+                                                                   CellColumns<3>& sum) {
+               const SurfacePoint<double> p = tangent_point(X, table, q);
+               const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
+               sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
+           }));
+}
+
+Eigen::VectorXd MotionStepper::solve(const MotionState&, const StepBase& base, double& lambda) {
+    assemble(space_, unknowns_, law_, bending_, base, system_);
+    const Extent now = extent(space_, *base.mesh), back = extent_rate(space_, *base.mesh, base.displacement);
+    if (law_.inextensible && control_.area)
+        system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
+    solver_.factor(system_.A);
+    lambda = 0;
+    if (!law_.keeps_volume) return solver_.solve(system_.b, 1);
+    Eigen::MatrixXd rhs(system_.b.size(), 2);
+    rhs << system_.b, system_.flux;
+    const Eigen::MatrixXd x = solver_.solve(rhs, 1);
+    const double rate = control_.volume ? (*control_.volume - now.volume + back.volume) / base.te : 0;
+    lambda = (system_.flux.dot(x.col(0)) - rate) / system_.flux.dot(x.col(1));
+    return x.col(0) - lambda * x.col(1);
+}
+
+double MotionStepper::correct(VectorField& X) {
+    const bool area = law_.inextensible && control_.area, volume = law_.keeps_volume && control_.volume;
+    if (!area && !volume) return 0;
+    double largest = 0;
+    for (int k = 0; k < 3; ++k) {
+        const CurvedMesh m = mesh(X);
+        const Extent now = extent(space_, m);
+        const Eigen::Vector2d missing(area ? *control_.area - now.area : 0, volume ? *control_.volume - now.volume : 0);
+        if (std::abs(missing[0]) <= 1e-13 * now.area && std::abs(missing[1]) <= 1e-13 * std::abs(now.volume)) break;
+        const MotionFields f = fields(m);
+        const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
+        const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
+        VectorField d;
+        if (area && volume) {
+            Eigen::Matrix2d J;
+            J << a.area, b.area, a.volume, b.volume;
+            const Eigen::Vector2d x = J.inverse() * missing;
+            d = x[0] * by_normal + x[1] * by_H;
+        } else {
+            d = volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
+        }
+        X += d;
+        largest = std::max(largest, d.colwise().norm().maxCoeff());
+    }
+    return largest;
+}
+
+MotionStep MotionStepper::step(const MotionState& from, double tau) {
+    const bool past = from.step > 0;
+    const double r = past ? tau / from.step : 0, rate = (1 + 2 * r) / ((1 + r) * tau), te = 1 / rate;
+    const auto bar = [&](const auto& now, const auto& before) {
+        return ((1 + r) * now - r * r / (1 + r) * before) * (te / tau);
+    };
+    const auto ahead = [&](const auto& now, const auto& before) { return (1 + r) * now - r * before; };
+    const VectorField Xbar = bar(from.X, from.X_past), Xstar = ahead(from.X, from.X_past);
+    const CurvedMesh at = mesh(Xstar);
+    StepBase base{&at, fields(at), Xstar - Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past),
+                  bar(from.u, from.u_past), te};
+    MotionStep out;
+    MotionState& to = out.state;
+    const Eigen::VectorXd x = solve(from, base, to.lambda);
+    to.time = from.time + tau, to.step = tau;
+    to.u = x.head(from.u.size());
+    if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
+    to.w = mesh_motion_.velocity(space_, at, mesh(Xbar), base.fields.normal, flux(to.u, at, base.fields),
+                                 control_.relaxation, te);
+    to.X = Xbar + te * to.w;
+    if (past) {
+        // Adams-Bashforth of second order for comparison; the constants of both errors are known (Milne).
+        const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
+        const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
+        const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
+        out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
+    }
+    out.correction = correct(to.X);
+    to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;
+    return out;
+}
+
+}  // namespace tubule::surface3d

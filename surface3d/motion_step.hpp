@@ -1,0 +1,82 @@
+// One step in time of a moving surface: backward differences of second order on the surface that is expected at the end
+// of the step, linearly implicit.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "surface3d/curved_mesh.hpp"
+#include "surface3d/mesh_motion.hpp"
+#include "surface3d/motion_forms.hpp"
+#include "surface3d/projection.hpp"
+
+namespace tubule::surface3d {
+
+// Nodal values at a time, and what the next step needs of the one before.
+struct MotionState {
+    double time = 0;
+    double step = 0;             // that led here; 0 at the start: then there is no past
+    VectorField X, w;            // positions, their velocity
+    Eigen::VectorXd u;           // velocity as in MotionUnknowns, component by component
+    VectorField X_past, w_past;  // at time - step
+    Eigen::VectorXd u_past;
+    Eigen::VectorXd p;      // pressure, at the nodes of its own order
+    double lambda = 0;
+};
+
+// What is kept on the way, and how the mesh moves.
+struct MotionControl {
+    std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
+    double relaxation = 0.1;             // time in which the mesh becomes even
+};
+
+struct MotionStep {
+    MotionState state;
+    double error = 0;       // of the positions over this step along the normal, largest, estimated
+    double correction = 0;  // largest displacement that area and volume took
+};
+
+class MotionStepper {
+public:
+    MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, const MotionControl& control);
+
+    // SolveError where a system cannot be solved.
+    MotionStep step(const MotionState& from, double tau);
+
+    // At rest.
+    MotionState start(const CurvedMesh& mesh) const;
+    CurvedMesh mesh(const VectorField& X) const;
+    // Velocities of the surface at the nodes.
+    VectorField velocity(const MotionState& state, const MotionFields& fields) const;
+
+    const SurfaceSpace& space() const { return space_; }
+    const MotionUnknowns& unknowns() const { return unknowns_; }
+    const MotionLaw& law() const { return law_; }
+    MotionFields fields(const CurvedMesh& mesh);
+
+private:
+    Eigen::VectorXd solve(const MotionState& from, const StepBase& base, double& lambda);
+    double correct(VectorField& X);
+    Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
+
+    CurvedMesh mesh_;
+    SurfaceSpace space_;
+    MotionLaw law_;
+    Bending bending_;
+    MotionControl control_;
+    MotionUnknowns unknowns_;
+    MeshMotion mesh_motion_;
+    StepSystem system_;
+    SparseLuLarge solver_;
+    std::optional<Projection> projection_;
+};
+
+// Area and volume (of one period), and their change with displacements d of the nodes:
+// (div_P d, 1) and (d.nu, 1).
+struct Extent {
+    double area = 0, volume = 0;
+};
+Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh);
+Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d);
+
+}  // namespace tubule::surface3d
