@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
+
 #include "common/geometry/profile_point.hpp"
+#include "surface3d/import_check.hpp"
 
 namespace tubule::surface3d {
 
@@ -44,6 +49,56 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
                                       o.integral_K, defect, euler_characteristic(mesh)),
                           advice};
     return std::nullopt;
+}
+
+namespace {
+
+// The triangles between neighbouring nodes of a cell, counter-clockwise.
+std::vector<std::array<int, 3>> lattice_triangles(int order) {
+    const auto nodes = lattice(order);
+    const auto at = [&](int j, int l) {
+        return static_cast<int>(std::find(nodes.begin(), nodes.end(), std::array<int, 3>{order - j - l, j, l}) -
+                                nodes.begin());
+    };
+    std::vector<std::array<int, 3>> out;
+    for (int j = 0; j < order; ++j)
+        for (int l = 0; j + l < order; ++l) {
+            out.push_back({at(j, l), at(j + 1, l), at(j, l + 1)});
+            if (j + l + 1 < order) out.push_back({at(j + 1, l), at(j + 1, l + 1), at(j, l + 1)});
+        }
+    return out;
+}
+
+// The flat triangles between the nodes; a periodic tube is cut open.
+TriangleMesh flattened(const CurvedMesh& mesh) {
+    TriangleMesh flat;
+    std::map<std::array<int, 2>, int> number;  // of a node, as a cell sees it
+    const auto small = lattice_triangles(mesh.order);
+    for (int cell = 0; cell < mesh.triangles(); ++cell)
+        for (const auto& corners : small) {
+            std::array<int, 3> triangle;
+            for (int c = 0; c < 3; ++c) {
+                const int shift = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
+                const auto [found, is_new] = number.try_emplace({mesh.node(cell, corners[c]), shift},
+                                                                static_cast<int>(flat.points.size()));
+                if (is_new) flat.points.push_back(mesh.position(cell, corners[c]));
+                triangle[c] = found->second;
+            }
+            flat.triangles.push_back(triangle);
+        }
+    return flat;
+}
+
+}  // namespace
+
+std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
+    const TriangleMesh flat = flattened(mesh);
+    const auto pair = first_intersection(flat);
+    if (!pair) return std::nullopt;
+    const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);
+    return StopReport{Stop::self_intersection, 0,
+                      fmt::format("the surface meets itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
+                      "the model knows no contact: what comes after is not meant"};
 }
 
 }  // namespace tubule::surface3d

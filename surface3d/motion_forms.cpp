@@ -48,7 +48,7 @@ struct CellWork {
     CellTables t;
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
-    Eigen::VectorXd rhs, flux, load;
+    Eigen::VectorXd rhs, flux, load, force;
 };
 
 class Assembler {
@@ -93,7 +93,7 @@ private:
     void fill_tables(const Point& at, const CellColumns<3>& gradient, const SurfacePoint<double>& p, int q,
                      CellTables& t) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
-    void add_bending(const std::vector<Point>& at, CellWork& work) const;
+    void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
 
@@ -118,7 +118,8 @@ void Assembler::size(CellWork& work) const {
         if (!law_.flows) t.psi_grad.resize(2 * Q, pressure_table_.functions());
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
-    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w);
+    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w),
+        work.force.setZero(w);
 }
 
 Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
@@ -205,7 +206,7 @@ void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& w
 }
 
 // -(grad f_H + (HP-B) grad f_K, G(v)) + (|B|^2 f_H + H K f_K - H f, v.nu), linear in H and K about those of X*
-void Assembler::add_bending(const std::vector<Point>& at, CellWork& work) const {
+void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();
     const auto add = [&](int columns, const auto& gradient, const auto& value) {
@@ -230,8 +231,11 @@ void Assembler::add_bending(const std::vector<Point>& at, CellWork& work) const 
         if (H_ >= 0) known -= in_H(s) * s.H;
         if (K_ >= 0) known -= in_K(s) * s.K;
         work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
+        work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
     }
+    if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
+    if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
 }
 
 // -(p, div_P v) and -(div_P u, q); where nothing flows u = (u.nu) nu - grad p/friction.
@@ -313,7 +317,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
         fill_tables(at.back(), gradient, p, q, work.t);
     }
     add_momentum(at, cell, work);
-    add_bending(at, work);
+    add_bending(at, cell, work);
     add_pressure(at, work);
     add_curvature_evolution(at, cell, work);
     unknowns_.add(system.A, cell, work.block);
@@ -322,6 +326,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
         system.b[numbers[i]] += work.rhs[i];
         system.flux[numbers[i]] += work.flux[i];
         system.pressure_load[numbers[i]] += work.load[i];
+        system.force[numbers[i]] += work.force[i];
     }
 }
 
@@ -334,6 +339,7 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const M
     system.b.setZero(unknowns.size());
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());
+    system.force.setZero(unknowns.size());
     const Assembler assembler(space, unknowns, law, bending, base);
     static thread_local CellWork work;
     space.for_each_cell([&](int cell) { assembler.add_cell(cell, work, system); });

@@ -33,11 +33,12 @@ struct StepSystem {
     Eigen::SparseMatrix<double> A;
     Eigen::VectorXd b;
     Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
-    Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b += rate * this makes INT div_P u = -rate
+    Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
+    Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
 };
 
-// Scheme "evolved curvature": H and K at the end of the step are unknowns, which their own evolution ties to u, so that
-// the bending force is implicit in both (docs/scheme3d in docs/surface_motion.md).
+// H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in
+// both. The equations stand in docs/surface_motion.md.
 void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 

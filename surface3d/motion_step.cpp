@@ -6,6 +6,9 @@
 namespace tubule::surface3d {
 namespace {
 
+constexpr int most_corrections = 5;
+constexpr double kept = 1e-12;  // area and volume, relative
+
 template <class AtPoint>
 Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
     Eigen::Matrix2Xd of_cell(2, space.cells());  // so that the sum does not depend on the number of threads
@@ -132,35 +135,58 @@ Eigen::VectorXd MotionStepper::solve(const MotionState&, const StepBase& base, d
     return x.col(0) - lambda * x.col(1);
 }
 
-double MotionStepper::correct(VectorField& X) {
+Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const {
+    const CurvedMesh& own = unknowns_.last_mesh();
+    if (own.order == mesh_.order) return state.p;
+    std::vector<QuadraturePoint> nodes;
+    for (const auto& [i, j, l] : lattice(mesh_.order))
+        nodes.push_back({static_cast<double>(j) / mesh_.order, static_cast<double>(l) / mesh_.order, 0});
+    const Tabulation table(own.order, nodes);
+    Eigen::VectorXd out(mesh_.size());
+    for (int cell = 0; cell < mesh_.triangles(); ++cell)
+        for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
+            double p = 0;
+            for (int b = 0; b < own.nodes_per_cell(); ++b) p += table.value(b, a) * state.p[own.node(cell, b)];
+            out[mesh_.node(cell, a)] = p;
+        }
+    return out;
+}
+
+// Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
+VectorField MotionStepper::correction(const VectorField& X, const MotionFields& f) const {
     const bool area = law_.inextensible && control_.area, volume = law_.keeps_volume && control_.volume;
-    if (!area && !volume) return 0;
-    double largest = 0;
-    for (int k = 0; k < 3; ++k) {
-        const CurvedMesh m = mesh(X);
+    VectorField sum = VectorField::Zero(3, X.cols());
+    if (!area && !volume) return sum;
+    const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
+    for (int k = 0; k < most_corrections; ++k) {
+        const CurvedMesh m = mesh(X + sum);
         const Extent now = extent(space_, m);
         const Eigen::Vector2d missing(area ? *control_.area - now.area : 0, volume ? *control_.volume - now.volume : 0);
-        if (std::abs(missing[0]) <= 1e-13 * now.area && std::abs(missing[1]) <= 1e-13 * std::abs(now.volume)) break;
-        const MotionFields f = fields(m);
-        const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
+        if (std::abs(missing[0]) <= kept * now.area && std::abs(missing[1]) <= kept * std::abs(now.volume)) break;
         const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
-        VectorField d;
         if (area && volume) {
             Eigen::Matrix2d J;
             J << a.area, b.area, a.volume, b.volume;
             const Eigen::Vector2d x = J.inverse() * missing;
-            d = x[0] * by_normal + x[1] * by_H;
+            sum += x[0] * by_normal + x[1] * by_H;
         } else {
-            d = volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
+            sum += volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
         }
-        X += d;
-        largest = std::max(largest, d.colwise().norm().maxCoeff());
     }
-    return largest;
+    return sum;
+}
+
+// -(b, d), to first order the energy that a displacement of the nodes takes.
+double MotionStepper::work(const VectorField& d, const MotionFields& fields) const {
+    const int n = unknowns_.nodes();
+    if (!law_.flows) return -system_.force.head(n).dot(d.cwiseProduct(fields.normal).colwise().sum());
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum -= system_.force.segment(i * n, n).dot(d.row(i));
+    return sum;
 }
 
 MotionStep MotionStepper::step(const MotionState& from, double tau) {
-    const bool past = from.step > 0;
+    const bool past = from.step > 0 && control_.second_order;
     const double r = past ? tau / from.step : 0, rate = (1 + 2 * r) / ((1 + r) * tau), te = 1 / rate;
     const auto bar = [&](const auto& now, const auto& before) {
         return ((1 + r) * now - r * r / (1 + r) * before) * (te / tau);
@@ -185,8 +211,12 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
         const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
         out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
+    } else if (from.step > 0) {
+        out.error = (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum().cwiseAbs().maxCoeff() / 2;
     }
-    out.correction = correct(to.X);
+    const VectorField kept_extent = correction(to.X, base.fields);
+    out.correction = work(kept_extent, base.fields);
+    to.X += kept_extent;
     to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;
     return out;
 }

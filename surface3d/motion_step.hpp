@@ -28,12 +28,13 @@ struct MotionState {
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
     double relaxation = 0.1;             // time in which the mesh becomes even
+    bool second_order = true;            // else Euler steps on the surface of their beginning
 };
 
 struct MotionStep {
     MotionState state;
     double error = 0;       // of the positions over this step along the normal, largest, estimated
-    double correction = 0;  // largest displacement that area and volume took
+    double correction = 0;  // energy that keeping area and volume took
 };
 
 class MotionStepper {
@@ -49,15 +50,20 @@ public:
     // Velocities of the surface at the nodes.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
 
+    // At the nodes of the mesh.
+    Eigen::VectorXd pressure_at_nodes(const MotionState& state) const;
+
     const SurfaceSpace& space() const { return space_; }
     const MotionUnknowns& unknowns() const { return unknowns_; }
     const MotionLaw& law() const { return law_; }
     MotionFields fields(const CurvedMesh& mesh);
+    // (u.nu, phi) of a velocity as in MotionState.
+    Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
 
 private:
     Eigen::VectorXd solve(const MotionState& from, const StepBase& base, double& lambda);
-    double correct(VectorField& X);
-    Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
+    VectorField correction(const VectorField& X, const MotionFields& fields) const;
+    double work(const VectorField& displacement, const MotionFields& fields) const;
 
     CurvedMesh mesh_;
     SurfaceSpace space_;

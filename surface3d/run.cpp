@@ -8,6 +8,7 @@
 #include "common/solve/sparse.hpp"
 #include "surface3d/guards.hpp"
 #include "surface3d/mapped_mesh.hpp"
+#include "surface3d/motion_frame.hpp"
 #include "surface3d/start.hpp"
 
 namespace tubule::surface3d {
@@ -147,13 +148,6 @@ std::vector<double> row(const Answer& answer, double seconds) {
     return out;
 }
 
-template <class Columns>
-Array array(const std::string& name, const Columns& nodal) {  // one column a node
-    Array out{name, {static_cast<std::size_t>(nodal.cols())}, {nodal.data(), nodal.data() + nodal.size()}};
-    if (nodal.rows() > 1) out.shape.push_back(nodal.rows());
-    return out;
-}
-
 Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
     const CurvatureField& field = m.curvature;
     Record out;
@@ -169,10 +163,6 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
                               array("K", field.K.transpose()), array("energy_density", energy_density)})
         out.arrays.push_back(more);
     return out;
-}
-
-SurfaceCells cells_of(const CurvedMesh& mesh) {
-    return {mesh.order, mesh.nodes.size(), mesh.cells, mesh.period, mesh.shifts};
 }
 
 // What the run came to, in the end.
@@ -192,7 +182,8 @@ StopReport stop_of(const Case& c, const Answer& answer, RunSummary& summary) {
 
 }  // namespace
 
-std::vector<std::string> series_names(const Case&) {
+std::vector<std::string> series_names(const Case& c) {
+    if (c.moves()) return motion_series_names(c);
     std::vector<std::string> names{"time", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
     for (const char* name : {"area", "volume", "integral_H2", "integral_K", "gauss_bonnet_defect", "energy_error",
@@ -205,7 +196,8 @@ void check_start(const Case& c) {
     start_mesh(c, fewest_triangles);
 }
 
-RunSummary run(const Case& c, RunObserver& observer) {
+RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
+    if (c.moves()) return run_motion(c, observer, restart);
     const auto started = std::chrono::steady_clock::now();
     const Answer answer = answer_to(c, observer);
     const Measured& m = answer.measured;

@@ -1,4 +1,4 @@
-// A case of tier "surface3d": the geometry, curvature and energies of its shape.
+// A case of tier "surface3d": the motion of its shape, or its geometry, curvature and energies.
 #pragma once
 
 #include <string>
@@ -6,6 +6,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
+#include "surface3d/motion_run.hpp"
 
 namespace tubule::surface3d {
 
@@ -15,9 +16,9 @@ std::vector<std::string> series_names(const Case& c);
 // Throws CaseError where the shape of the case cannot be meshed, for then nothing should be written.
 void check_start(const Case& c);
 
-// One row and one frame. The triangles are those of the case; where it leaves their number open, they become more until
+// A motion: motion_run.hpp. Else one row and one frame. The triangles are those of the case; where it leaves their number open, they become more until
 // the energy is as accurate as asked. What the geometry does (elements that fold, curvatures of no surface) is reported
 // in the summary; throws as check_start.
-RunSummary run(const Case& c, RunObserver& observer);
+RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::surface3d

@@ -16,6 +16,7 @@
 #include "surface3d/graded_mesh.hpp"
 #include "surface3d/import_fit.hpp"
 #include "surface3d/mapped_mesh.hpp"
+#include "surface3d/motion_frame.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -47,7 +48,7 @@ TriangleMesh uniform_tube(double radius, double length, int triangles) {
 // The shape map(base), with its curvatures where the case wants the exact ones.
 template <class Map>
 StartMesh mapped(const Case& c, const TriangleMesh& base, const Map& map) {
-    const int order = c.surface.order;
+    const int order = element_order(c);
     StartMesh start{mapped_mesh(base, order, map), true, {}, {}};
     if (c.surface.recovery == Recovery::exact) start.exact = exact_curvature(start.mesh, exact_nodes(base, order, map));
     return start;
@@ -59,7 +60,7 @@ StartMesh meshed(const Case& c, int triangles, const Map& map, const Profile& pr
     const auto base = [&] {
         switch (c.surface.mesh) {
             case MeshKind::graded:
-                return graded_rings(resolution_of(map, profile, c.surface.order), profile, triangles);
+                return graded_rings(resolution_of(map, profile, element_order(c)), profile, triangles);
             case MeshKind::irregular:
                 return jittered(uniform(), jitter, seed);
             default:
@@ -73,7 +74,7 @@ StartMesh meshed(const Case& c, int triangles, const Map& map, const Profile& pr
 template <class Map>
 StartMesh meshed_in_rings(const Case& c, int triangles, const Map& map, const Profile& profile) {
     return meshed(c, triangles, map, profile,
-                  [&] { return uniform_rings(resolution_of(map, profile, c.surface.order), profile, triangles); });
+                  [&] { return uniform_rings(resolution_of(map, profile, element_order(c)), profile, triangles); });
 }
 
 std::filesystem::path beside(const Case& c, const std::string& path) {
@@ -106,13 +107,6 @@ double number(const Record& record, const std::string& name) {
     for (const auto& [key, value] : record.numbers)
         if (key == name) return value;
     return 0;
-}
-
-CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points) {
-    CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
-    for (std::size_t i = 0; i < cells.nodes; ++i)
-        mesh.nodes.emplace_back(points.data[3 * i], points.data[3 * i + 1], points.data[3 * i + 2]);
-    return mesh;
 }
 
 struct MakeStart {
@@ -171,7 +165,7 @@ struct MakeStart {
         try {
             ImportedMesh imported = read_mesh(beside(c, file.path), file.weld);
             close_mesh(imported);
-            Fit fit = fit_surface(imported, {.order = c.surface.order, .smoothing = file.smoothing});
+            Fit fit = fit_surface(imported, {.order = element_order(c), .smoothing = file.smoothing});
             std::vector<std::string> notes = imported.notes;
             notes.insert(notes.end(), fit.report.notes.begin(), fit.report.notes.end());
             return {std::move(fit.surface), false, notes, {}};
@@ -185,7 +179,7 @@ struct MakeStart {
         if (frame.mesh) {
             refuse_what_needs_a_shape();
             const CurvedMesh mesh = curved_mesh(result.meshes.at(*frame.mesh), *find_array(frame, "points"));
-            return {mesh.order == c.surface.order ? mesh : with_order(mesh, c.surface.order), false, {}, {}};
+            return {mesh.order == element_order(c) ? mesh : with_order(mesh, element_order(c)), false, {}, {}};
         }
         if (find_array(frame, "knots") && find_array(frame, "coefficients")) return of_graph(frame);
         const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");

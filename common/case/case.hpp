@@ -66,10 +66,16 @@ struct Discretisation {
 // The same of tier surface3d.
 struct SurfaceDiscretisation {
     std::optional<int> elements;  // about how many triangles
-    int order = 3;                // of the elements: 2, 3, 4
+    std::optional<int> order;     // of the elements: 2, 3, 4; element_order() tells the default
     MeshKind mesh = MeshKind::uniform;
+    // Of a shape at rest:
     Recovery recovery = Recovery::patch;
     double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none
+    // Of a motion:
+    Scheme scheme = Scheme::bdf2;
+    std::optional<double> step;            // the same for all steps; switches their control off
+    std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
+    std::optional<double> relaxation;      // time in which the mesh becomes even
 };
 
 struct TimeSpan {
@@ -108,6 +114,13 @@ struct Case {
     TimeSpan time;
     std::optional<EquilibriumChoices> equilibrium;  // instead of a motion
     Expect expect;
+
+    bool moves() const { return time.end > 0; }
 };
+
+// Of curved triangles: fourth order follows motion better, third is enough to look at a shape (docs/decisions.md).
+inline int element_order(const Case& c) {
+    return c.surface.order.value_or(c.moves() ? 4 : 3);
+}
 
 }  // namespace tubule

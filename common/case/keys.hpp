@@ -68,8 +68,16 @@ inline std::vector<std::string> known_series() {
                              "elements",
                              "kinetic_energy",
                              "speed",
+                             "momentum_x",
+                             "momentum_y",
                              "momentum_z",
+                             "angular_momentum_x",
+                             "angular_momentum_y",
                              "angular_momentum_z",
+                             "stretching",
+                             "quality",
+                             "turn",
+                             "correction_energy",
                              "lambda",
                              "parameter",
                              "special",
@@ -172,11 +180,22 @@ void keys(Keys& k, Discretisation& d) {
 }
 
 template <class Keys>
-void keys(Keys& k, SurfaceDiscretisation& d) {
+void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
     k.integer("elements", d.elements, {.from = 20, .to = 1000000});
     k.integer("order", d.order, {.from = 2, .to = 4, .step = 1});
     k.choice("mesh", d.mesh,
              {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
+    if (moves) {
+        for (const char* key : {"recovery", "smoothing"})
+            k.absent(key, "must be absent: a surface that moves has its own curvatures");
+        k.choice("scheme", d.scheme, {{"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}});
+        k.number("step", d.step, {.above = 0});
+        k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
+        k.number("relaxation", d.relaxation, {.above = 0});
+        return;
+    }
+    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation"})
+        k.absent(key, "must be absent: it belongs to a motion, which has a table [time]");
     k.choice("recovery", d.recovery,
              {{"elementwise", Recovery::elementwise},
               {"normal", Recovery::normal},
@@ -307,45 +326,59 @@ void check_together(Keys& k, const Case& c) {
     });
 }
 
+// Tier axisym moves a profile or looks for its equilibria.
+template <class Keys>
+void motion_keys(Keys& k, Case& c) {
+    k.table("model", [&](auto& k) { keys(k, c.model); });
+    k.optional_table("equilibrium", c.equilibrium, [](auto& k, EquilibriumChoices& e) { keys(k, e); });
+    if (c.equilibrium) {
+        for (const char* key : {"velocity", "time"})
+            k.absent(key, "must be absent: nothing moves in a case with [equilibrium]");
+        return;
+    }
+    k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
+    k.table("time", [&](auto& k) { keys(k, c.time); });
+}
+
+// Tier surface3d moves a surface if there is a time to do so.
+template <class Keys>
+void surface_motion_keys(Keys& k, Case& c) {
+    k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
+    std::optional<TimeSpan> time;
+    if (c.moves()) time = c.time;
+    k.optional_table("time", time, [](auto& k, TimeSpan& t) { keys(k, t); });
+    if (time) c.time = *time;
+    if (!c.moves()) {
+        for (const char* key : {"model", "velocity"})
+            k.absent(key, "must be absent: without a table [time] nothing moves");
+        return;
+    }
+    k.table("model", [&](auto& k) { keys(k, c.model); });
+    k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
+}
+
 template <class Keys>
 void keys(Keys& k, Case& c) {
     k.choice("tier", c.tier, {{"axisym", Tier::axisym}, {"surface3d", Tier::surface3d}}, k.required);
-    const bool moves = c.tier == Tier::axisym;
     k.table("about", [&](auto& k) {
         k.text("title", c.title);
         k.text("source", c.source);
     });
     k.table("energy", [&](auto& k) { keys(k, c.energy); });
-    const auto only_axisym = [&](const std::string& key, const auto& describe) {
-        if (moves)
-            k.table(key, describe);
-        else
-            k.absent(key, "must be absent: tier \"surface3d\" does not move surfaces yet");
-    };
-    only_axisym("model", [&](auto& k) { keys(k, c.model); });
-    if (moves)
-        k.optional_table("equilibrium", c.equilibrium, [](auto& k, EquilibriumChoices& e) { keys(k, e); });
+    if (c.tier == Tier::axisym)
+        motion_keys(k, c);
     else
-        k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
-    const char* no_motion = "must be absent: nothing moves in a case with [equilibrium]";
-    if (c.equilibrium)
-        k.absent("velocity", no_motion);
-    else
-        only_axisym("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
+        surface_motion_keys(k, c);
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
     k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });
     k.table("discretisation", [&](auto& k) {
         if (c.tier == Tier::surface3d)
-            keys(k, c.surface);
+            keys(k, c.surface, c.moves());
         else if (c.equilibrium)
             k.integer("order", c.discretisation.order, {.from = 3, .to = 7, .step = 2});
         else
             keys(k, c.discretisation);
     });
-    if (c.equilibrium)
-        k.absent("time", no_motion);
-    else
-        only_axisym("time", [&](auto& k) { keys(k, c.time); });
     // The shapes of a branch are numbered as if that were their time.
     const double end = c.equilibrium ? std::numeric_limits<int>::max() : c.time.end;
     k.table("expect", [&](auto& k) { keys(k, c.expect, end); });

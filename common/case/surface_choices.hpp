@@ -21,4 +21,10 @@ enum class MeshKind {
     irregular  // uniform, then disturbed at random: to see that nothing hangs on regular neighbours
 };
 
+// How a surface is moved.
+enum class Scheme {
+    bdf2,  // H and K implicit, backward differences of second order
+    euler  // the same of first order
+};
+
 }  // namespace tubule

@@ -84,11 +84,11 @@ std::vector<std::string> series_names(const Case& c) {
     if (c.equilibrium) return axisym::equilibrium_series_names(c);
     return c.tier == Tier::axisym ? axisym::series_names(c) : surface3d::series_names(c);
 }
-RunSummary run_tier(const Case& c, RunObserver& observer, const Record* restart) {
+RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart) {
     if (c.equilibrium) return axisym::run_equilibrium(c, observer);
-    if (c.tier == Tier::axisym) return axisym::run(c, observer, restart);
-    if (restart) observer.discard();  // nothing moves: there is no half of it to go on from
-    return surface3d::run(c, observer);
+    if (c.tier == Tier::axisym) return axisym::run(c, observer, restart ? &restart->record : nullptr);
+    if (restart && !c.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
+    return surface3d::run(c, observer, restart);
 }
 
 // Why a result's run ended; nothing if it is unfinished.
@@ -154,7 +154,7 @@ bool derivatives_pass(const Case& c) {
 
 struct Opened {
     ResultWriter writer;
-    std::optional<Record> restart;
+    std::optional<surface3d::Restart> restart;
 };
 
 Opened create(const Case& c, const std::filesystem::path& file) {
@@ -173,7 +173,8 @@ std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
     if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
     if (old.frames.empty() && !old.checkpoint) return create(c, file);
     ResultWriter writer = ResultWriter::resume(file);
-    Record restart = writer.restart_record();
+    const Record& record = writer.restart_record();
+    surface3d::Restart restart{record, record.mesh ? old.meshes.at(*record.mesh) : SurfaceCells{}};
     return Opened{std::move(writer), std::move(restart)};
 }
 
@@ -208,7 +209,7 @@ int run_case(Case c, const RunOptions& options) {
     auto& [writer, restart] = *result;
     RunSummary summary;
     {
-        Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->time : 0);
+        Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->record.time : 0);
         summary = run_tier(c, recorder, restart ? &*restart : nullptr);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();

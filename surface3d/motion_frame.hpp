@@ -1,0 +1,44 @@
+// Moving surfaces as records of the result file, and as what a run goes on from.
+#pragma once
+
+#include "common/result/result.hpp"
+#include "surface3d/motion_measures.hpp"
+
+namespace tubule::surface3d {
+
+// Beside the state of the surface, what a run has to remember.
+struct MotionMemory {
+    double next_step = 0, relaxation = 0;
+    bool keeps_volume = true;  // and can, for H varies
+    int elements = 0;  // asked for
+    double tolerance = 0;
+    double area = 0, volume = 0;  // at the start
+    double total_start = 0;       // energy with kinetic energy, then
+    double dissipated = 0, corrected = 0, error = 0, reference_energy = 0;
+};
+
+// Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest
+// of the state under names that begin with restart_.
+Record motion_record(const MotionStepper& stepper, const MotionState& state, const MotionMeasures& measures,
+                     const Bending& bending, const MotionMemory& memory, std::size_t mesh_number);
+
+struct MotionRestart {
+    MotionState state;
+    MotionMemory memory;
+};
+
+// Throws std::runtime_error if the record does not hold such a state.
+MotionRestart motion_restart(const Record& record);
+
+SurfaceCells cells_of(const CurvedMesh& mesh);
+CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points);
+
+// One column a node.
+template <class Columns>
+Array array(const std::string& name, const Columns& nodal) {
+    Array out{name, {static_cast<std::size_t>(nodal.cols())}, {nodal.data(), nodal.data() + nodal.size()}};
+    if (nodal.rows() > 1) out.shape.push_back(nodal.rows());
+    return out;
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,484 @@
+#include "surface3d/motion_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "surface3d/guards.hpp"
+#include "surface3d/motion_frame.hpp"
+#include "surface3d/start.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+// Measured choices: docs/decisions.md, "Surfaces in motion".
+constexpr int first_triangles = 180, most_triangles = 40000;  // of the finer run of a pair
+constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarser one
+constexpr int most_pairs = 6;
+constexpr double tolerance_per_accuracy = 3;    // time_tolerance = this * asked accuracy^1.5, see tolerance_for()
+constexpr double relaxes_in = 0.2;              // of the time that the shape needs to change
+constexpr double first_step = 1e-4;             // of the time in which the mesh relaxes
+constexpr double growth = 1.6, safety = 0.85;   // of steps
+constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
+constexpr double climb = 0.25;                  // increase of the energy in a step, of the asked accuracy
+constexpr double worst_quality = 0.03, sharpest_turn = 1.2;
+constexpr int steps_between_looks = 10;
+constexpr double seconds_between_checkpoints = 20;
+constexpr double same_everywhere = 1e-8;  // variation_of_H
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The energy along a run, for another to be compared with.
+class Trace {
+public:
+    void add(double t, double energy) { points_.push_back({t, energy}); }
+    double end() const { return points_.back()[0]; }
+    // Cubic through the four nearest steps.
+    double operator()(double t) const {
+        const int n = static_cast<int>(points_.size());
+        const auto after = std::lower_bound(points_.begin(), points_.end(), t,
+                                            [](const auto& p, double x) { return p[0] < x; });
+        const int first = std::clamp(static_cast<int>(after - points_.begin()) - 2, 0, std::max(n - 4, 0));
+        double sum = 0;
+        for (int i = first; i < std::min(first + 4, n); ++i) {
+            double weight = 1;
+            for (int j = first; j < std::min(first + 4, n); ++j)
+                if (j != i) weight *= (t - points_[j][0]) / (points_[i][0] - points_[j][0]);
+            sum += weight * points_[i][1];
+        }
+        return sum;
+    }
+
+private:
+    std::vector<std::array<double, 2>> points_;
+};
+
+struct Settings {
+    int elements = first_triangles;
+    double tolerance = 1e-4;
+};
+
+double tolerance_for(double accuracy) {
+    return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, 1e-2);
+}
+
+Settings first_settings(const Case& c) {
+    return {c.surface.elements.value_or(first_triangles),
+            c.surface.time_tolerance.value_or(tolerance_for(c.accuracy.energy))};
+}
+
+Settings coarser(const Settings& s) {
+    return {static_cast<int>(s.elements / fewer_triangles), s.tolerance * longer_tolerance};
+}
+
+// `excess` is how many times more than asked the two runs before differed. Errors fall with the fourth power of the
+// mesh width and the power 2/3 of the tolerance.
+Settings finer(const Settings& s, double excess) {
+    const double by = std::clamp(std::sqrt(excess), 1.6, 4.0);
+    return {static_cast<int>(std::ceil(by * s.elements)), s.tolerance / std::clamp(std::pow(excess, 1.5), 4.0, 64.0)};
+}
+
+class MotionAttempt {
+public:
+    // Nothing is written unless `recorded`.
+    MotionAttempt(const Case& c, RunObserver& watch, bool recorded, const Settings& settings, const Trace* coarser,
+                  std::chrono::steady_clock::time_point started)
+        : case_(c), watch_(watch), recorded_(recorded), coarser_(coarser), started_(started) {
+        memory_.elements = settings.elements, memory_.tolerance = settings.tolerance;
+        outputs_ = c.time.output;
+        outputs_.push_back(c.time.end);
+        std::sort(outputs_.begin(), outputs_.end());
+        outputs_.erase(std::unique(outputs_.begin(), outputs_.end()), outputs_.end());
+        outputs_.erase(outputs_.begin(), std::upper_bound(outputs_.begin(), outputs_.end(), 0.0));
+    }
+
+    void begin();
+    void resume(const Restart& restart);
+    void go();
+
+    RunSummary summary;
+    Trace trace;
+    double error() const { return memory_.error; }  // largest difference from the coarser run, absolute
+    bool resizable = true;  // whether the number of triangles can be chosen
+
+private:
+    void make_stepper(const CurvedMesh& mesh);
+    void look();
+    double length() const { return std::sqrt(memory_.area); }
+    double total() const { return now_.bending.energy + now_.kinetic; }
+    double defect() const { return total() - memory_.total_start + memory_.dissipated; }
+    double left_until_output() const { return outputs_[next_output_] - state_.time; }
+
+    // What became of a trial step: nothing to say if it is taken.
+    struct Refusal {
+        double shrink = 0.25;  // the next trial is so much shorter
+        StopReport report;     // if no step is short enough
+    };
+    std::optional<Refusal> attempt(double tau);
+    std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
+    void take(const MotionStep& next, const MotionMeasures& m);
+    void set_next_step(double tau, double asked, double error);
+    std::optional<StopReport> step();
+    std::optional<StopReport> check();
+    std::optional<StopReport> check_shape() const;
+    double what_may_change() const;
+    void write_row();
+    void write_frame();
+    Record record() const { return motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh_number_); }
+
+    const Case& case_;
+    RunObserver& watch_;
+    bool recorded_;
+    const Trace* coarser_;
+    std::chrono::steady_clock::time_point started_;
+    std::unique_ptr<MotionStepper> stepper_;
+    MotionState state_;
+    MotionMeasures now_;
+    MotionMemory memory_;
+    std::optional<StopReport> early_;  // nothing can be begun
+    std::vector<double> outputs_;
+    std::size_t next_output_ = 0, mesh_number_ = 0;
+    double error_now_ = 0;
+    double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
+    int steps_ = 0, rejected_ = 0;
+    std::vector<double> row_;
+};
+
+// The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.
+double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
+    const double R = (closed ? 3 : 2) * std::abs(o.volume) / o.area;
+    const double drive = std::max(std::abs(o.energy), o.magnitude) / o.area;
+    return (law.friction * R * R + law.viscosity) / drive + std::sqrt(law.inertia * R * R / drive);
+}
+
+void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
+    MotionLaw law = motion_law(case_.model);
+    law.keeps_volume = memory_.keeps_volume;
+    const MotionControl control{.area = memory_.area,
+                                .volume = memory_.volume,
+                                .relaxation = memory_.relaxation,
+                                .second_order = case_.surface.scheme == Scheme::bdf2};
+    stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
+    if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
+    summary.elements = mesh.triangles();
+}
+
+void MotionAttempt::begin() {
+    const StartMesh start = start_mesh(case_, memory_.elements);
+    resizable = start.resizable;
+    summary.warnings = start.notes;
+    const SurfaceSpace space(start.mesh);
+    if (const auto fold = find_fold(space, start.mesh)) {
+        early_ = *fold;
+        return;
+    }
+    const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
+    const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, case_.energy);
+    const MotionLaw law = motion_law(case_.model);
+    memory_.area = o.area, memory_.volume = o.volume;
+    memory_.reference_energy = std::max(std::abs(o.energy), o.magnitude);
+    memory_.relaxation =
+        case_.surface.relaxation.value_or(relaxes_in * time_to_change(law, o, start.mesh.period == 0));
+    // Where H is the same everywhere, area and volume are the same condition: the pressure stands for lambda.
+    const bool same = law.inextensible && variation_of_H(space, start.mesh, fields) < same_everywhere;
+    memory_.keeps_volume = law.keeps_volume && !same;
+    memory_.next_step = case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end));
+    make_stepper(start.mesh);
+    state_ = stepper_->start(start.mesh);
+    if (case_.velocity.rotates)
+        for (int i = 0; i < start.mesh.size(); ++i) {
+            const Eigen::Vector3d& x = start.mesh.nodes[i];
+            state_.u[i] = -case_.velocity.omega * x.y();
+            state_.u[start.mesh.size() + i] = case_.velocity.omega * x.x();
+        }
+    state_.u_past = state_.u;
+    look();
+    memory_.total_start = total();
+    trace.add(0, now_.bending.energy);
+    write_row();
+    write_frame();
+}
+
+void MotionAttempt::resume(const Restart& restart) {
+    auto [state, memory] = motion_restart(restart.record);
+    memory_ = memory;
+    CurvedMesh mesh{restart.cells.order, {}, restart.cells.cells, restart.cells.period, restart.cells.shifts};
+    for (int i = 0; i < state.X.cols(); ++i) mesh.nodes.push_back(state.X.col(i));
+    make_stepper(mesh);
+    state_ = std::move(state);
+    look();
+    next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), state_.time) - outputs_.begin();
+    last_row_ = last_frame_ = state_.time;
+    trace.add(state_.time, now_.bending.energy);
+}
+
+void MotionAttempt::look() {
+    now_ = measure(*stepper_, state_, case_.energy);
+}
+
+std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
+    const double t = state_.time;
+    if (const auto spurious = find_impossible_curvature(m.bending, stepper_->mesh(next.state.X)))
+        return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
+    const double rise = m.bending.energy + m.kinetic - total();
+    if (rise > climb * case_.accuracy.energy * memory_.reference_energy)
+        return Refusal{0.25,
+                       {Stop::resolution_lost, t,
+                        fmt::format("the energy rises by {:.3g} of E_ref in a step of {:.3g}, which it cannot",
+                                    rise / memory_.reference_energy, next.state.step),
+                        "use more elements or, if given, a smaller discretisation.step"}};
+    return std::nullopt;
+}
+
+std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
+    const double t = state_.time;
+    const auto failed = [&](const std::string& what) {
+        return Refusal{0.25, {Stop::solver_failed, t, what, "try other elements, or another discretisation.order"}};
+    };
+    try {
+        const MotionStep next = stepper_->step(state_, tau);
+        if (!next.state.X.allFinite() || !next.state.u.allFinite()) return failed("the step overflows");
+        const double error = next.error / (memory_.tolerance * length());
+        if (!case_.surface.step && error > 2)
+            return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
+                           {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
+                            "ask for less accuracy, or use more elements"}};
+        const CurvedMesh mesh = stepper_->mesh(next.state.X);
+        if (auto fold = find_fold(stepper_->space(), mesh)) {
+            fold->time = t;
+            return Refusal{0.25, *fold};
+        }
+        const MotionMeasures m = measure(*stepper_, next.state, case_.energy);
+        if (const auto refusal = judge(next, m)) return refusal;
+        take(next, m);
+        set_next_step(tau, memory_.next_step, error);
+        return std::nullopt;
+    } catch (const SolveError& failure) {
+        return failed(failure.what());
+    }
+}
+
+void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
+    memory_.dissipated += next.state.step * (now_.dissipation + m.dissipation) / 2;
+    memory_.corrected += std::abs(next.correction);
+    state_ = next.state;
+    now_ = m;
+    ++steps_;
+}
+
+// A step that was cut short by an output says little about how long the next one may be.
+void MotionAttempt::set_next_step(double tau, double asked, double error) {
+    if (case_.surface.step) return;
+    const double factor = error > 0 ? std::clamp(safety / std::cbrt(error), 0.4, growth) : growth;
+    memory_.next_step = std::max(tau * factor, tau < asked ? std::min(asked, growth * tau) : 0.0);
+}
+
+// What lies in the shape itself: no shorter step would help.
+std::optional<StopReport> MotionAttempt::check_shape() const {
+    const double t = state_.time;
+    const auto where = [](const Eigen::Vector3d& x) { return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]); };
+    if (!(now_.symbol > 0))
+        return StopReport{Stop::ill_posed, t,
+                          "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(now_.least_symbol),
+                          "no resolution helps: the energy does not resist short waves there"};
+    if (now_.turn > sharpest_turn)
+        return StopReport{now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
+                          fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
+                                      now_.neck ? "a neck closes" : "the surface is too sharp", where(now_.sharpest),
+                                      now_.turn),
+                          now_.neck ? "more elements follow the neck further" : "use more elements"};
+    if (!(now_.quality > worst_quality))
+        return StopReport{Stop::mesh_lost, t,
+                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(now_.worst),
+                                      now_.quality),
+                          "use more elements or a shorter discretisation.relaxation"};
+    return std::nullopt;
+}
+
+// By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
+double MotionAttempt::what_may_change() const {
+    const double left = case_.time.end - state_.time;
+    return std::max({now_.dissipation * left, now_.kinetic, now_.acceleration * left * left});
+}
+
+std::optional<StopReport> MotionAttempt::check() {
+    const double t = state_.time;
+    if (seconds_since(started_) > case_.time.limit.value_or(std::numeric_limits<double>::infinity()))
+        return StopReport{Stop::time_limit, t, fmt::format("used the {} s of time.limit", *case_.time.limit),
+                          "go on with --resume"};
+    if (watch_.interrupted()) return StopReport{Stop::interrupted, t, "interrupted by a signal", "go on with --resume"};
+    if (auto lost = check_shape()) return lost;
+    if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.reference_energy)
+        return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
+    if (steps_ % steps_between_looks == 0)
+        if (const auto crossing = find_self_intersection(stepper_->mesh(state_.X))) {
+            StopReport report = *crossing;
+            report.time = t;
+            return report;
+        }
+    return std::nullopt;
+}
+
+std::optional<StopReport> MotionAttempt::step() {
+    const double left = left_until_output();
+    double tau = left / std::ceil(left / memory_.next_step * (1 - 1e-9));  // arrives without a last short step
+    while (const auto refusal = attempt(tau)) {
+        ++rejected_;
+        tau *= refusal->shrink;
+        memory_.next_step = tau;
+        if (case_.surface.step || tau < shortest_step * memory_.relaxation) return refusal->report;
+        if (watch_.interrupted()) break;
+    }
+    const double t = state_.time;
+    trace.add(t, now_.bending.energy);
+    if (coarser_ && t <= coarser_->end()) {
+        error_now_ = std::abs(now_.bending.energy - (*coarser_)(t));
+        memory_.error = std::max(memory_.error, error_now_);
+    }
+    write_row();
+    if (recorded_) watch_.progress(t, now_.bending.energy, state_.step);
+    if (left_until_output() <= 1e-12 * case_.time.end) {
+        state_.time = outputs_[next_output_++];
+        write_frame();
+        if (next_output_ == outputs_.size()) return StopReport{Stop::finished, state_.time, "reached time.end", ""};
+    }
+    if (recorded_ && seconds_since(started_) > last_checkpoint_ + seconds_between_checkpoints) {
+        last_checkpoint_ = seconds_since(started_);
+        watch_.checkpoint(record());
+    }
+    return check();
+}
+
+void MotionAttempt::go() {
+    std::optional<StopReport> stop = early_;
+    if (!stop) stop = check_shape();
+    if (!stop) stop = find_impossible_curvature(now_.bending, stepper_->mesh(state_.X));
+    while (!stop) stop = step();
+    summary.stop = *stop;
+    summary.energy = now_.bending.energy;
+    summary.reference_energy = memory_.reference_energy;
+    if (!stepper_) return;
+    write_row();
+    write_frame();
+    const int nodes = static_cast<int>(state_.X.cols());
+    summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", steps_, rejected_,
+                                 summary.elements, element_order(case_), nodes);
+    summary.details = {{"elements", std::int64_t{summary.elements}}, {"nodes", std::int64_t{nodes}},
+                       {"order", std::int64_t{element_order(case_)}}, {"steps", std::int64_t{steps_}},
+                       {"rejected_steps", std::int64_t{rejected_}},  {"time_tolerance", memory_.tolerance},
+                       {"relaxation", memory_.relaxation},           {"dissipated", memory_.dissipated},
+                       {"identity_defect", defect()},                {"correction_energy", memory_.corrected}};
+}
+
+void MotionAttempt::write_row() {
+    if (!recorded_ || last_row_ == state_.time) return;
+    last_row_ = state_.time;
+    const MotionMeasures& m = now_;
+    row_ = {state_.time, state_.step, m.bending.energy};
+    row_.insert(row_.end(), m.bending.energy_term.begin(), m.bending.energy_term.end());
+    for (const double value : {m.dissipation, defect(), m.bending.area, m.bending.volume, m.r_min, m.r_max, m.kinetic,
+                               m.speed, m.momentum.x(), m.momentum.y(), m.momentum.z(), m.angular_momentum.x(),
+                               m.angular_momentum.y(), m.angular_momentum.z(), state_.lambda, m.stretching,
+                               memory_.corrected, m.bending.integral_H2, m.bending.integral_K, m.quality, m.turn,
+                               error_now_, static_cast<double>(summary.elements), seconds_since(started_)})
+        row_.push_back(value);
+    watch_.row(row_);
+}
+
+void MotionAttempt::write_frame() {
+    if (!recorded_ || state_.time == last_frame_) return;
+    last_frame_ = state_.time;
+    watch_.frame([&] { return record(); });
+}
+
+bool settings_given(const Case& c) {
+    return c.surface.elements || c.surface.time_tolerance || c.surface.step;
+}
+
+void describe(RunSummary& s, const Case& c, double error, int pairs) {
+    s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
+    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
+    s.details.emplace_back("pairs", std::int64_t{pairs});
+}
+
+// A run that is less accurate than asked although nothing is left to refine.
+void accept(RunSummary& s, const Case& c, bool chosen) {
+    if (s.as_accurate_as_asked || s.stop.reason == Stop::interrupted || s.stop.reason == Stop::time_limit) return;
+    s.warnings.push_back(fmt::format("the energy is off by {:.2g} of E_ref (estimated), {:.2g} was asked for",
+                                     s.estimated_error, c.accuracy.energy));
+    if (chosen || s.stop.reason != Stop::finished) return;
+    s.stop = {Stop::resolution_lost, s.stop.time, s.warnings.back(), "ask for less accuracy"};
+    s.warnings.pop_back();
+}
+
+bool ended_early(Stop reason) {
+    return reason == Stop::interrupted || reason == Stop::time_limit;
+}
+
+}  // namespace
+
+std::vector<std::string> motion_series_names(const Case&) {
+    std::vector<std::string> names{"time", "step_size", "energy"};
+    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
+    for (const char* name :
+         {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "kinetic_energy", "speed", "momentum_x",
+          "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y", "angular_momentum_z", "lambda",
+          "stretching", "correction_energy", "integral_H2", "integral_K", "quality", "turn", "energy_error", "elements",
+          "wall_seconds"})
+        names.push_back(name);
+    return names;
+}
+
+RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* restart) {
+    const auto started = std::chrono::steady_clock::now();
+    Settings settings = first_settings(c);
+    if (restart) {
+        const MotionMemory memory = motion_restart(restart->record).memory;
+        settings = {memory.elements, memory.tolerance};
+    }
+    const auto run_one = [&](bool recorded, const Settings& with, const Trace* coarser) {
+        auto attempt = std::make_unique<MotionAttempt>(c, observer, recorded, with, coarser, started);
+        if (recorded && restart)
+            attempt->resume(*restart);
+        else
+            attempt->begin();
+        attempt->go();
+        return attempt;
+    };
+    auto coarse = run_one(false, coarser(settings), nullptr);
+    for (int pair = 1;; ++pair) {
+        if (ended_early(coarse->summary.stop.reason)) {
+            describe(coarse->summary, c, coarse->summary.reference_energy, pair);  // nothing is known of the error yet
+            return coarse->summary;
+        }
+        auto fine = run_one(true, settings, &coarse->trace);
+        const Stop reason = fine->summary.stop.reason;
+        const bool known = coarse->summary.elements < fine->summary.elements &&
+                           (coarse->summary.stop.reason == reason || ended_early(reason));
+        describe(fine->summary, c, known ? fine->error() : fine->summary.reference_energy, pair);
+        const bool given = settings_given(c) || !fine->resizable;
+        if (fine->summary.as_accurate_as_asked || given || pair == most_pairs ||
+            settings.elements * 1.6 > most_triangles || ended_early(reason)) {
+            if (!known)
+                fine->summary.warnings.push_back(
+                    fmt::format("the coarser run of the pair, of {} triangles, ended at t = {:.6g} with {}: the error "
+                                "is not known",
+                                coarse->summary.elements, coarse->summary.stop.time, name(coarse->summary.stop.reason)));
+            accept(fine->summary, c, given);
+            return fine->summary;
+        }
+        settings = finer(settings, fine->summary.estimated_error / c.accuracy.energy);
+        observer.discard();
+        restart = nullptr;
+        coarse = std::move(fine);
+    }
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,24 @@
+// Runs of a moving surface: as accurate as asked in space and time, stopped where its answer would mean nothing.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+
+namespace tubule::surface3d {
+
+// What an interrupted run goes on from.
+struct Restart {
+    Record record;
+    SurfaceCells cells;
+};
+
+std::vector<std::string> motion_series_names(const Case& c);
+
+// Each run is one of a pair: the energies of the coarser one, of fewer triangles and larger steps, tell the error of
+// the finer one, which is written. Pairs become finer until the energy is as accurate as asked at all times.
+RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* restart);
+
+}  // namespace tubule::surface3d
