@@ -33,15 +33,6 @@ void require_finite(const Matrix& A) {
                 throw SolveError(fmt::format("matrix entry ({}, {}) is {}", entry.row(), column, entry.value()));
 }
 
-// A second BLAS thread gains nothing in factors as small as ours, and OpenBLAS's wait by spinning, on the core that the
-// next assembly wants (docs/decisions.md). Who sets OPENBLAS_NUM_THREADS is obeyed.
-void use_one_blas_thread() {
-    [[maybe_unused]] static const bool once = [] {
-        if (!std::getenv("OPENBLAS_NUM_THREADS")) openblas_set_num_threads(1);
-        return true;
-    }();
-}
-
 double norm_1(const Matrix& A) {
     double norm = 0;
     for (int column = 0; column < A.cols(); ++column) norm = std::max(norm, A.col(column).cwiseAbs().sum());
@@ -78,6 +69,13 @@ double norm_1_of_inverse(SparseEngine& engine, int n) {
 }
 
 }  // namespace
+
+void use_one_blas_thread() {
+    [[maybe_unused]] static const bool once = [] {
+        if (!std::getenv("OPENBLAS_NUM_THREADS")) openblas_set_num_threads(1);
+        return true;
+    }();
+}
 
 struct SparseSolver::Impl {
     const char* name;

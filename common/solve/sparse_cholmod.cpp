@@ -1,4 +1,5 @@
-#include <cholmod.h>
+#include "common/solve/sparse_cholmod.hpp"
+
 #include <fmt/core.h>
 #include <omp.h>
 
@@ -15,18 +16,6 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 
-// A CHOLMOD workspace that prints nothing and uses one ordering, to be filled in.
-struct Common : cholmod_common {
-    Common() {
-        cholmod_start(this);
-        print = 0;
-        nmethods = 1;
-    }
-    Common(const Common&) = delete;
-    Common& operator=(const Common&) = delete;
-    ~Common() { cholmod_finish(this); }
-};
-
 // While it lives, parallel regions have one thread. CHOLMOD asks for four in every supernode, whatever the machine has,
 // and these wait for each other by spinning: on two busy cores it took 2 to 30 times as long (docs/decisions.md).
 class OneThread {
@@ -39,22 +28,6 @@ public:
 private:
     int levels_ = omp_get_max_active_levels();
 };
-
-// The lower triangle of A as CHOLMOD sees it, without a copy.
-cholmod_sparse lower_triangle(const Matrix& A) {
-    cholmod_sparse view{};
-    view.nrow = view.ncol = static_cast<std::size_t>(A.cols());
-    view.nzmax = static_cast<std::size_t>(A.nonZeros());
-    view.p = const_cast<int*>(A.outerIndexPtr());
-    view.i = const_cast<int*>(A.innerIndexPtr());
-    view.x = const_cast<double*>(A.valuePtr());
-    view.stype = -1;
-    view.itype = CHOLMOD_INT;
-    view.xtype = CHOLMOD_REAL;
-    view.dtype = CHOLMOD_DOUBLE;
-    view.sorted = view.packed = 1;
-    return view;
-}
 
 // Throws SolveError unless diagonal entries are positive and those across it agree to rounding, measured by
 // |a_ij| < sqrt(a_ii a_jj), which holds for every positive definite matrix in whatever units its unknowns come.
@@ -143,7 +116,7 @@ private:
     }
 
     Ordering ordering_;
-    Common common_;
+    CholmodCommon common_;
     cholmod_factor* factor_ = nullptr;
     std::int64_t fill_ = 0;
 };
@@ -183,6 +156,21 @@ int count_nodes(const Matrix& A, const std::vector<int>& node_of_unknown) {
 
 }  // namespace
 
+cholmod_sparse lower_triangle(const Matrix& A) {
+    cholmod_sparse view{};
+    view.nrow = view.ncol = static_cast<std::size_t>(A.cols());
+    view.nzmax = static_cast<std::size_t>(A.nonZeros());
+    view.p = const_cast<int*>(A.outerIndexPtr());
+    view.i = const_cast<int*>(A.innerIndexPtr());
+    view.x = const_cast<double*>(A.valuePtr());
+    view.stype = -1;
+    view.itype = CHOLMOD_INT;
+    view.xtype = CHOLMOD_REAL;
+    view.dtype = CHOLMOD_DOUBLE;
+    view.sorted = view.packed = 1;
+    return view;
+}
+
 void require_ordering(const Ordering& ordering, int size) {
     if (ordering.empty()) return;
     if (static_cast<int>(ordering.size()) != size)
@@ -208,7 +196,7 @@ Ordering nested_dissection(const Matrix& A, const std::vector<int>& node_of_unkn
     const int nodes = count_nodes(A, node);
     const Matrix graph = node_graph(A, node, nodes);
     cholmod_sparse view = lower_triangle(graph);
-    Common common;
+    CholmodCommon common;
     Ordering node_at(nodes);
     if (!cholmod_metis(&view, nullptr, 0, /*postorder*/ 1, node_at.data(), &common))
         throw SolveError(fmt::format("METIS gives up on {} nodes (status {})", nodes, common.status));

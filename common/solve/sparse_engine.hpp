@@ -34,4 +34,8 @@ public:
 // std::invalid_argument unless the ordering is empty or a permutation of this many unknowns.
 void require_ordering(const Ordering& ordering, int size);
 
+// A second BLAS thread gains nothing in factors as small as ours, and OpenBLAS's wait by spinning, on the core that the
+// next assembly wants (docs/decisions.md). Who sets OPENBLAS_NUM_THREADS is obeyed.
+void use_one_blas_thread();
+
 }  // namespace tubule
