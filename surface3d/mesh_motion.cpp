@@ -7,7 +7,7 @@ namespace tubule::surface3d {
 MeshMotion::MeshMotion(const CurvedMesh& mesh)
     : unknowns_(mesh, 4),
       A_(unknowns_.pattern()),
-      solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {}
+      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {}
 
 VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedMesh& from,
                                  const VectorField& normal, const Eigen::VectorXd& flux, double relaxation,
@@ -42,8 +42,7 @@ VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& me
             for (int d = 0; d < 3; ++d) b[d * nodes + i] += pull(d, a);
         }
     });
-    solver_.factor(A_);
-    const Eigen::VectorXd x = solver_.solve(b, 1);
+    const Eigen::VectorXd x = solver_.solve(A_, b).x;
     VectorField out(3, nodes);
     for (int d = 0; d < 3; ++d) out.row(d) = x.segment(d * nodes, nodes).transpose();
     return out;

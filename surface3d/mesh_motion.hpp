@@ -1,7 +1,7 @@
 // How the nodes move: with the surface in the direction of its normal, along it so that the triangles stay good.
 #pragma once
 
-#include "common/solve/sparse.hpp"
+#include "common/solve/bordered.hpp"
 #include "surface3d/field_unknowns.hpp"
 
 namespace tubule::surface3d {
@@ -21,7 +21,7 @@ public:
 private:
     FieldUnknowns unknowns_;
     Eigen::SparseMatrix<double> A_;
-    SparseLuLarge solver_;
+    BorderedSolver solver_;
 };
 
 }  // namespace tubule::surface3d

@@ -52,7 +52,7 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
       control_(control),
       unknowns_(mesh, law, bending),
       mesh_motion_(mesh),
-      solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {}
+      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {}
 
 CurvedMesh MotionStepper::mesh(const VectorField& X) const {
     CurvedMesh out = mesh_;
@@ -119,20 +119,34 @@ VectorField MotionStepper::velocity(const MotionState& state, const MotionFields
            }));
 }
 
-Eigen::VectorXd MotionStepper::solve(const MotionState&, const StepBase& base, double& lambda) {
+// The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without derivatives
+// and the variation of these factors.
+void MotionStepper::make_symmetric(const StepBase& base) {
+    Eigen::VectorXd scale = Eigen::VectorXd::Ones(unknowns_.size());
+    for (int i = 0; i < unknowns_.nodes(); ++i) {
+        const CurvatureJet<double> f = density(bending_, base.fields.H[i], base.fields.K[i]);
+        const auto factor = [&](double second) { return second > 0 ? -second / base.te : -1 / base.te; };
+        if (unknowns_.H >= 0) scale[unknowns_.H + i] = factor(f.HH);
+        if (unknowns_.K >= 0) scale[unknowns_.K + i] = factor(f.KK);
+    }
+    for (Eigen::Index k = 0; k < system_.A.nonZeros(); ++k)
+        system_.A.valuePtr()[k] *= scale[system_.A.innerIndexPtr()[k]];
+    system_.b.array() *= scale.array();
+}
+
+Eigen::VectorXd MotionStepper::solve(const StepBase& base, double& lambda) {
     assemble(space_, unknowns_, law_, bending_, base, system_);
     const Extent now = extent(space_, *base.mesh), back = extent_rate(space_, *base.mesh, base.displacement);
     if (law_.inextensible && control_.area)
         system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
-    solver_.factor(system_.A);
+    make_symmetric(base);
     lambda = 0;
-    if (!law_.keeps_volume) return solver_.solve(system_.b, 1);
-    Eigen::MatrixXd rhs(system_.b.size(), 2);
-    rhs << system_.b, system_.flux;
-    const Eigen::MatrixXd x = solver_.solve(rhs, 1);
-    const double rate = control_.volume ? (*control_.volume - now.volume + back.volume) / base.te : 0;
-    lambda = (system_.flux.dot(x.col(0)) - rate) / system_.flux.dot(x.col(1));
-    return x.col(0) - lambda * x.col(1);
+    if (!law_.keeps_volume) return solver_.solve(system_.A, system_.b).x;
+    Eigen::VectorXd rate(1);
+    rate << (control_.volume ? (*control_.volume - now.volume + back.volume) / base.te : 0);
+    const auto [x, y] = solver_.solve(system_.A, system_.b, system_.flux, rate);
+    lambda = y[0];
+    return x;
 }
 
 Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const {
@@ -198,7 +212,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
                   bar(from.u, from.u_past), te};
     MotionStep out;
     MotionState& to = out.state;
-    const Eigen::VectorXd x = solve(from, base, to.lambda);
+    const Eigen::VectorXd x = solve(base, to.lambda);
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);

@@ -61,7 +61,8 @@ public:
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
 
 private:
-    Eigen::VectorXd solve(const MotionState& from, const StepBase& base, double& lambda);
+    Eigen::VectorXd solve(const StepBase& base, double& lambda);
+    void make_symmetric(const StepBase& base);
     VectorField correction(const VectorField& X, const MotionFields& fields) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;
 
@@ -73,7 +74,7 @@ private:
     MotionUnknowns unknowns_;
     MeshMotion mesh_motion_;
     StepSystem system_;
-    SparseLuLarge solver_;
+    BorderedSolver solver_;
     std::optional<Projection> projection_;
 };
 

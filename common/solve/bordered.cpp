@@ -1,0 +1,71 @@
+#include "common/solve/bordered.hpp"
+
+#include <Eigen/LU>
+
+namespace tubule {
+namespace {
+
+constexpr double regularisation = 1e-5, tolerance = 1e-11;
+constexpr int most_iterations = 60;
+
+}  // namespace
+
+BorderedSolver::BorderedSolver(const Eigen::SparseMatrix<double>& pattern, const std::vector<int>& node_of_unknown)
+    : ordering_(nested_dissection(pattern, node_of_unknown)), factors_(ordering_, regularisation) {}
+
+BorderedSolver::Answer BorderedSolver::solve(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
+                                             const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+    const Eigen::MatrixXd columns = C.cols() > 0 ? C : Eigen::MatrixXd(b.size(), 0);
+    try {
+        return iterate(A, b, columns, d);
+    } catch (const SolveError&) {
+        ++fallbacks_;
+        return directly(A, b, columns, d);
+    }
+}
+
+// Preconditioned by the same block elimination with the factors in place of A.
+BorderedSolver::Answer BorderedSolver::iterate(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
+                                               const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+    const int n = static_cast<int>(b.size()), m = static_cast<int>(C.cols());
+    factors_.factor(A);
+    Eigen::MatrixXd W(n, m);
+    for (int j = 0; j < m; ++j) W.col(j) = factors_.solve(C.col(j));
+    const Eigen::MatrixXd S = C.transpose() * W;
+    const Eigen::PartialPivLU<Eigen::MatrixXd> schur(m > 0 ? S : Eigen::MatrixXd::Identity(1, 1).eval());
+    const Gmres::Operator whole = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {
+        y.head(n).noalias() = A * x.head(n);
+        if (m == 0) return;
+        y.head(n).noalias() += C * x.tail(m);
+        y.tail(m).noalias() = C.transpose() * x.head(n);
+    };
+    Eigen::VectorXd part;
+    const Gmres::Operator nearly = [&](const Eigen::VectorXd& r, Eigen::VectorXd& x) {
+        factors_.solve(r.head(n), part);
+        x.head(n) = part;
+        if (m == 0) return;
+        x.tail(m) = schur.solve(C.transpose() * part - r.tail(m));
+        x.head(n).noalias() -= W * x.tail(m);
+    };
+    if (!gmres_) gmres_.emplace(n + m);
+    Eigen::VectorXd rhs(n + m), x = Eigen::VectorXd::Zero(n + m);
+    rhs.head(n) = b;
+    if (m > 0) rhs.tail(m) = d;
+    nearly(rhs, x);
+    iterations_ = gmres_->solve(whole, nearly, rhs, x, tolerance, most_iterations).iterations;
+    return {x.head(n), x.tail(m)};
+}
+
+BorderedSolver::Answer BorderedSolver::directly(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
+                                                const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+    if (!lu_) lu_.emplace(ordering_);
+    lu_->factor(A);
+    const Eigen::VectorXd x = lu_->solve(b, 1);
+    if (C.cols() == 0) return {x, {}};
+    const Eigen::MatrixXd W = lu_->solve(C, 1);
+    const Eigen::MatrixXd S = C.transpose() * W;
+    const Eigen::VectorXd y = S.partialPivLu().solve(C.transpose() * x - d);
+    return {x - W * y, y};
+}
+
+}  // namespace tubule
