@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -198,8 +199,9 @@ inline System saddle(const Triangles& t, int k, double wind) {
 
 // One step tau of the flow in u (P_k, by components), p (P_{k-1}), H, K (P_k), Re = 1, k20 = .125, k42 = .12,
 // linearised about the sphere (B = -P, H = -2, K = 1), with the rotation as its wind. Unsymmetric; no diagonal for p.
+inline constexpr double flow_f_HH = 0.25, flow_f_KK = 0.24;
 inline System flow(const Triangles& t, int k, double tau) {
-    const double f_HH = 0.25, f_KK = 0.24;
+    const double f_HH = flow_f_HH, f_KK = flow_f_KK;
     const Nodes nodes(t, k), pressures(t, k - 1);
     const int n = nodes.count(), np = pressures.count(), size = 5 * n + np;
     System s{.A = {}, .node_of_unknown = std::vector<int>(size)};
@@ -242,6 +244,18 @@ inline System flow(const Triangles& t, int k, double tau) {
         local.block(K, K, m, m) += mass;
     });
     return s;
+}
+
+// That step with its rows scaled as they become symmetric but for the wind: p by -1, H by -f_HH/tau, K by -f_KK/tau.
+inline System almost_symmetric(System flow, double tau) {
+    const auto size = flow.A.rows();
+    const int n = *std::max_element(flow.node_of_unknown.begin(), flow.node_of_unknown.end()) + 1;
+    Eigen::VectorXd row = Eigen::VectorXd::Ones(size);
+    row.segment(3 * n, size - 5 * n).setConstant(-1);
+    row.segment(size - 2 * n, n).setConstant(-flow_f_HH / tau);
+    row.tail(n).setConstant(-flow_f_KK / tau);
+    flow.A = row.asDiagonal() * flow.A;
+    return flow;
 }
 
 }  // namespace tubule::sphere

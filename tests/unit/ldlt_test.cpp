@@ -248,22 +248,9 @@ TEST(SparseLdlt, regularisationStandsInForAZeroDiagonal) {
     EXPECT_THROW(SparseLdlt<double>({1, 0}).factor(sparse(Dense{{4, 2}, {2, 0}})), SolveError);
 }
 
-// One step of the flow, rows scaled as they become symmetric but for the wind: H by -f_HH/tau, K by -f_KK/tau, p by -1.
-sphere::System almost_symmetric_flow(int level, double tau) {
-    sphere::System s = sphere::flow(sphere::icosphere(level), 3, tau);
-    const int n = *std::max_element(s.node_of_unknown.begin(), s.node_of_unknown.end()) + 1,
-              size = static_cast<int>(s.A.rows());
-    Vector row = Vector::Ones(size);
-    row.segment(3 * n, size - 5 * n).setConstant(-1);
-    row.segment(size - 2 * n, n).setConstant(-0.25 / tau);
-    row.tail(n).setConstant(-0.24 / tau);
-    s.A = row.asDiagonal() * s.A;
-    return s;
-}
-
 TEST(Gmres, singlePrecisionFactorsLeadToFullAccuracy) {
     // Expected: the vector from which the right-hand side was made.
-    const sphere::System s = almost_symmetric_flow(1, 1e-2);
+    const sphere::System s = sphere::almost_symmetric(sphere::flow(sphere::icosphere(1), 3, 1e-2), 1e-2);
     const Vector x = waves(s.A.rows()), b = s.A * x;
     SparseLdlt<float> factors(nested_dissection(s.A, s.node_of_unknown), 1e-5);
     factors.factor(s.A);
