@@ -19,6 +19,7 @@ namespace {
 // Measured choices: docs/decisions.md, "Surfaces in motion".
 constexpr int first_triangles = 180, most_triangles = 40000;  // of the finer run of a pair
 constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarser one
+constexpr double fall = 2;  // at least so many times more accurate is the finer one than the two differ
 constexpr int most_pairs = 6;
 constexpr double tolerance_per_accuracy = 3;    // time_tolerance = this * asked accuracy^1.5, see tolerance_for()
 constexpr double relaxes_in = 0.2;              // of the time that the shape needs to change
@@ -339,7 +340,7 @@ std::optional<StopReport> MotionAttempt::step() {
     const double t = state_.time;
     trace.add(t, now_.bending.energy);
     if (coarser_ && t <= coarser_->end()) {
-        error_now_ = std::abs(now_.bending.energy - (*coarser_)(t));
+        error_now_ = std::abs(now_.bending.energy - (*coarser_)(t)) / fall;
         memory_.error = std::max(memory_.error, error_now_);
     }
     write_row();

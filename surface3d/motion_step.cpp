@@ -7,7 +7,8 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr int most_corrections = 5;
-constexpr double kept = 1e-12;  // area and volume, relative
+constexpr double kept = 1e-12;            // area and volume, relative
+constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
 
 template <class AtPoint>
 Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
@@ -52,7 +53,11 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
       control_(control),
       unknowns_(mesh, law, bending),
       mesh_motion_(mesh),
-      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {}
+      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {
+    if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
+    holds_rigid_motions_ = true;
+    law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
+}
 
 CurvedMesh MotionStepper::mesh(const VectorField& X) const {
     CurvedMesh out = mesh_;
@@ -140,13 +145,41 @@ Eigen::VectorXd MotionStepper::solve(const StepBase& base, double& lambda) {
     if (law_.inextensible && control_.area)
         system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
     make_symmetric(base);
-    lambda = 0;
-    if (!law_.keeps_volume) return solver_.solve(system_.A, system_.b).x;
-    Eigen::VectorXd rate(1);
-    rate << (control_.volume ? (*control_.volume - now.volume + back.volume) / base.te : 0);
-    const auto [x, y] = solver_.solve(system_.A, system_.b, system_.flux, rate);
-    lambda = y[0];
+    const Eigen::MatrixXd rigid = rigid_motions(base);
+    Eigen::MatrixXd border(unknowns_.size(), rigid.cols() + law_.keeps_volume);
+    border.leftCols(rigid.cols()) = rigid;
+    Eigen::VectorXd rate = Eigen::VectorXd::Zero(border.cols());
+    if (law_.keeps_volume) {
+        border.rightCols<1>() = system_.flux;
+        if (control_.volume) rate.tail<1>()[0] = (*control_.volume - now.volume + back.volume) / base.te;
+    }
+    const auto [x, y] = solver_.solve(system_.A, system_.b, border, rate);
+    lambda = law_.keeps_volume ? y.tail<1>()[0] : 0;
     return x;
+}
+
+// (r, v) of the motions r that nothing resists, where there are any: translations, and rotations that the surface allows.
+Eigen::MatrixXd MotionStepper::rigid_motions(const StepBase& base) const {
+    const int n = unknowns_.nodes();
+    if (!holds_rigid_motions_) return Eigen::MatrixXd(unknowns_.size(), 0);
+    const bool tube = mesh_.period > 0;
+    const Eigen::SparseMatrix<double> mass = mass_matrix(space_, *base.mesh);
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(unknowns_.size(), tube ? 4 : 6);
+    VectorField x(3, n);
+    for (int i = 0; i < n; ++i) x.col(i) = base.mesh->nodes[i];
+    for (int motion = 0; motion < out.cols(); ++motion) {
+        const int axis = tube && motion == 3 ? 2 : motion % 3;
+        const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
+        for (int d = 0; d < 3; ++d) {
+            Eigen::VectorXd r = Eigen::VectorXd::Constant(n, e[d]);
+            if (motion >= 3) {
+                const int j = (d + 1) % 3, k = (d + 2) % 3;
+                r = (e[j] * x.row(k) - e[k] * x.row(j)).transpose();
+            }
+            out.col(motion).segment(d * n, n) = mass * r;
+        }
+    }
+    return out;
 }
 
 Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const {
@@ -224,9 +257,11 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
         const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
         const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
-        out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
+        out.error = ours / (ours + theirs) * along.norm() / std::sqrt(along.size());
     } else if (from.step > 0) {
-        out.error = (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum().cwiseAbs().maxCoeff() / 2;
+        const Eigen::RowVectorXd along =
+            (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum();
+        out.error = along.norm() / std::sqrt(along.size()) / 2;
     }
     const VectorField kept_extent = correction(to.X, base.fields);
     out.correction = work(kept_extent, base.fields);

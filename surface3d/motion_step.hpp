@@ -33,7 +33,7 @@ struct MotionControl {
 
 struct MotionStep {
     MotionState state;
-    double error = 0;       // of the positions over this step along the normal, largest, estimated
+    double error = 0;       // of the positions over this step along the normal, root of the mean square, estimated
     double correction = 0;  // energy that keeping area and volume took
 };
 
@@ -63,6 +63,7 @@ public:
 private:
     Eigen::VectorXd solve(const StepBase& base, double& lambda);
     void make_symmetric(const StepBase& base);
+    Eigen::MatrixXd rigid_motions(const StepBase& base) const;
     VectorField correction(const VectorField& X, const MotionFields& fields) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;
 
@@ -75,6 +76,7 @@ private:
     MeshMotion mesh_motion_;
     StepSystem system_;
     BorderedSolver solver_;
+    bool holds_rigid_motions_ = false;
     std::optional<Projection> projection_;
 };
 
