@@ -1,0 +1,38 @@
+// How far two curved surfaces are from each other.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "tools/compare/surface.hpp"
+
+namespace tubule::compare {
+
+// x -> rotation x + shift.
+struct Motion {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+
+    Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return rotation * x + shift; }
+    Motion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
+};
+
+// Points of one surface have their nearest points on the other one; both ways count.
+struct Distance {
+    double hausdorff = 0;                             // the largest distance of such a point
+    double l2 = 0;                                    // root of the mean of both mean squares
+    Eigen::Vector3d where = Eigen::Vector3d::Zero();  // the point that is farthest from the other surface
+    double size = 0;                                  // radius of the sphere, or the tube, that has the area of `a`
+};
+
+// Between `a` and `b` after `motion`. Nearest points are exact to rounding. The mean squares are by quadrature on every
+// element; the largest distance is that of its points and nodes, the 32 triangles that seem farthest being searched for
+// a larger one between. Throws std::invalid_argument if one is closed and the other one a tube, or their periods
+// differ.
+Distance distance(const Surface& a, const Surface& b, const Motion& motion = {});
+
+// The motion of `b` for which the mean square of the distances from `a` to it is least, as far as a search from many
+// beginnings finds it: of closed surfaces translations and rotations, of tubes translations and rotations about z, of
+// two surfaces of revolution what keeps the axis. Throws as distance does.
+Motion alignment(const Surface& a, const Surface& b);
+
+}  // namespace tubule::compare

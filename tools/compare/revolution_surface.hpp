@@ -1,0 +1,48 @@
+// A surface of revolution as a frame of tier axisym holds it: a spline r(z), or points of a profile.
+#pragma once
+
+#include <variant>
+
+#include "common/shapes/profile_curve.hpp"
+#include "common/shapes/revolution.hpp"
+#include "tools/compare/box_tree.hpp"
+#include "tools/compare/surface.hpp"
+
+namespace tubule::compare {
+
+// Points are sought in the half plane (r, z), by Newton's method from the pieces of the profile that can be nearest. A
+// Place is (s, theta): s from 0 to 1 along the profile, theta the angle around the axis; there is only one piece.
+class RevolutionSurface final : public Surface {
+public:
+    // Throws std::invalid_argument for a spline of another degree than 1 ... 7 or of lengths that do not fit.
+    explicit RevolutionSurface(Revolution tube);
+    explicit RevolutionSurface(ProfileCurve curve);
+
+    double period() const override { return period_; }
+    double grain() const override { return 0; }
+    Foot foot(const Eigen::Vector3d& x) const override;
+    Eigen::Vector3d at(const Place& place) const override;
+    void confine(Place& place) const override;
+    std::vector<Sample> samples(double grain) const override;
+
+private:
+    // (r, z) and its derivatives in s.
+    struct CurvePoint {
+        Eigen::Vector2d x, d, dd;
+    };
+    struct Nearest;
+
+    CurvePoint evaluate(double s) const;
+    void build(const std::vector<double>& breaks);
+    void add_part(double from, double to, int depth, std::vector<BoxTree<2>::Box>& boxes);
+    void look_at(double from, double to, const Eigen::Vector2d& x, Nearest& nearest) const;
+    std::vector<double> panels(double width) const;
+
+    std::variant<Revolution, ProfileCurve> profile_;
+    double period_;
+    std::vector<double> breaks_;  // of the parts, ascending
+    std::vector<double> bulge_;   // how far each part is off its chord, at most
+    BoxTree<2> tree_;
+};
+
+}  // namespace tubule::compare
