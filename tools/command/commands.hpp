@@ -18,6 +18,7 @@ void add_equilibrium(CLI::App& app, int& exit_status);
 void add_check(CLI::App& app, int& exit_status);
 void add_show(CLI::App& app, int& exit_status);
 void add_plot(CLI::App& app, int& exit_status);
+void add_compare(CLI::App& app, int& exit_status);
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
 struct RunOptions {

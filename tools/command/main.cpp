@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
     tubule::add_check(app, status);
     tubule::add_show(app, status);
     tubule::add_plot(app, status);
+    tubule::add_compare(app, status);
     try {
         app.parse(argc, argv);
         if (version)

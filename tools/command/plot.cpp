@@ -7,22 +7,19 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "common/energy/bending.hpp"
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/python.hpp"
 
 namespace tubule {
 
 namespace {
-
-constexpr const char* python = "/usr/bin/python3";  // PATH's python3 may lack Debian's modules
 
 struct PlotOptions {
     std::vector<std::string> results, outputs;
@@ -30,16 +27,9 @@ struct PlotOptions {
     std::string kind = "all";
 };
 
-// <prefix>/share/tubule/plot/plot.py of an installed program, else the one this program was built beside.
-std::filesystem::path script() {
-    std::error_code ignored;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-    const auto installed = program.parent_path().parent_path() / "share/tubule/plot/plot.py";
-    return std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path(TUBULE_PLOT_DIR) / "plot.py";
-}
-
 std::vector<std::string> script_arguments(const PlotOptions& options) {
-    std::vector<std::string> arguments{python, "-B", script().string(), "--kind=" + options.kind};
+    std::vector<std::string> arguments = plot_command("plot", "plot.py");
+    arguments.push_back("--kind=" + options.kind);
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
     for_each_bending_term([&](std::size_t, const auto& term) {
@@ -58,22 +48,19 @@ int plot(const PlotOptions& options) {
         fmt::print(stderr, "{}\n", error.what());
         return 2;
     }
-    if (access(python, X_OK) != 0) {
-        fmt::print(stderr, "tubule plot needs {}; install the packages python3 python3-matplotlib python3-h5py\n",
-                   python);
-        return 4;
-    }
-    std::vector<std::string> arguments = script_arguments(options);
-    if (!std::filesystem::exists(arguments[2])) {
-        fmt::print(stderr, "tubule plot: its script {} is missing; install or build tubule again\n", arguments[2]);
+    std::vector<std::string> arguments;
+    try {
+        arguments = script_arguments(options);
+    } catch (const std::runtime_error& error) {
+        fmt::print(stderr, "{}\n", error.what());
         return 4;
     }
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
     std::fflush(nullptr);
-    execv(python, argv.data());
-    fmt::print(stderr, "tubule plot: cannot start {}: {}\n", python, std::strerror(errno));
+    execv(argv[0], argv.data());
+    fmt::print(stderr, "tubule plot: cannot start {}: {}\n", arguments[0], std::strerror(errno));
     return 4;
 }
 

@@ -18,6 +18,7 @@
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/json.hpp"
 
 namespace tubule {
 
@@ -179,51 +180,8 @@ std::vector<Column> frame_columns(const Result& result, std::size_t index) {
 
 // ---- JSON
 
-std::string json(const std::string& text) {
-    std::string quoted = "\"";
-    for (const char c : text) {
-        if (c == '"' || c == '\\')
-            quoted += {'\\', c};
-        else if (static_cast<unsigned char>(c) < 0x20)
-            quoted += fmt::format("\\u{:04x}", static_cast<int>(c));
-        else
-            quoted += c;
-    }
-    return quoted + '"';
-}
-// The shortest that reads back the same, with a point or exponent, so that 1.0 stays a floating-point number.
-std::string json(double value) {
-    const std::string digits = fmt::format("{}", value);
-    return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
-}
-std::string json(std::int64_t value) {
-    return fmt::format("{}", value);
-}
-std::string json(int value) {
-    return fmt::format("{}", value);
-}
-std::string json(std::size_t value) {
-    return fmt::format("{}", value);
-}
-std::string json(const Value& value) {
-    return std::visit([](const auto& v) { return json(v); }, value);
-}
-template <class T>
-std::string json(const std::vector<T>& values) {
-    std::string list = "[";
-    for (const T& value : values) list += (list.size() > 1 ? ", " : "") + json(value);
-    return list + "]";
-}
-template <class T>
-std::string json(const std::vector<std::pair<std::string, T>>& entries) {
-    std::string object = "{";
-    for (const auto& [name, value] : entries)
-        object += fmt::format("{}{}: {}", object.size() > 1 ? ", " : "", json(name), json(value));
-    return object + "}";
-}
-
 // Of arrays only the shapes, unless `data` too is wanted (row-major, in one list).
-std::string json(const Record& record, bool data) {
+std::string json_of(const Record& record, bool data) {
     std::string arrays;
     for (const Array& array : record.arrays) {
         arrays += fmt::format("{}{}: {{\"shape\": {}", arrays.empty() ? "" : ", ", json(array.name), json(array.shape));
@@ -236,7 +194,7 @@ std::string json(const Record& record, bool data) {
 }
 
 // Of cells only the number, unless `data` too is wanted.
-std::string json(const SurfaceCells& mesh, bool data) {
+std::string json_of(const SurfaceCells& mesh, bool data) {
     std::string out = fmt::format("{{\"order\": {}, \"nodes\": {}, \"triangles\": {}, \"period\": {}", mesh.order,
                                   mesh.nodes, cell_count(mesh), json(mesh.period));
     if (data) out += fmt::format(", \"cells\": {}, \"shifts\": {}", json(mesh.cells), json(mesh.shifts));
@@ -253,11 +211,12 @@ void add_json(Text& out, const Result& result, std::optional<std::size_t> with_d
     }
     add(out, "\n}},\n\"meshes\": [");
     for (std::size_t i = 0; i < result.meshes.size(); ++i)
-        add(out, "{}\n{}", i > 0 ? "," : "", json(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
+        add(out, "{}\n{}", i > 0 ? "," : "",
+            json_of(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
     add(out, "\n],\n\"frames\": [");
     for (std::size_t i = 0; i < result.frames.size(); ++i)
-        add(out, "{}\n{}", i > 0 ? "," : "", json(result.frames[i], with_data == i));
-    add(out, "\n],\n\"checkpoint\": {}\n}}\n", result.checkpoint ? json(*result.checkpoint, false) : "null");
+        add(out, "{}\n{}", i > 0 ? "," : "", json_of(result.frames[i], with_data == i));
+    add(out, "\n],\n\"checkpoint\": {}\n}}\n", result.checkpoint ? json_of(*result.checkpoint, false) : "null");
 }
 
 // ----

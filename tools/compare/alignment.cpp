@@ -17,8 +17,12 @@ using Eigen::Vector3d;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t coarse_samples = 150, fine_samples = 3000;
-constexpr std::size_t tried_closely = 4;  // of the beginnings
-constexpr int most_steps = 30;
+constexpr std::size_t tried_closely = 4;  // of the beginnings, besides those that turn nothing
+constexpr double as_good = 1.01;          // mean squares that differ by less are told apart by the angle
+constexpr int most_steps = 30, last_steps = 12;
+// By how much of itself a step must lower the mean square for another one to follow, in three rounds: where that is
+// least is found to the root of it.
+constexpr double coarse_gain = 1e-4, fine_gain = 1e-8, last_gain = 1e-13;
 constexpr int shifts_tried = 12;      // along a tube, and turns about its axis
 constexpr double same_moment = 0.05;  // relative difference below which two axes of inertia are not told apart
 constexpr int turns_tried = 8;        // about an axis that alone is known
@@ -26,7 +30,10 @@ constexpr int turns_tried = 8;        // about an axis that alone is known
 // What a motion may be made of: translations, then rotations about x, y, z.
 Vector6 freedom(const Surface& a, const Surface& b) {
     Vector6 out = Vector6::Ones();
-    if (a.period() > 0) out[3] = out[4] = 0;
+    if (a.period() > 0) {
+        out[3] = out[4] = 0;
+        if (a.grain() == 0 || b.grain() == 0) out[5] = 0;  // a turn changes nothing
+    }
     if (a.grain() == 0 && b.grain() == 0) out << 0, 0, 1, 0, 0, 0;
     return out;
 }
@@ -75,7 +82,7 @@ struct Fit {
 
 // Levenberg's and Marquardt's method: the distance of a moving point grows as fast as it moves away from its foot.
 Fit fitted(const std::vector<Sample>& samples, const Surface& b, const Vector6& free, double size, Motion motion,
-           int most) {
+           int most, double gain) {
     std::vector<Foot> foot = feet(samples, b, motion);
     double value = mean_square(samples, foot), damping = 1e-9;
     for (int i = 0; i < most && damping < 1e3; ++i) {
@@ -102,10 +109,9 @@ Fit fitted(const std::vector<Sample>& samples, const Surface& b, const Vector6& 
         const double changed = mean_square(samples, there);
         if (!(changed < value)) {
             damping = std::max(10 * damping, 1e-6);
-            if (step.head<3>().norm() + size * step.tail<3>().norm() < 1e-14 * size) break;
             continue;
         }
-        const bool enough = changed > (1 - 1e-8) * value || changed < 1e-30 * size * size;
+        const bool enough = changed > (1 - gain) * value || changed < 1e-30 * size * size;
         motion = next, foot = std::move(there), value = changed, damping = std::max(damping / 10, 1e-12);
         if (enough) break;
     }
@@ -169,7 +175,7 @@ std::vector<Matrix3d> turns(const Vector3d& moments) {
 std::vector<Motion> beginnings(const Surface& a, const Surface& b, const std::vector<Sample>& samples) {
     const bool lone_meridian = a.grain() == 0 && b.grain() == 0;
     const Inertia from = inertia(samples, lone_meridian), to = inertia(quadrature_points(b, a), lone_meridian);
-    std::vector<Motion> out{Motion{}};
+    std::vector<Motion> out{Motion{}, {Matrix3d::Identity(), to.centre - from.centre}};
     if (a.period() > 0) {
         Vector3d across = to.centre - from.centre;
         for (int i = 0; i < shifts_tried; ++i)
@@ -182,15 +188,14 @@ std::vector<Motion> beginnings(const Surface& a, const Surface& b, const std::ve
         return out;
     }
     if (lone_meridian) {
-        for (const Matrix3d& flip : {Matrix3d(Matrix3d::Identity()), turn(pi, Vector3d::UnitX())})
-            out.push_back({flip, to.centre - flip * from.centre});
+        const Matrix3d flip = turn(pi, Vector3d::UnitX());
+        out.push_back({flip, to.centre - flip * from.centre});
         return out;
     }
     for (const Matrix3d& turned : turns(to.moments)) {
         const Matrix3d rotation = to.axes * turned * from.axes.transpose();
         out.push_back({rotation, to.centre - rotation * from.centre});
     }
-    out.push_back({Matrix3d::Identity(), to.centre - from.centre});
     return out;
 }
 
@@ -209,13 +214,21 @@ Motion alignment(const Surface& a, const Surface& b) {
 #pragma omp parallel for schedule(dynamic, 4)
     for (std::size_t i = 0; i < fits.size(); ++i) fits[i].mean_square = mean_square(few, feet(few, b, fits[i].motion));
     const auto better = [](const Fit& l, const Fit& r) { return l.mean_square < r.mean_square; };
-    // The first, no motion at all, always has its chance.
-    std::stable_sort(fits.begin() + 1, fits.end(), better);
-    fits.resize(std::min(fits.size(), tried_closely + 1));
+    std::stable_sort(fits.begin() + 2, fits.end(), better);
+    fits.resize(std::min(fits.size(), tried_closely + 2));
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = 0; i < fits.size(); ++i) fits[i] = fitted(few, b, free, size, fits[i].motion, most_steps);
-    const Fit best = *std::min_element(fits.begin(), fits.end(), better);
-    return fitted(many, b, free, size, best.motion, most_steps).motion.inverse();
+    for (std::size_t i = 0; i < fits.size(); ++i)
+        fits[i] = fitted(few, b, free, size, fits[i].motion, most_steps, coarse_gain);
+    // What is symmetric fits in many ways; the one that turns it least is meant.
+    const double enough =
+        as_good * std::min_element(fits.begin(), fits.end(), better)->mean_square + 1e-20 * size * size;
+    const Fit* best = nullptr;
+    for (const Fit& fit : fits)
+        if (fit.mean_square <= enough && (!best || fit.motion.rotation.trace() > best->motion.rotation.trace() + 1e-6))
+            best = &fit;
+    // Where the surfaces are not the same, where the distance is least depends on the weights: all of them in the end.
+    const Motion near = fitted(many, b, free, size, best->motion, most_steps, fine_gain).motion;
+    return fitted(all, b, free, size, near, last_steps, last_gain).motion.inverse();
 }
 
 }  // namespace tubule::compare

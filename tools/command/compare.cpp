@@ -1,0 +1,423 @@
+// tubule compare A B: two results of any tiers against each other, as a table, CSV, JSON and a picture; the exit status
+// says whether they agree within tolerances.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "common/case/text.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/command/json.hpp"
+#include "tools/command/python.hpp"
+#include "tools/compare/results.hpp"
+
+namespace tubule {
+
+namespace {
+
+using compare::FramePair;
+using compare::SeriesDifference;
+using compare::ShapeDifference;
+
+constexpr int beyond_tolerance = 1, bad_input = 2, no_picture = 4;
+
+struct CompareOptions {
+    std::vector<std::string> results, tolerances, frames, pictures;
+    bool align = false, no_shapes = false, csv = false, json = false;
+};
+
+struct Tolerance {
+    std::string quantity;
+    double most;
+};
+
+// Of one result, and what it must keep.
+struct Side {
+    std::string path;
+    compare::Outcome outcome;
+    std::optional<double> stated_error;
+    std::size_t rows = 0;
+    double area_drift = 0, volume_drift = 0;
+};
+
+// How far apart they are in one respect: relative, and infinite if they differ in kind.
+struct Quantity {
+    std::string name;
+    double value;
+};
+
+struct Check {
+    Quantity quantity;
+    double most;
+    bool holds() const { return quantity.value <= most; }
+};
+
+struct Comparison {
+    Side a, b;
+    bool aligned = false;
+    bool energies_of_frames = false;  // frames are compared by number, and all know their energy
+    std::vector<SeriesDifference> series;
+    std::vector<ShapeDifference> shapes;
+    std::vector<Check> checks;
+};
+
+[[noreturn]] void refuse(const std::string& words) {
+    throw std::invalid_argument(words);
+}
+
+// ---- what is asked
+
+std::vector<Tolerance> tolerances_of(const CompareOptions& options) {
+    std::vector<Tolerance> out;
+    for (const std::string& text : options.tolerances) {
+        const std::size_t equals = text.find('=');
+        double most = -1;
+        if (equals != std::string::npos) {
+            const char *begin = text.data() + equals + 1, *end = text.data() + text.size();
+            const auto [rest, error] = std::from_chars(begin, end, most);
+            if (error != std::errc() || rest != end) most = -1;
+        }
+        if (!(most >= 0) || !std::isfinite(most))
+            refuse(
+                fmt::format("--tolerance {}: must be NAME=VALUE with a value of 0 or more, such as energy=1e-4", text));
+        out.push_back({text.substr(0, equals), most});
+    }
+    return out;
+}
+
+std::size_t frame_number(const std::string& text, const Result& result, const std::string& option) {
+    long number = 0;
+    const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || rest != text.data() + text.size())
+        refuse(fmt::format("--frames {}: must be I:J, a frame of A and one of B, such as 3:0 or -1:-1", option));
+    const long count = static_cast<long>(result.frames.size());
+    if (number >= count || number < -count)
+        refuse(fmt::format("--frames {}: no frame {}: there are {} frames, counted from 0, or from -1 backwards",
+                           option, number, count));
+    return static_cast<std::size_t>(number < 0 ? count + number : number);
+}
+
+std::string frame_times(const Result& result) {
+    std::vector<std::string> times;
+    for (const Record& frame : result.frames) times.push_back(fmt::format("{:.6g}", frame.time));
+    if (times.size() > 8) times.erase(times.begin() + 4, times.end() - 3), times.insert(times.begin() + 4, "...");
+    return times.empty() ? "none" : fmt::format("t = {}", fmt::join(times, ", "));
+}
+
+std::vector<FramePair> pairs_of(const CompareOptions& options, const Result& a, const Result& b) {
+    if (options.no_shapes) return {};
+    std::vector<FramePair> out;
+    for (const std::string& option : options.frames) {
+        const std::vector<std::string> ends = split(option, ':');
+        if (ends.size() != 2)
+            refuse(fmt::format("--frames {}: must be I:J, a frame of A and one of B, such as 3:0 or -1:-1", option));
+        out.emplace_back(frame_number(ends[0], a, option), frame_number(ends[1], b, option));
+    }
+    if (options.frames.empty()) out = compare::frames_in_common(a, b);
+    if (out.empty())
+        refuse(
+            fmt::format("no frames in common: A has {}; B has {}. Name pairs with --frames I:J, or leave the shapes "
+                        "out with --no-shapes",
+                        frame_times(a), frame_times(b)));
+    return out;
+}
+
+// ---- what is found
+
+template <class Value>
+double largest(const std::vector<ShapeDifference>& shapes, const Value& value) {
+    double most = 0;
+    for (const ShapeDifference& shape : shapes) most = std::max(most, value(shape));
+    return most;
+}
+
+double outcomes_apart(const Side& a, const Side& b) {
+    if (a.outcome.stop != b.outcome.stop) return std::numeric_limits<double>::infinity();
+    const double later = std::max(a.outcome.time, b.outcome.time);
+    return later > 0 ? std::abs(a.outcome.time - b.outcome.time) / later : 0;
+}
+
+// All that a tolerance may be set for.
+std::vector<Quantity> quantities(const Comparison& c, bool with_shapes) {
+    std::vector<Quantity> out;
+    for (const SeriesDifference& d : c.series) out.push_back({d.name, d.largest / d.scale});
+    if (c.energies_of_frames)
+        out.push_back({"energy", largest(c.shapes, [](const ShapeDifference& s) { return *s.energy; })});
+    if (with_shapes) {
+        out.push_back(
+            {"shape", largest(c.shapes, [](const auto& s) { return s.distance.hausdorff / s.distance.size; })});
+        out.push_back({"shape_l2", largest(c.shapes, [](const auto& s) { return s.distance.l2 / s.distance.size; })});
+    }
+    out.push_back({"area_drift", std::max(c.a.area_drift, c.b.area_drift)});
+    out.push_back({"volume_drift", std::max(c.a.volume_drift, c.b.volume_drift)});
+    out.push_back({"outcome", outcomes_apart(c.a, c.b)});
+    return out;
+}
+
+void require_known(const std::vector<Tolerance>& tolerances, const std::vector<Quantity>& known) {
+    std::vector<std::string> names;
+    for (const Quantity& quantity : known) names.push_back(quantity.name);
+    for (const Tolerance& tolerance : tolerances) {
+        if (std::find(names.begin(), names.end(), tolerance.quantity) != names.end()) continue;
+        const auto meant = near_miss(tolerance.quantity, names);
+        refuse(fmt::format("--tolerance {}: not compared here{}; it must be one of {}", tolerance.quantity,
+                           meant ? fmt::format("; did you mean '{}'", *meant) : "", fmt::join(names, ", ")));
+    }
+}
+
+Result read_side(const std::string& path, Side& side) {
+    Result result = read_result(path);
+    side = {path,
+            compare::outcome(result),
+            compare::stated_error(result),
+            result.series.at("time").size(),
+            compare::drift(result, "area"),
+            compare::drift(result, "volume")};
+    return result;
+}
+
+Comparison compared(const CompareOptions& options) {
+    const std::vector<Tolerance> tolerances = tolerances_of(options);
+    Comparison out;
+    const Result a = read_side(options.results[0], out.a), b = read_side(options.results[1], out.b);
+    out.aligned = options.align;
+    // Pairs of frames that are named say that the times mean nothing to each other.
+    if (options.frames.empty()) out.series = compare::compare_series(a, b);
+    const std::vector<FramePair> pairs = pairs_of(options, a, b);
+    out.energies_of_frames = !options.frames.empty() && std::all_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
+        return compare::know_energies(a, b, pair);
+    });
+    require_known(tolerances, quantities(out, !options.no_shapes));
+    for (const FramePair& pair : pairs) out.shapes.push_back(compare::compare_shapes(a, b, pair, options.align));
+    const std::vector<Quantity> known = quantities(out, !options.no_shapes);
+    for (const Tolerance& tolerance : tolerances)
+        for (const Quantity& quantity : known)
+            if (quantity.name == tolerance.quantity) out.checks.push_back({quantity, tolerance.most});
+    return out;
+}
+
+// ---- how it is told
+
+using Text = fmt::memory_buffer;
+
+template <class... Args>
+void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+double turn_of(const compare::Motion& motion) {  // degrees
+    const Eigen::Matrix3d& r = motion.rotation;
+    const Eigen::Vector3d axis(r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1));
+    return std::atan2(axis.norm(), r.trace() - 1) * 180 / M_PI;
+}
+
+void add_side(Text& out, char letter, const Side& side) {
+    add(out, "{}  {}: {} at t = {:.8g}, {} rows", letter, side.path, side.outcome.stop, side.outcome.time, side.rows);
+    if (side.stated_error) add(out, "; error of the energy as stated {:.2g} of E_ref", *side.stated_error);
+    add(out, "\n");
+}
+
+void add_series(Text& out, const std::vector<SeriesDifference>& series) {
+    if (series.empty()) return;
+    const SeriesDifference& first = series.front();
+    add(out, "\nt = {:.6g} to {:.6g}, {} times with rows of both; differences over `scale`\n", first.times.front(),
+        first.times.back(), first.rows_in_both);
+    add(out, "{:<20} {:>10} {:>12} {:>10} {:>10} {:>10} {:>10}\n", "series", "largest", "at t", "both rows",
+        "at the end", "interpol.", "scale");
+    for (const SeriesDifference& d : series)
+        add(out, "{:<20} {:>10.3g} {:>12.6g} {:>10.3g} {:>10.3g} {:>10.2g} {:>10.4g}\n", d.name, d.largest / d.scale,
+            d.when, d.largest_in_rows / d.scale, d.at_end / d.scale, d.largest_unsure / d.scale, d.scale);
+}
+
+void add_shapes(Text& out, const Comparison& c) {
+    if (c.shapes.empty()) return;
+    add(out, "\n{:>12} {:>4} {:>4} {:>11} {:>11} {:>10} {:>10} {:>10} {:>10}", "t of A", "A", "B", "Hausdorff", "L2",
+        "of size", "of size", "size", "energy");
+    if (c.aligned) add(out, " {:>32} {:>8}", "centre of B moved by", "turned");
+    add(out, "\n");
+    for (const ShapeDifference& s : c.shapes) {
+        const auto& [hausdorff, l2, where, size] = s.distance;
+        add(out, "{:>12.6g} {:>4} {:>4} {:>11.4g} {:>11.4g} {:>10.3g} {:>10.3g} {:>10.5g} {:>10}", s.time,
+            s.frames.first, s.frames.second, hausdorff, l2, hausdorff / size, l2 / size, size,
+            s.energy ? fmt::format("{:.3g}", *s.energy) : "-");
+        if (c.aligned)
+            add(out, " {:>32} {:>8.3g}", fmt::format("{:.3g}, {:.3g}, {:.3g}", s.moved[0], s.moved[1], s.moved[2]),
+                turn_of(s.motion));
+        add(out, "\n");
+    }
+}
+
+Text words(const Comparison& c) {
+    Text out;
+    add_side(out, 'A', c.a), add_side(out, 'B', c.b);
+    add_series(out, c.series);
+    add_shapes(out, c);
+    add(out, "\n{:<20} {:>10} {:>10}\n", "largest drift of", "A", "B");
+    add(out, "{:<20} {:>10.2g} {:>10.2g}\n", "area", c.a.area_drift, c.b.area_drift);
+    add(out, "{:<20} {:>10.2g} {:>10.2g}\n", "volume", c.a.volume_drift, c.b.volume_drift);
+    if (c.a.outcome.stop != c.b.outcome.stop)
+        add(out, "\nthe outcomes differ: {} and {}\n", c.a.outcome.stop, c.b.outcome.stop);
+    if (!c.checks.empty()) add(out, "\n");
+    for (const Check& check : c.checks)
+        add(out, "{:<20} {:>10.3g} {:<2} {:<8.3g} {}\n", check.quantity.name, check.quantity.value,
+            check.holds() ? "<=" : ">", check.most, check.holds() ? "within" : "BEYOND");
+    return out;
+}
+
+// One line for each series, each frame, each check; `scale` is what `relative` is relative to.
+Text csv(const Comparison& c) {
+    Text out;
+    add(out, "kind,quantity,time,difference,scale,relative,both_rows,at_end,interpolation\n");
+    for (const SeriesDifference& d : c.series)
+        add(out, "series,{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", d.name, d.when, d.largest,
+            d.scale, d.largest / d.scale, d.largest_in_rows, d.at_end, d.largest_unsure);
+    for (const ShapeDifference& s : c.shapes)
+        for (const auto& [name, value] :
+             {std::pair{"shape", s.distance.hausdorff}, std::pair{"shape_l2", s.distance.l2}})
+            add(out, "frame,{},{:.17g},{:.17g},{:.17g},{:.17g},,,\n", name, s.time, value, s.distance.size,
+                value / s.distance.size);
+    for (const auto& [name, value] : quantities(c, false))
+        if (name.ends_with("_drift") || name == "outcome") add(out, "run,{},,,,{:.17g},,,\n", name, value);
+    for (const Check& check : c.checks)
+        add(out, "tolerance,{},,,{:.17g},{:.17g},,,\n", check.quantity.name, check.most, check.quantity.value);
+    return out;
+}
+
+std::string json_of(const Side& side) {
+    return fmt::format(
+        "{{\"file\": {}, \"stop\": {}, \"stop_time\": {}, \"stated_error\": {}, \"rows\": {}, \"area_drift\": {}, "
+        "\"volume_drift\": {}}}",
+        json(side.path), json(side.outcome.stop), json(side.outcome.time),
+        side.stated_error ? json(*side.stated_error) : "null", json(side.rows), json(side.area_drift),
+        json(side.volume_drift));
+}
+
+std::string json_of(const SeriesDifference& d) {
+    return fmt::format(
+        "{{\"name\": {}, \"scale\": {}, \"largest\": {}, \"when\": {}, \"both_rows\": {}, \"rows_in_both\": {}, "
+        "\"at_end\": {}, \"interpolation\": {},\n \"times\": {},\n \"a\": {},\n \"b\": {},\n \"unsure\": {}}}",
+        json(d.name), json(d.scale), json(d.largest), json(d.when), json(d.largest_in_rows), json(d.rows_in_both),
+        json(d.at_end), json(d.largest_unsure), json(d.times), json(d.a), json(d.b), json(d.unsure));
+}
+
+std::string json_of(const ShapeDifference& s) {
+    const auto list = [](const auto& v) { return json(std::vector<double>(v.data(), v.data() + v.size())); };
+    const Eigen::Matrix3d rows = s.motion.rotation.transpose();  // Eigen stores columns
+    return fmt::format(
+        "{{\"time\": {}, \"frame_a\": {}, \"frame_b\": {}, \"hausdorff\": {}, \"l2\": {}, \"size\": {}, \"where\": {}, "
+        "\"moved\": {}, \"shift\": {}, \"rotation\": {}, \"energy\": {}}}",
+        json(s.time), s.frames.first, s.frames.second, json(s.distance.hausdorff), json(s.distance.l2),
+        json(s.distance.size), list(s.distance.where), list(s.moved), list(s.motion.shift), list(rows),
+        s.energy ? json(*s.energy) : "null");
+}
+
+std::string json_of(const Check& check) {
+    return fmt::format(
+        "{{\"quantity\": {}, \"value\": {}, \"tolerance\": {}, \"within\": {}}}", json(check.quantity.name),
+        std::isfinite(check.quantity.value) ? json(check.quantity.value) : "null", json(check.most), check.holds());
+}
+
+template <class T>
+std::string json_list(const std::vector<T>& items) {
+    std::string out = "[";
+    for (const T& item : items) out += (out.size() > 1 ? ",\n" : "\n") + json_of(item);
+    return out + "\n]";
+}
+
+Text json_text(const Comparison& c) {
+    Text out;
+    add(out, "{{\n\"a\": {},\n\"b\": {},\n\"aligned\": {},\n\"series\": {},\n\"frames\": {},\n\"checks\": {}\n}}\n",
+        json_of(c.a), json_of(c.b), c.aligned, json_list(c.series), json_list(c.shapes), json_list(c.checks));
+    return out;
+}
+
+// The script reads the JSON. Its exit status.
+int draw(const Comparison& c, const std::vector<std::string>& pictures) {
+    std::vector<std::string> arguments = plot_command("compare", "compare.py");
+    arguments.insert(arguments.end(), pictures.begin(), pictures.end());
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    const Text text = json_text(c);
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> input(std::tmpfile(), std::fclose);
+    if (!input || std::fwrite(text.data(), 1, text.size(), input.get()) != text.size() || std::fflush(input.get()) != 0)
+        throw std::runtime_error("tubule compare: cannot write a temporary file for the picture");
+    lseek(fileno(input.get()), 0, SEEK_SET);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, fileno(input.get()), STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);  // stdout is the table's
+    pid_t child = 0;
+    const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    int status = 0;
+    if (error != 0 || waitpid(child, &status, 0) != child)
+        throw std::runtime_error(
+            fmt::format("tubule compare: cannot start {}: {}", arguments[0], std::strerror(error)));
+    return WIFEXITED(status) ? WEXITSTATUS(status) : no_picture;
+}
+
+int run_compare(const CompareOptions& options) {
+    Comparison c;
+    try {
+        c = compared(options);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "tubule compare: {}\n", error.what());
+        return bad_input;
+    }
+    const Text out = options.json ? json_text(c) : options.csv ? csv(c) : words(c);
+    if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0) {
+        fmt::print(stderr, "tubule compare: cannot write the output\n");
+        return bad_input;
+    }
+    if (!options.pictures.empty()) {
+        try {
+            if (const int status = draw(c, options.pictures)) return status;
+        } catch (const std::runtime_error& error) {
+            fmt::print(stderr, "{}\n", error.what());
+            return no_picture;
+        }
+    }
+    const bool agree = std::all_of(c.checks.begin(), c.checks.end(), [](const Check& check) { return check.holds(); });
+    return agree ? 0 : beyond_tolerance;
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app, int& exit_status) {
+    CLI::App* command = app.add_subcommand("compare", "Compare two results: series, shapes, outcomes");
+    const auto o = std::make_shared<CompareOptions>();
+    command->add_option("RESULT", o->results, "two result files, A and B, of any tiers")->required()->expected(2);
+    command
+        ->add_option("--tolerance", o->tolerances,
+                     "NAME=VALUE, the largest relative difference of a series, shape, shape_l2, area_drift, "
+                     "volume_drift or outcome; exit status 1 if one is larger")
+        ->allow_extra_args(false);
+    CLI::Option* no_shapes = command->add_flag("--no-shapes", o->no_shapes, "do not compare the frames' surfaces");
+    command->add_flag("--align", o->align, "first move B rigidly to where it fits best")->excludes(no_shapes);
+    command
+        ->add_option("--frames", o->frames,
+                     "I:J, compare frame I of A with frame J of B (-1: the last) whatever their times, and no series")
+        ->allow_extra_args(false)
+        ->excludes(no_shapes);
+    CLI::Option* csv_flag = command->add_flag("--csv", o->csv, "the table as CSV, in full precision");
+    command->add_flag("--json", o->json, "all of it as JSON, with the series over time")->excludes(csv_flag);
+    command->add_option("--plot", o->pictures, "picture to write, .png, .svg or .pdf; may be repeated")
+        ->allow_extra_args(false);
+    command->callback([o, &exit_status] { exit_status = run_compare(*o); });
+}
+
+}  // namespace tubule

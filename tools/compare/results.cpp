@@ -1,0 +1,107 @@
+#include "tools/compare/results.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "tools/compare/frame_surface.hpp"
+
+namespace tubule::compare {
+
+namespace {
+
+constexpr double same_frame = 1e-6;
+
+template <class T>
+std::optional<T> about(const Result& result, const std::string& name) {
+    for (const auto& [key, value] : result.about)
+        if (key == name)
+            if (const T* held = std::get_if<T>(&value)) return *held;
+    return {};
+}
+
+std::optional<double> energy_of(const Record& frame) {
+    for (const auto& [name, value] : frame.numbers)
+        if (name == "energy") return value;
+    return {};
+}
+
+// By area. A period of a tube may begin anywhere, so that it is on the axis.
+Eigen::Vector3d centre(const Surface& surface) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double area = 0;
+    for (const Sample& s : surface.samples(0)) sum += s.weight * s.x, area += s.weight;
+    sum /= area;
+    if (surface.grain() == 0) sum[0] = sum[1] = 0;  // one meridian stood for all
+    if (surface.period() > 0) sum[2] = 0;
+    return sum;
+}
+
+std::unique_ptr<Surface> surface_of(const Result& result, std::size_t frame, char which) {
+    try {
+        return frame_surface(result.frames[frame], result);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(
+            fmt::format("frame {} of {}, t = {:.8g}: {}", frame, which, result.frames[frame].time, error.what()));
+    }
+}
+
+}  // namespace
+
+Outcome outcome(const Result& result) {
+    const auto& times = result.series.at("time");
+    return {about<std::string>(result, "stop").value_or("unfinished"),
+            about<double>(result, "stop_time").value_or(times.empty() ? 0 : times.back())};
+}
+
+double reference_energy(const Result& result) {
+    return about<double>(result, "E_ref").value_or(0);
+}
+
+std::optional<double> stated_error(const Result& result) {
+    return about<double>(result, "estimated_error");
+}
+
+std::vector<FramePair> frames_in_common(const Result& a, const Result& b) {
+    std::vector<FramePair> out;
+    for (std::size_t i = 0, j = 0; i < a.frames.size() && j < b.frames.size();) {
+        const double s = a.frames[i].time, t = b.frames[j].time;
+        if (std::abs(s - t) <= same_frame * std::max(std::abs(s), std::abs(t)))
+            out.emplace_back(i++, j++);
+        else
+            s < t ? ++i : ++j;
+    }
+    return out;
+}
+
+bool know_energies(const Result& a, const Result& b, FramePair frames) {
+    return energy_of(a.frames[frames.first]) && energy_of(b.frames[frames.second]);
+}
+
+ShapeDifference compare_shapes(const Result& a, const Result& b, FramePair frames, bool align) {
+    const auto [i, j] = frames;
+    const auto of_a = surface_of(a, i, 'A'), of_b = surface_of(b, j, 'B');
+    ShapeDifference out;
+    out.frames = frames, out.time = a.frames[i].time;
+    if (know_energies(a, b, frames)) {
+        const double of_a = *energy_of(a.frames[i]), of_b = *energy_of(b.frames[j]);
+        const double stated = reference_energy(a), scale = stated > 0 ? stated : std::abs(of_a);
+        out.energy = std::abs(of_a - of_b) / (scale > 0 ? scale : 1);
+    }
+    try {
+        if (align) {
+            const Eigen::Vector3d before = centre(*of_b);
+            out.motion = alignment(*of_a, *of_b);
+            out.moved = out.motion(before) - before;
+        }
+        out.distance = distance(*of_a, *of_b, out.motion);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(
+            fmt::format("frame {} of A and {} of B cannot be compared: {}", i, j, error.what()));
+    }
+    return out;
+}
+
+}  // namespace tubule::compare

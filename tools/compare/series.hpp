@@ -1,0 +1,59 @@
+// Differences of two results' series over time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule::compare {
+
+// A series of one result between its rows: cubic Hermite interpolation.
+class Trace {
+public:
+    // Of rows at the same time the last one counts. Without `slopes` those of parabolas through neighbours are taken.
+    Trace(const std::vector<double>& times, const std::vector<double>& values, const std::vector<double>* slopes);
+
+    double begin() const { return time_.front(); }
+    double end() const { return time_.back(); }
+    const std::vector<double>& times() const { return time_; }
+    const std::vector<double>& values() const { return value_; }
+
+    double operator()(double t) const;  // begin() <= t <= end()
+    bool has_row(double t) const;
+    double slope(std::size_t row) const { return slope_[row]; }
+    // Of the interpolation at t, estimated: a quarter of what the neighbouring rows are off by when they are left out.
+    double error(double t) const;
+
+private:
+    std::size_t interval(double t) const;
+    double off_without(std::size_t i, bool slopes_known) const;
+
+    std::vector<double> time_, value_, slope_, left_out_;
+};
+
+// The energy's slope is minus the dissipation, unless there is kinetic energy too.
+Trace trace_of(const Result& result, const std::string& series);
+
+// A - B at all times that both results span, where either has a row.
+struct SeriesDifference {
+    std::string name;
+    double scale = 1;  // relative differences are over this: E_ref of A for energies, else the largest |A|
+    std::vector<double> times, a, b;
+    std::vector<double> unsure;  // estimated error of interpolation; 0 where both have a row
+
+    // The largest |A - B| - unsure, what interpolation does not explain, and when; that of times at which both have
+    // rows, and how many those are; the last one; the largest `unsure`.
+    double largest = 0, when = 0, largest_in_rows = 0;
+    std::size_t rows_in_both = 0;
+    double at_end = 0, largest_unsure = 0;
+};
+
+// What both results have of what a run computes (not of how it does), and "rate", d(E + E_kinetic)/dt: minus the
+// dissipation where it is known. Empty if they have no time in common.
+std::vector<SeriesDifference> compare_series(const Result& a, const Result& b);
+
+// The largest relative change of a series since its first row; 0 if there is none.
+double drift(const Result& result, const std::string& series);
+
+}  // namespace tubule::compare
