@@ -79,8 +79,8 @@ TriangleMesh flattened(const CurvedMesh& mesh) {
             std::array<int, 3> triangle;
             for (int c = 0; c < 3; ++c) {
                 const int shift = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
-                const auto [found, is_new] = number.try_emplace({mesh.node(cell, corners[c]), shift},
-                                                                static_cast<int>(flat.points.size()));
+                const auto [found, is_new] =
+                    number.try_emplace({mesh.node(cell, corners[c]), shift}, static_cast<int>(flat.points.size()));
                 if (is_new) flat.points.push_back(mesh.position(cell, corners[c]));
                 triangle[c] = found->second;
             }

@@ -5,13 +5,10 @@
 namespace tubule::surface3d {
 
 MeshMotion::MeshMotion(const CurvedMesh& mesh)
-    : unknowns_(mesh, 4),
-      A_(unknowns_.pattern()),
-      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {}
+    : unknowns_(mesh, 4), A_(unknowns_.pattern()), solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {}
 
 VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedMesh& from,
-                                 const VectorField& normal, const Eigen::VectorXd& flux, double relaxation,
-                                 double te) {
+                                 const VectorField& normal, const Eigen::VectorXd& flux, double relaxation, double te) {
     const Tabulation& table = space.tabulation();
     const int n = space.width(), nodes = space.size();
     std::fill_n(A_.valuePtr(), A_.nonZeros(), 0.0);

@@ -7,8 +7,9 @@
 namespace tubule::surface3d {
 
 // Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to one of equal
-// triangles: (grad w, grad Z) + (m nu, Z) = -(grad X, grad Z)/(relaxation + te), with a multiplier m. In the limit of no
-// relaxation time this is the motion of Barrett, Garcke and Nuernberg, whose positions do not converge with the step.
+// triangles: (grad w, grad Z) + (m nu, Z) = -(grad X, grad Z)/(relaxation + te), with a multiplier m. In the limit of
+// no relaxation time this is the motion of Barrett, Garcke and Nuernberg, whose positions do not converge with the
+// step.
 class MeshMotion {
 public:
     explicit MeshMotion(const CurvedMesh& mesh);

@@ -37,11 +37,11 @@ using Frame = Eigen::Matrix<double, 3, 2>;
 // What the forms of one cell are made of, stacked over its quadrature points: one column a function, one row a point
 // (two or three where there are components in the tangent plane).
 struct CellTables {
-    Eigen::MatrixXd phi, grad;             // functions of P_k, gradients
-    Eigen::MatrixXd psi;                   // pressure
+    Eigen::MatrixXd phi, grad;  // functions of P_k, gradients
+    Eigen::MatrixXd psi;        // pressure
     Eigen::MatrixXd psi_grad;
-    Eigen::MatrixXd normal, normal_grad;   // v.nu, G(v) = grad(v.nu)
-    Eigen::MatrixXd strain, divergence;    // sigma(v) as (11, 22, sqrt(2) 12), div_P v
+    Eigen::MatrixXd normal, normal_grad;  // v.nu, G(v) = grad(v.nu)
+    Eigen::MatrixXd strain, divergence;   // sigma(v) as (11, 22, sqrt(2) 12), div_P v
 };
 
 struct CellWork {
@@ -74,10 +74,10 @@ private:
     // The state at a point.
     struct Point {
         double dS, H, K, B2, trace;
-        Eigen::Vector3d normal;        // continuous
-        Frame e;                       // orthonormal, tangential
-        Eigen::Matrix<double, 2, 3> B; // e^T B
-        Eigen::Matrix2d S;             // HP - B
+        Eigen::Vector3d normal;         // continuous
+        Frame e;                        // orthonormal, tangential
+        Eigen::Matrix<double, 2, 3> B;  // e^T B
+        Eigen::Matrix2d S;              // HP - B
         CurvatureJet<double> f;
     };
 
@@ -118,8 +118,7 @@ void Assembler::size(CellWork& work) const {
         if (!law_.flows) t.psi_grad.resize(2 * Q, pressure_table_.functions());
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
-    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w),
-        work.force.setZero(w);
+    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w), work.force.setZero(w);
 }
 
 Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
@@ -286,8 +285,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
             const Eigen::Vector3d d = moved * phi;
             const Eigen::Vector2d slope = g * (moved.transpose() * s.normal + along.transpose()) - s.B * d;
             const double height = s.normal.dot(d) + along.dot(phi);
-            work.rhs.segment(rows, n_) +=
-                s.dS * (Sg.transpose() * slope + (known(s) - value(s) * height) * phi);
+            work.rhs.segment(rows, n_) += s.dS * (Sg.transpose() * slope + (known(s) - value(s) * height) * phi);
             work.weighted2.middleRows<2>(2 * q) = (base_.te * s.dS) * Sg;
             work.weighted1.row(q) = (base_.te * s.dS * value(s)) * t.phi.row(q);
         }

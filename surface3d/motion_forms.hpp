@@ -20,13 +20,13 @@ struct MotionUnknowns : FieldUnknowns {
 // What a step is linearised about: the surface X* that is expected at its end, and what is known of its past. Over the
 // step, X = Xbar + te w and u_t = inertia (u - ubar): of backward differences of any order.
 struct StepBase {
-    const CurvedMesh* mesh;    // X*
-    MotionFields fields;       // of X*
-    VectorField displacement;  // X* - Xbar
-    VectorField mesh_velocity; // w*, expected
-    Eigen::VectorXd velocity;  // u*, expected, as numbered in MotionUnknowns; of one or three components
-    Eigen::VectorXd past;      // ubar
-    double te = 0;             // the step, effectively
+    const CurvedMesh* mesh;     // X*
+    MotionFields fields;        // of X*
+    VectorField displacement;   // X* - Xbar
+    VectorField mesh_velocity;  // w*, expected
+    Eigen::VectorXd velocity;   // u*, expected, as numbered in MotionUnknowns; of one or three components
+    Eigen::VectorXd past;       // ubar
+    double te = 0;              // the step, effectively
 };
 
 struct StepSystem {

@@ -10,7 +10,7 @@ namespace tubule::surface3d {
 struct MotionMemory {
     double next_step = 0, relaxation = 0;
     bool keeps_volume = true;  // and can, for H varies
-    int elements = 0;  // asked for
+    int elements = 0;          // asked for
     double tolerance = 0;
     double area = 0, volume = 0;  // at the start
     double total_start = 0;       // energy with kinetic energy, then

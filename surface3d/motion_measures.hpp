@@ -9,21 +9,21 @@ namespace tubule::surface3d {
 struct MotionMeasures {
     Observables bending;  // with H and K of `fields`, to which the force belongs
     MotionFields fields;
-    VectorField velocity;      // at the nodes
-    double kinetic = 0;        // inertia INT |u|^2/2
-    double dissipation = 0;    // INT 2 viscosity |sigma|^2 + friction |u|^2
-    double acceleration = 0;   // inertia INT |d_t u|^2 /2: kinetic energy that a unit of time would make
-    double speed = 0;          // largest |u|
-    double stretching = 0;     // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
+    VectorField velocity;     // at the nodes
+    double kinetic = 0;       // inertia INT |u|^2/2
+    double dissipation = 0;   // INT 2 viscosity |sigma|^2 + friction |u|^2
+    double acceleration = 0;  // inertia INT |d_t u|^2 /2: kinetic energy that a unit of time would make
+    double speed = 0;         // largest |u|
+    double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
     Eigen::Vector3d momentum, angular_momentum, centre;
-    double r_min = 0, r_max = 0;  // distances from the axis of a tube; from the centre of a closed surface
-    double quality = 0;           // of the worst triangle: 1 if equilateral, 0 if without area
-    Eigen::Vector3d worst;        // where it is
-    double turn = 0;              // largest angle by which the normal turns between neighbouring nodes
-    Eigen::Vector3d sharpest;     // where that is
-    bool neck = false;            // and whether the surface is a saddle there
-    double symbol = 0;            // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
-    Eigen::Vector3d least_symbol; // where it is
+    double r_min = 0, r_max = 0;   // distances from the axis of a tube; from the centre of a closed surface
+    double quality = 0;            // of the worst triangle: 1 if equilateral, 0 if without area
+    Eigen::Vector3d worst;         // where it is
+    double turn = 0;               // largest angle by which the normal turns between neighbouring nodes
+    Eigen::Vector3d sharpest;      // where that is
+    bool neck = false;             // and whether the surface is a saddle there
+    double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
+    Eigen::Vector3d least_symbol;  // where it is
 };
 
 // `stepper` made the state; its projection is brought to the surface of the state.

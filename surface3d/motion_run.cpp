@@ -17,17 +17,19 @@ namespace tubule::surface3d {
 namespace {
 
 // Measured choices: docs/decisions.md, "Surfaces in motion".
-constexpr int first_triangles = 180, most_triangles = 40000;  // of the finer run of a pair
+constexpr int first_triangles = 180, most_triangles = 40000;    // of the finer run of a pair
 constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarser one
 constexpr double fall = 2;  // at least so many times more accurate is the finer one than the two differ
 constexpr int most_pairs = 6;
-constexpr double tolerance_per_accuracy = 3;    // time_tolerance = this * asked accuracy^1.5, see tolerance_for()
+constexpr int least_triangles = 80;             // fewer tell nothing
+constexpr double tolerance_per_accuracy = 0.5;  // time_tolerance = this * asked accuracy^1.5, see tolerance_for()
 constexpr double relaxes_in = 0.2;              // of the time that the shape needs to change
+constexpr double loosest_tolerance = 1e-4;      // beyond it steps are too long to be compared
 constexpr double first_step = 1e-4;             // of the time in which the mesh relaxes
 constexpr double growth = 1.6, safety = 0.85;   // of steps
 constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
 constexpr double climb = 0.25;                  // increase of the energy in a step, of the asked accuracy
-constexpr double worst_quality = 0.03, sharpest_turn = 1.2;
+constexpr double worst_quality = 0.03, sharpest_turn = 2;
 constexpr int steps_between_looks = 10;
 constexpr double seconds_between_checkpoints = 20;
 constexpr double same_everywhere = 1e-8;  // variation_of_H
@@ -40,12 +42,13 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 class Trace {
 public:
     void add(double t, double energy) { points_.push_back({t, energy}); }
+    bool empty() const { return points_.empty(); }
     double end() const { return points_.back()[0]; }
     // Cubic through the four nearest steps.
     double operator()(double t) const {
         const int n = static_cast<int>(points_.size());
-        const auto after = std::lower_bound(points_.begin(), points_.end(), t,
-                                            [](const auto& p, double x) { return p[0] < x; });
+        const auto after =
+            std::lower_bound(points_.begin(), points_.end(), t, [](const auto& p, double x) { return p[0] < x; });
         const int first = std::clamp(static_cast<int>(after - points_.begin()) - 2, 0, std::max(n - 4, 0));
         double sum = 0;
         for (int i = first; i < std::min(first + 4, n); ++i) {
@@ -67,7 +70,7 @@ struct Settings {
 };
 
 double tolerance_for(double accuracy) {
-    return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, 1e-2);
+    return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, loosest_tolerance);
 }
 
 Settings first_settings(const Case& c) {
@@ -107,7 +110,6 @@ public:
     RunSummary summary;
     Trace trace;
     double error() const { return memory_.error; }  // largest difference from the coarser run, absolute
-    bool resizable = true;  // whether the number of triangles can be chosen
 
 private:
     void make_stepper(const CurvedMesh& mesh);
@@ -173,7 +175,6 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
 
 void MotionAttempt::begin() {
     const StartMesh start = start_mesh(case_, memory_.elements);
-    resizable = start.resizable;
     summary.warnings = start.notes;
     const SurfaceSpace space(start.mesh);
     if (const auto fold = find_fold(space, start.mesh)) {
@@ -185,8 +186,7 @@ void MotionAttempt::begin() {
     const MotionLaw law = motion_law(case_.model);
     memory_.area = o.area, memory_.volume = o.volume;
     memory_.reference_energy = std::max(std::abs(o.energy), o.magnitude);
-    memory_.relaxation =
-        case_.surface.relaxation.value_or(relaxes_in * time_to_change(law, o, start.mesh.period == 0));
+    memory_.relaxation = case_.surface.relaxation.value_or(relaxes_in * time_to_change(law, o, start.mesh.period == 0));
     // Where H is the same everywhere, area and volume are the same condition: the pressure stands for lambda.
     const bool same = law.inextensible && variation_of_H(space, start.mesh, fields) < same_everywhere;
     memory_.keeps_volume = law.keeps_volume && !same;
@@ -284,22 +284,24 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 // What lies in the shape itself: no shorter step would help.
 std::optional<StopReport> MotionAttempt::check_shape() const {
     const double t = state_.time;
-    const auto where = [](const Eigen::Vector3d& x) { return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]); };
+    const auto where = [](const Eigen::Vector3d& x) {
+        return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
+    };
     if (!(now_.symbol > 0))
         return StopReport{Stop::ill_posed, t,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(now_.least_symbol),
                           "no resolution helps: the energy does not resist short waves there"};
     if (now_.turn > sharpest_turn)
-        return StopReport{now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
-                          fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
-                                      now_.neck ? "a neck closes" : "the surface is too sharp", where(now_.sharpest),
-                                      now_.turn),
-                          now_.neck ? "more elements follow the neck further" : "use more elements"};
+        return StopReport{
+            now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
+            fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
+                        now_.neck ? "a neck closes" : "the surface is too sharp", where(now_.sharpest), now_.turn),
+            now_.neck ? "more elements follow the neck further" : "use more elements"};
     if (!(now_.quality > worst_quality))
-        return StopReport{Stop::mesh_lost, t,
-                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(now_.worst),
-                                      now_.quality),
-                          "use more elements or a shorter discretisation.relaxation"};
+        return StopReport{
+            Stop::mesh_lost, t,
+            fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(now_.worst), now_.quality),
+            "use more elements or a shorter discretisation.relaxation"};
     return std::nullopt;
 }
 
@@ -371,11 +373,16 @@ void MotionAttempt::go() {
     const int nodes = static_cast<int>(state_.X.cols());
     summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", steps_, rejected_,
                                  summary.elements, element_order(case_), nodes);
-    summary.details = {{"elements", std::int64_t{summary.elements}}, {"nodes", std::int64_t{nodes}},
-                       {"order", std::int64_t{element_order(case_)}}, {"steps", std::int64_t{steps_}},
-                       {"rejected_steps", std::int64_t{rejected_}},  {"time_tolerance", memory_.tolerance},
-                       {"relaxation", memory_.relaxation},           {"dissipated", memory_.dissipated},
-                       {"identity_defect", defect()},                {"correction_energy", memory_.corrected}};
+    summary.details = {{"elements", std::int64_t{summary.elements}},
+                       {"nodes", std::int64_t{nodes}},
+                       {"order", std::int64_t{element_order(case_)}},
+                       {"steps", std::int64_t{steps_}},
+                       {"rejected_steps", std::int64_t{rejected_}},
+                       {"time_tolerance", memory_.tolerance},
+                       {"relaxation", memory_.relaxation},
+                       {"dissipated", memory_.dissipated},
+                       {"identity_defect", defect()},
+                       {"correction_energy", memory_.corrected}};
 }
 
 void MotionAttempt::write_row() {
@@ -384,11 +391,30 @@ void MotionAttempt::write_row() {
     const MotionMeasures& m = now_;
     row_ = {state_.time, state_.step, m.bending.energy};
     row_.insert(row_.end(), m.bending.energy_term.begin(), m.bending.energy_term.end());
-    for (const double value : {m.dissipation, defect(), m.bending.area, m.bending.volume, m.r_min, m.r_max, m.kinetic,
-                               m.speed, m.momentum.x(), m.momentum.y(), m.momentum.z(), m.angular_momentum.x(),
-                               m.angular_momentum.y(), m.angular_momentum.z(), state_.lambda, m.stretching,
-                               memory_.corrected, m.bending.integral_H2, m.bending.integral_K, m.quality, m.turn,
-                               error_now_, static_cast<double>(summary.elements), seconds_since(started_)})
+    for (const double value : {m.dissipation,
+                               defect(),
+                               m.bending.area,
+                               m.bending.volume,
+                               m.r_min,
+                               m.r_max,
+                               m.kinetic,
+                               m.speed,
+                               m.momentum.x(),
+                               m.momentum.y(),
+                               m.momentum.z(),
+                               m.angular_momentum.x(),
+                               m.angular_momentum.y(),
+                               m.angular_momentum.z(),
+                               state_.lambda,
+                               m.stretching,
+                               memory_.corrected,
+                               m.bending.integral_H2,
+                               m.bending.integral_K,
+                               m.quality,
+                               m.turn,
+                               error_now_,
+                               static_cast<double>(summary.elements),
+                               seconds_since(started_)})
         row_.push_back(value);
     watch_.row(row_);
 }
@@ -428,11 +454,30 @@ bool ended_early(Stop reason) {
 std::vector<std::string> motion_series_names(const Case&) {
     std::vector<std::string> names{"time", "step_size", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name :
-         {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max", "kinetic_energy", "speed", "momentum_x",
-          "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y", "angular_momentum_z", "lambda",
-          "stretching", "correction_energy", "integral_H2", "integral_K", "quality", "turn", "energy_error", "elements",
-          "wall_seconds"})
+    for (const char* name : {"dissipation",
+                             "identity_defect",
+                             "area",
+                             "volume",
+                             "r_min",
+                             "r_max",
+                             "kinetic_energy",
+                             "speed",
+                             "momentum_x",
+                             "momentum_y",
+                             "momentum_z",
+                             "angular_momentum_x",
+                             "angular_momentum_y",
+                             "angular_momentum_z",
+                             "lambda",
+                             "stretching",
+                             "correction_energy",
+                             "integral_H2",
+                             "integral_K",
+                             "quality",
+                             "turn",
+                             "energy_error",
+                             "elements",
+                             "wall_seconds"})
         names.push_back(name);
     return names;
 }
@@ -444,8 +489,8 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         const MotionMemory memory = motion_restart(restart->record).memory;
         settings = {memory.elements, memory.tolerance};
     }
-    const auto run_one = [&](bool recorded, const Settings& with, const Trace* coarser) {
-        auto attempt = std::make_unique<MotionAttempt>(c, observer, recorded, with, coarser, started);
+    const auto run_one = [&](const Case& which, bool recorded, const Settings& with, const Trace* coarser) {
+        auto attempt = std::make_unique<MotionAttempt>(which, observer, recorded, with, coarser, started);
         if (recorded && restart)
             attempt->resume(*restart);
         else
@@ -453,25 +498,32 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         attempt->go();
         return attempt;
     };
-    auto coarse = run_one(false, coarser(settings), nullptr);
+    // With too few triangles, or when their number is not ours to choose, the coarser run has elements of lower order.
+    Case lower = c;
+    lower.surface.order = std::max(element_order(c) - 1, 2);
+    const bool resizable = start_mesh(c, settings.elements).resizable;
+    const bool by_order = !resizable || coarser(settings).elements < least_triangles;
+    auto coarse = by_order ? run_one(lower, false, {settings.elements, coarser(settings).tolerance}, nullptr)
+                           : run_one(c, false, coarser(settings), nullptr);
     for (int pair = 1;; ++pair) {
         if (ended_early(coarse->summary.stop.reason)) {
             describe(coarse->summary, c, coarse->summary.reference_energy, pair);  // nothing is known of the error yet
             return coarse->summary;
         }
-        auto fine = run_one(true, settings, &coarse->trace);
+        auto fine = run_one(c, true, settings, coarse->trace.empty() ? nullptr : &coarse->trace);
         const Stop reason = fine->summary.stop.reason;
-        const bool known = coarse->summary.elements < fine->summary.elements &&
-                           (coarse->summary.stop.reason == reason || ended_early(reason));
+        const bool differ = coarse->summary.elements < fine->summary.elements || (by_order && pair == 1);
+        const bool known =
+            differ && !coarse->trace.empty() && (coarse->summary.stop.reason == reason || ended_early(reason));
         describe(fine->summary, c, known ? fine->error() : fine->summary.reference_energy, pair);
-        const bool given = settings_given(c) || !fine->resizable;
+        const bool given = settings_given(c) || !resizable;
         if (fine->summary.as_accurate_as_asked || given || pair == most_pairs ||
             settings.elements * 1.6 > most_triangles || ended_early(reason)) {
             if (!known)
-                fine->summary.warnings.push_back(
-                    fmt::format("the coarser run of the pair, of {} triangles, ended at t = {:.6g} with {}: the error "
-                                "is not known",
-                                coarse->summary.elements, coarse->summary.stop.time, name(coarse->summary.stop.reason)));
+                fine->summary.warnings.push_back(fmt::format(
+                    "the coarser run of the pair, of {} triangles, ended at t = {:.6g} with {}: the error "
+                    "is not known",
+                    coarse->summary.elements, coarse->summary.stop.time, name(coarse->summary.stop.reason)));
             accept(fine->summary, c, given);
             return fine->summary;
         }

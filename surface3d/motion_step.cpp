@@ -116,16 +116,16 @@ VectorField MotionStepper::velocity(const MotionState& state, const MotionFields
     for (int i = 0; i < n; ++i) out.col(i) = state.u[i] * fields.normal.col(i);
     if (!law_.inextensible) return out;
     const Tabulation& table = space_.tabulation();
-    return out - (*projection_)(load<3>(space_, mesh(state.X), [&](int cell, const CellColumns<3>& X, int q,
-                                                                   CellColumns<3>& sum) {
-               const SurfacePoint<double> p = tangent_point(X, table, q);
-               const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
-               sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
-           }));
+    return out - (*projection_)(
+                     load<3>(space_, mesh(state.X), [&](int cell, const CellColumns<3>& X, int q, CellColumns<3>& sum) {
+                         const SurfacePoint<double> p = tangent_point(X, table, q);
+                         const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
+                         sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
+                     }));
 }
 
-// The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without derivatives
-// and the variation of these factors.
+// The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without
+// derivatives and the variation of these factors.
 void MotionStepper::make_symmetric(const StepBase& base) {
     Eigen::VectorXd scale = Eigen::VectorXd::Ones(unknowns_.size());
     for (int i = 0; i < unknowns_.nodes(); ++i) {
@@ -158,7 +158,8 @@ Eigen::VectorXd MotionStepper::solve(const StepBase& base, double& lambda) {
     return x;
 }
 
-// (r, v) of the motions r that nothing resists, where there are any: translations, and rotations that the surface allows.
+// (r, v) of the motions r that nothing resists, where there are any: translations, and rotations that the surface
+// allows.
 Eigen::MatrixXd MotionStepper::rigid_motions(const StepBase& base) const {
     const int n = unknowns_.nodes();
     if (!holds_rigid_motions_) return Eigen::MatrixXd(unknowns_.size(), 0);
@@ -241,8 +242,9 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     const auto ahead = [&](const auto& now, const auto& before) { return (1 + r) * now - r * before; };
     const VectorField Xbar = bar(from.X, from.X_past), Xstar = ahead(from.X, from.X_past);
     const CurvedMesh at = mesh(Xstar);
-    StepBase base{&at, fields(at), Xstar - Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past),
-                  bar(from.u, from.u_past), te};
+    StepBase base{
+        &at, fields(at), Xstar - Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past), bar(from.u, from.u_past),
+        te};
     MotionStep out;
     MotionState& to = out.state;
     const Eigen::VectorXd x = solve(base, to.lambda);
@@ -257,11 +259,11 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
         const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
         const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
-        out.error = ours / (ours + theirs) * along.norm() / std::sqrt(along.size());
+        out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
     } else if (from.step > 0) {
         const Eigen::RowVectorXd along =
             (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum();
-        out.error = along.norm() / std::sqrt(along.size()) / 2;
+        out.error = along.cwiseAbs().maxCoeff() / 2;
     }
     const VectorField kept_extent = correction(to.X, base.fields);
     out.correction = work(kept_extent, base.fields);

@@ -20,7 +20,7 @@ struct MotionState {
     Eigen::VectorXd u;           // velocity as in MotionUnknowns, component by component
     VectorField X_past, w_past;  // at time - step
     Eigen::VectorXd u_past;
-    Eigen::VectorXd p;      // pressure, at the nodes of its own order
+    Eigen::VectorXd p;  // pressure, at the nodes of its own order
     double lambda = 0;
 };
 
@@ -33,7 +33,7 @@ struct MotionControl {
 
 struct MotionStep {
     MotionState state;
-    double error = 0;       // of the positions over this step along the normal, root of the mean square, estimated
+    double error = 0;       // of the positions over this step along the normal, largest, estimated
     double correction = 0;  // energy that keeping area and volume took
 };
 

@@ -14,8 +14,8 @@ namespace tubule::surface3d {
 
 // Small matrices with one column, or row and column, for each node of a cell: on the stack.
 template <int rows>
-using CellColumns = Eigen::Matrix<double, rows, Eigen::Dynamic, rows == 1 ? Eigen::RowMajor : Eigen::ColMajor, rows,
-                                  max_cell_nodes>;
+using CellColumns =
+    Eigen::Matrix<double, rows, Eigen::Dynamic, rows == 1 ? Eigen::RowMajor : Eigen::ColMajor, rows, max_cell_nodes>;
 using CellMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, max_cell_nodes, max_cell_nodes>;
 
