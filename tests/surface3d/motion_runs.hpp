@@ -1,0 +1,69 @@
+// Short runs of either stepper, and their energies.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "surface3d/bending_force.hpp"
+#include "surface3d/paper_scheme.hpp"
+#include "tests/surface3d/errors.hpp"
+
+namespace tubule::surface3d {
+
+inline double longest_edge(const CurvedMesh& mesh) {
+    double h = 0;
+    for (int cell = 0; cell < mesh.triangles(); ++cell)
+        for (int c = 0; c < 3; ++c) h = std::max(h, (mesh.position(cell, (c + 1) % 3) - mesh.position(cell, c)).norm());
+    return h;
+}
+
+// Area and volume of the start.
+inline MotionControl kept(const CurvedMesh& mesh) {
+    const Extent e = extent(SurfaceSpace(mesh), mesh);
+    return {.area = e.area, .volume = e.volume};
+}
+
+// Bending energy of the fields that drive the surface, and INT inertia u^2/2.
+template <class Stepper>
+double total_energy(const Stepper& stepper, const MotionState& state, const Bending& bending) {
+    const SurfaceSpace& space = stepper.space();
+    const CurvedMesh mesh = stepper.mesh(state.X);
+    const MotionFields fields = motion_fields(space, mesh, Projection(space, mesh));
+    double energy = observe(space, mesh, {fields.normal, {}, fields.H, fields.K}, bending).energy;
+    if (stepper.law().inertia == 0) return energy;
+    const Eigen::SparseMatrix<double> mass = mass_matrix(space, mesh);
+    for (int d = 0; d < 3; ++d) {
+        const Eigen::VectorXd u = state.u.segment(d * space.size(), space.size());
+        energy += stepper.law().inertia * u.dot(mass * u) / 2;
+    }
+    return energy;
+}
+
+struct EnergyRun {
+    double first = 0, largest = 0, last = 0;  // infinite where a step failed
+    int steps = 0;
+    MotionState state;
+};
+
+// So many steps from rest, fewer where the energy exceeds `limit` times the first or a step fails.
+template <class Stepper>
+EnergyRun run_steps(Stepper& stepper, const CurvedMesh& mesh, const Bending& bending, double tau, int steps,
+                    double limit = std::numeric_limits<double>::infinity()) {
+    EnergyRun out;
+    out.state = stepper.start(mesh);
+    out.first = out.largest = out.last = total_energy(stepper, out.state, bending);
+    while (out.steps < steps && out.last <= limit * out.first) {
+        try {
+            out.state = stepper.step(out.state, tau).state;
+            out.last = total_energy(stepper, out.state, bending);
+        } catch (const SolveError&) {
+            out.last = std::numeric_limits<double>::infinity();
+        }
+        if (!(out.last < std::numeric_limits<double>::infinity())) out.last = std::numeric_limits<double>::infinity();
+        out.largest = std::max(out.largest, out.last);
+        ++out.steps;
+    }
+    return out;
+}
+
+}  // namespace tubule::surface3d
