@@ -205,6 +205,8 @@ PaperStepper::PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const B
       solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {
     if (!law.inextensible)
         throw std::invalid_argument("the paper's scheme has fluid, stokes and overdamped, no gradient flow");
+    if (law.inertia == 0 && law.friction == 0)
+        throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: nothing decides rigid motions");
     if (!(smoothing >= 0))
         throw std::invalid_argument(fmt::format("curvatures are smoothed by eps >= 0, not {:g}", smoothing));
 }

@@ -37,9 +37,10 @@ struct PaperFields {
 class PaperStepper {
 public:
     // `smoothing`: the eps >= 0 of the paper's a - eps Lap a = a_h for K, grad K and the explicit H; a length squared.
-    // The paper gives no value, only that it was chosen by experiment; 0 leaves an L2 projection.
-    // std::invalid_argument for a law or a term of the energy that the paper has no scheme for, or eps < 0.
-    PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, double smoothing = 0);
+    // The paper chose it by experiment and gives no value; 0 leaves an L2 projection. std::invalid_argument for eps < 0
+    // and for what the scheme has no equations for: a gradient flow, other terms of the energy, and Stokes without
+    // friction, whose rigid motions nothing decides.
+    PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, double smoothing);
 
     // Leaves `error` and `correction` of the answer 0: nothing is estimated, and area and volume drift.
     // SolveError where the system cannot be solved.
@@ -49,11 +50,13 @@ public:
     MotionState start(const CurvedMesh& mesh) const;
     CurvedMesh mesh(const VectorField& X) const;
 
+    // What is explicit in a step from this surface.
+    PaperFields fields(const CurvedMesh& mesh);
+
     const SurfaceSpace& space() const { return space_; }
     const MotionLaw& law() const { return law_; }
 
 private:
-    PaperFields fields(const CurvedMesh& mesh);
     void assemble(const MotionState& from, double tau);
 
     CurvedMesh mesh_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "surface3d/base_meshes.hpp"
 #include "surface3d/bending_force.hpp"
 #include "surface3d/paper_scheme.hpp"
 #include "tests/surface3d/errors.hpp"
@@ -64,6 +65,16 @@ EnergyRun run_steps(Stepper& stepper, const CurvedMesh& mesh, const Bending& ben
         ++out.steps;
     }
     return out;
+}
+
+// The largest total energy of so many steps over the first, on the paper's perturbed sphere with eps = .01 h^2.
+inline double growth_by_the_paper(int n, double k42, double tau, int steps) {
+    const CurvedMesh mesh = mapped_mesh(icosphere(n), 3, map_of(perturbed_sphere()));
+    const Bending bending{.k = {0.125, 0, k42}, .H0 = 0};
+    PaperStepper stepper(mesh, motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}}), bending,
+                         0.01 * std::pow(longest_edge(mesh), 2));
+    const EnergyRun run = run_steps(stepper, mesh, bending, tau, steps, 10);
+    return run.largest / run.first;
 }
 
 }  // namespace tubule::surface3d
