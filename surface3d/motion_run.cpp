@@ -11,6 +11,7 @@
 
 #include "surface3d/guards.hpp"
 #include "surface3d/motion_frame.hpp"
+#include "surface3d/paper_scheme.hpp"
 #include "surface3d/start.hpp"
 
 namespace tubule::surface3d {
@@ -142,6 +143,7 @@ private:
     const Trace* coarser_;
     std::chrono::steady_clock::time_point started_;
     std::unique_ptr<MotionStepper> stepper_;
+    std::unique_ptr<PaperStepper> paper_;  // makes the steps instead where the case says so
     MotionState state_;
     MotionMeasures now_;
     MotionMemory memory_;
@@ -164,6 +166,10 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
 void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     MotionLaw law = motion_law(case_.model);
     law.keeps_volume = memory_.keeps_volume;
+    if (case_.surface.scheme == Scheme::paper) {
+        law.flows = true;  // it has all components of u in all models
+        paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);
+    }
     const MotionControl control{.area = memory_.area,
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
@@ -244,7 +250,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
         return Refusal{0.25, {Stop::solver_failed, t, what, "try other elements, or another discretisation.order"}};
     };
     try {
-        const MotionStep next = stepper_->step(state_, tau);
+        const MotionStep next = paper_ ? paper_->step(state_, tau) : stepper_->step(state_, tau);
         if (!next.state.X.allFinite() || !next.state.u.allFinite()) return failed("the step overflows");
         const double error = next.error / (memory_.tolerance * length());
         if (!case_.surface.step && error > 2)
@@ -501,10 +507,13 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
     // With too few triangles, or when their number is not ours to choose, the coarser run has elements of lower order.
     Case lower = c;
     lower.surface.order = std::max(element_order(c) - 1, 2);
+    Case same = c;
+    for (Case* coarse : {&lower, &same})
+        if (coarse->surface.step) *coarse->surface.step *= 2;
     const bool resizable = start_mesh(c, settings.elements).resizable;
     const bool by_order = !resizable || coarser(settings).elements < least_triangles;
     auto coarse = by_order ? run_one(lower, false, {settings.elements, coarser(settings).tolerance}, nullptr)
-                           : run_one(c, false, coarser(settings), nullptr);
+                           : run_one(same, false, coarser(settings), nullptr);
     for (int pair = 1;; ++pair) {
         if (ended_early(coarse->summary.stop.reason)) {
             describe(coarse->summary, c, coarse->summary.reference_energy, pair);  // nothing is known of the error yet

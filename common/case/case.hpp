@@ -70,7 +70,7 @@ struct SurfaceDiscretisation {
     MeshKind mesh = MeshKind::uniform;
     // Of a shape at rest:
     Recovery recovery = Recovery::patch;
-    double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none
+    double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none. Of its scheme, too
     // Of a motion:
     Scheme scheme = Scheme::bdf2;
     std::optional<double> step;            // the same for all steps; switches their control off

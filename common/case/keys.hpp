@@ -186,10 +186,16 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
     k.choice("mesh", d.mesh,
              {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
     if (moves) {
-        for (const char* key : {"recovery", "smoothing"})
-            k.absent(key, "must be absent: a surface that moves has its own curvatures");
-        k.choice("scheme", d.scheme, {{"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}});
+        k.absent("recovery", "must be absent: a surface that moves has its own curvatures");
+        k.choice("scheme", d.scheme, {{"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
         k.number("step", d.step, {.above = 0});
+        if (d.scheme == Scheme::paper) {
+            k.number("smoothing", d.smoothing, {.from = 0});
+            for (const char* key : {"time_tolerance", "relaxation"})
+                k.absent(key, "must be absent: scheme \"paper\" controls neither its step nor its mesh");
+            return;
+        }
+        k.absent("smoothing", "must be absent: it belongs to scheme \"paper\"");
         k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
         k.number("relaxation", d.relaxation, {.above = 0});
         return;
@@ -289,7 +295,17 @@ std::pair<std::string, std::string> not_axisymmetric(const Shape& shape);
 // What no table can tell alone.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
-    if (c.tier != Tier::axisym) return;
+    if (c.tier != Tier::axisym) {
+        if (c.surface.scheme != Scheme::paper) return;
+        k.check("discretisation.scheme", [&]() -> std::string {
+            if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not control it";
+            if (c.model.kind == ModelKind::gradient_flow) return "must not be \"paper\" for a gradient flow";
+            if (c.model.kind == ModelKind::stokes && c.model.gamma == 0)
+                return "must not be \"paper\" for a Stokes flow without friction: it leaves rigid motions open";
+            return {};
+        });
+        return;
+    }
     const auto [key, complaint] = not_axisymmetric(c.shape);
     k.check(key, [&] { return complaint; });
     k.check("discretisation.parametrisation", [&]() -> std::string {

@@ -23,8 +23,9 @@ enum class MeshKind {
 
 // How a surface is moved.
 enum class Scheme {
-    bdf2,  // H and K implicit, backward differences of second order
-    euler  // the same of first order
+    bdf2,   // H and K implicit, backward differences of second order
+    euler,  // the same of first order
+    paper   // the paper's: Euler steps with K explicit and smoothed
 };
 
 }  // namespace tubule
