@@ -61,6 +61,19 @@ public:
         return sum;
     }
 
+    // As an array of a record, and back.
+    Array array() const {
+        Array out{"restart_coarser_run", {points_.size(), 2}, {}};
+        for (const auto& p : points_) out.data.insert(out.data.end(), p.begin(), p.end());
+        return out;
+    }
+    explicit Trace(const Record& record) {
+        for (const Array& a : record.arrays)
+            if (a.name == "restart_coarser_run")
+                for (std::size_t i = 0; i + 1 < a.data.size(); i += 2) add(a.data[i], a.data[i + 1]);
+    }
+    Trace() = default;
+
 private:
     std::vector<std::array<double, 2>> points_;
 };
@@ -135,7 +148,11 @@ private:
     double what_may_change() const;
     void write_row();
     void write_frame();
-    Record record() const { return motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh_number_); }
+    Record record() const {
+        Record out = motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh_number_);
+        if (coarser_) out.arrays.push_back(coarser_->array());
+        return out;
+    }
 
     const Case& case_;
     RunObserver& watch_;
@@ -495,51 +512,49 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         const MotionMemory memory = motion_restart(restart->record).memory;
         settings = {memory.elements, memory.tolerance};
     }
-    const auto run_one = [&](const Case& which, bool recorded, const Settings& with, const Trace* coarser) {
-        auto attempt = std::make_unique<MotionAttempt>(which, observer, recorded, with, coarser, started);
-        if (recorded && restart)
-            attempt->resume(*restart);
-        else
-            attempt->begin();
-        attempt->go();
-        return attempt;
-    };
     // With too few triangles, or when their number is not ours to choose, the coarser run has elements of lower order.
-    Case lower = c;
-    lower.surface.order = std::max(element_order(c) - 1, 2);
-    Case same = c;
-    for (Case* coarse : {&lower, &same})
-        if (coarse->surface.step) *coarse->surface.step *= 2;
     const bool resizable = start_mesh(c, settings.elements).resizable;
     const bool by_order = !resizable || coarser(settings).elements < least_triangles;
-    auto coarse = by_order ? run_one(lower, false, {settings.elements, coarser(settings).tolerance}, nullptr)
-                           : run_one(same, false, coarser(settings), nullptr);
-    for (int pair = 1;; ++pair) {
-        if (ended_early(coarse->summary.stop.reason)) {
-            describe(coarse->summary, c, coarse->summary.reference_energy, pair);  // nothing is known of the error yet
-            return coarse->summary;
+    Trace trace = restart ? Trace(restart->record) : Trace();
+    if (trace.empty()) {
+        Case lower = c;
+        if (by_order) lower.surface.order = std::max(element_order(c) - 1, 2);
+        if (c.surface.step) lower.surface.step = 2 * *c.surface.step;
+        const Settings with{by_order ? settings.elements : coarser(settings).elements, coarser(settings).tolerance};
+        MotionAttempt coarse(lower, observer, false, with, nullptr, started);
+        coarse.begin();
+        coarse.go();
+        if (ended_early(coarse.summary.stop.reason)) {  // nothing is known of the error yet
+            describe(coarse.summary, c, coarse.summary.reference_energy, 1);
+            return coarse.summary;
         }
-        auto fine = run_one(c, true, settings, coarse->trace.empty() ? nullptr : &coarse->trace);
+        trace = coarse.trace;
+    }
+    for (int pair = 1;; ++pair) {
+        auto fine =
+            std::make_unique<MotionAttempt>(c, observer, true, settings, trace.empty() ? nullptr : &trace, started);
+        if (restart)
+            fine->resume(*restart);
+        else
+            fine->begin();
+        fine->go();
         const Stop reason = fine->summary.stop.reason;
-        const bool differ = coarse->summary.elements < fine->summary.elements || (by_order && pair == 1);
-        const bool known =
-            differ && !coarse->trace.empty() && (coarse->summary.stop.reason == reason || ended_early(reason));
+        const double compared_until = trace.empty() ? 0 : trace.end();
+        const bool known = compared_until >= fine->summary.stop.time * (1 - 1e-3) && compared_until > 0;
         describe(fine->summary, c, known ? fine->error() : fine->summary.reference_energy, pair);
         const bool given = settings_given(c) || !resizable;
         if (fine->summary.as_accurate_as_asked || given || pair == most_pairs ||
             settings.elements * 1.6 > most_triangles || ended_early(reason)) {
             if (!known)
                 fine->summary.warnings.push_back(fmt::format(
-                    "the coarser run of the pair, of {} triangles, ended at t = {:.6g} with {}: the error "
-                    "is not known",
-                    coarse->summary.elements, coarse->summary.stop.time, name(coarse->summary.stop.reason)));
+                    "the coarser run of the pair came to t = {:.6g} only: the error is not known", compared_until));
             accept(fine->summary, c, given);
             return fine->summary;
         }
         settings = finer(settings, fine->summary.estimated_error / c.accuracy.energy);
         observer.discard();
         restart = nullptr;
-        coarse = std::move(fine);
+        trace = std::move(fine->trace);
     }
 }
 
