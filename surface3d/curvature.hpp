@@ -50,6 +50,12 @@ public:
     CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh) const;
     CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh, const Projection& project) const;
 
+    // The graph about each vertex, and the surface that they make: at a point (xi, eta) of a cell, which is at x, the
+    // mean of the graphs' points above or below x, weighted as above. Nearer to the surface than P_k by some orders.
+    std::vector<PolynomialGraph> fit(const CurvedMesh& mesh) const;
+    Eigen::Vector3d position(const std::vector<PolynomialGraph>& graphs, const CurvedMesh& mesh, int cell,
+                             const Eigen::Vector2d& at, const Eigen::Vector3d& x) const;
+
 private:
     struct Member {
         int node, shift;  // as the vertex sees it
@@ -64,7 +70,6 @@ private:
         double weight;
     };
 
-    std::vector<PolynomialGraph> fit(const CurvedMesh& mesh) const;
     int shift(const CurvedMesh& mesh, int cell, int a) const {
         return mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + a] : 0;
     }

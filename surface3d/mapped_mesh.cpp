@@ -57,7 +57,7 @@ CurvedMesh flat_mesh(const TriangleMesh& base, int order) {
     return mesh;
 }
 
-CurvedMesh with_order(const CurvedMesh& mesh, int order) {
+TriangleMesh corner_triangles(const CurvedMesh& mesh) {
     TriangleMesh corners{.points = {}, .triangles = {}, .period = mesh.period, .shifts = {}};
     std::vector<int> number(mesh.size(), -1);
     for (int cell = 0; cell < mesh.triangles(); ++cell) {
@@ -74,8 +74,11 @@ CurvedMesh with_order(const CurvedMesh& mesh, int order) {
         corners.triangles.push_back(triangle);
         if (mesh.period > 0) corners.shifts.push_back(shifts);
     }
+    return corners;
+}
 
-    CurvedMesh out = flat_mesh(corners, order);
+CurvedMesh with_order(const CurvedMesh& mesh, int order) {
+    CurvedMesh out = flat_mesh(corner_triangles(mesh), order);
     std::vector<QuadraturePoint> points;
     for (const auto& [i, j, l] : lattice(order))
         points.push_back({static_cast<double>(j) / order, static_cast<double>(l) / order, 0});

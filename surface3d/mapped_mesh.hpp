@@ -11,6 +11,9 @@ namespace tubule::surface3d {
 // 1 ... 4.
 CurvedMesh flat_mesh(const TriangleMesh& base, int order);
 
+// The flat triangles between the vertices, cell by cell; vertices are numbered as the cells come to them.
+TriangleMesh corner_triangles(const CurvedMesh& mesh);
+
 // The interpolant of another order of the same triangles.
 CurvedMesh with_order(const CurvedMesh& mesh, int order);
 

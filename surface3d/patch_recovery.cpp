@@ -99,6 +99,17 @@ std::vector<PolynomialGraph> PatchRecovery::fit(const CurvedMesh& mesh) const {
     return graphs;
 }
 
+Eigen::Vector3d PatchRecovery::position(const std::vector<PolynomialGraph>& graphs, const CurvedMesh& mesh, int cell,
+                                        const Eigen::Vector2d& at, const Eigen::Vector3d& x) const {
+    const double weight[3] = {1 - at[0] - at[1], at[0], at[1]};
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 3; ++c) {
+        const Eigen::Vector3d up = shift(mesh, cell, c) * mesh.period * Eigen::Vector3d::UnitZ();
+        mean += weight[c] * (graphs[patch_of_[mesh.node(cell, c)]].at(x - up).x + up);
+    }
+    return mean;
+}
+
 CurvatureField PatchRecovery::nodal(const CurvedMesh& mesh) const {
     const std::vector<PolynomialGraph> graphs = fit(mesh);
     Columns11 values(11, mesh.size());
