@@ -8,9 +8,9 @@ namespace tubule::surface3d {
 namespace {
 
 TEST(PaperSchemeStudy, StableStepFallsAsTheSquareOfTheMeshWidth) {
-    EXPECT_EQ(growth_by_the_paper(4, 0.12, 3e-3, 60), 1);
+    EXPECT_LT(growth_by_the_paper(4, 0.12, 3e-3, 60), 1.1);
     EXPECT_GT(growth_by_the_paper(4, 0.12, 4.2e-3, 60), 10);
-    EXPECT_EQ(growth_by_the_paper(8, 0.12, 3.5e-4, 60), 1);
+    EXPECT_LT(growth_by_the_paper(8, 0.12, 3.5e-4, 60), 1.1);
     EXPECT_GT(growth_by_the_paper(8, 0.12, 1e-3, 60), 10);
 }
 
