@@ -46,18 +46,25 @@ double along_stretching(const SurfaceSpace& space, const CurvedMesh& mesh, const
 
 TEST(PaperScheme, FirstStepIsThatOfTheDefaultForEveryTerm) {
     // From rest both are one linearly implicit Euler step, by different weak forms of the same force. Compared on a
-    // smooth field, for on the scale of the mesh an explicit K and an implicit one differ. Found: 0.2 %, 1.4 %, 0.3 %.
+    // smooth field, for on the scale of the mesh an explicit K and an implicit one differ. Found: 0.2 % and 0.1 %
+    // (k20), 0.1 % and 0.1 % (k40), 0.3 % and 1.5 % (k42).
     const CurvedMesh mesh = smooth_cell(4);
     const MotionLaw law = law_of(ModelKind::fluid, 0.1);
     const double tau = 1e-2;
-    for (const Bending& bending : {Bending{.k = {1, 0, 0}, .H0 = -1.5}, Bending{.k = {0, 0.1, 0}, .H0 = -1.5},
-                                   Bending{.k = {0, 0, 1}, .H0 = 0}}) {
+    struct Term {
+        Bending bending;
+        double difference;
+    };
+    for (const auto& [bending, difference] :
+         {Term{{.k = {1, 0, 0}, .H0 = -1.5}, 0.005}, Term{{.k = {0, 0.02, 0}, .H0 = 1}, 0.005},
+          Term{{.k = {0, 0, 1}, .H0 = 0}, 0.03}}) {
         PaperStepper paper(mesh, law, bending, 0);
         MotionStepper standard(mesh, law, bending, MotionControl{});
         const MotionState a = paper.step(paper.start(mesh), tau).state,
                           b = standard.step(standard.start(mesh), tau).state;
-        EXPECT_NEAR(along_stretching(paper.space(), mesh, a.u) / along_stretching(paper.space(), mesh, b.u), 1, 0.02);
-        EXPECT_NEAR(a.lambda / b.lambda, 1, 0.02);
+        EXPECT_NEAR(along_stretching(paper.space(), mesh, a.u) / along_stretching(paper.space(), mesh, b.u), 1,
+                    difference);
+        EXPECT_NEAR(a.lambda / b.lambda, 1, difference);
     }
 }
 
