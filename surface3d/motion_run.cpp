@@ -12,6 +12,7 @@
 #include "surface3d/guards.hpp"
 #include "surface3d/motion_frame.hpp"
 #include "surface3d/paper_scheme.hpp"
+#include "surface3d/remesh.hpp"
 #include "surface3d/start.hpp"
 
 namespace tubule::surface3d {
@@ -31,6 +32,9 @@ constexpr double growth = 1.6, safety = 0.85;   // of steps
 constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
 constexpr double climb = 0.25;                  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
+// A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
+constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5;
+constexpr int steps_between_meshes = 20;
 constexpr int steps_between_looks = 10;
 constexpr double seconds_between_checkpoints = 20;
 constexpr double same_everywhere = 1e-8;  // variation_of_H
@@ -143,6 +147,8 @@ private:
     void take(const MotionStep& next, const MotionMeasures& m);
     void set_next_step(double tau, double asked, double error);
     std::optional<StopReport> step();
+    bool wants_new_mesh() const;
+    void make_new_mesh();
     std::optional<StopReport> check();
     std::optional<StopReport> check_shape() const;
     double what_may_change() const;
@@ -169,7 +175,7 @@ private:
     std::size_t next_output_ = 0, mesh_number_ = 0;
     double error_now_ = 0;
     double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
-    int steps_ = 0, rejected_ = 0;
+    int steps_ = 0, rejected_ = 0, mesh_since_ = 0, meshes_ = 1;
     std::vector<double> row_;
 };
 
@@ -352,6 +358,33 @@ std::optional<StopReport> MotionAttempt::check() {
     return std::nullopt;
 }
 
+bool MotionAttempt::wants_new_mesh() const {
+    if (paper_ || steps_ < mesh_since_ + steps_between_meshes) return false;
+    return now_.quality < quality_to_remesh || (now_.neck && now_.turn > turn_to_remesh);
+}
+
+// The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.
+// What the energy jumps counts as an error. Where no better mesh can be made, the old one is kept: check_shape() tells
+// when it will do no longer.
+void MotionAttempt::make_new_mesh() {
+    mesh_since_ = steps_;
+    const MotionLaw& law = stepper_->law();
+    const int n = static_cast<int>(state_.X.cols()), d = law.components();
+    const auto found = remesh(stepper_->mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
+    const auto* better = std::get_if<Remeshed>(&found);
+    if (!better || better->quality.worst < now_.quality) return;
+    const double time = state_.time, energy = now_.bending.energy;
+    make_stepper(better->mesh);
+    ++meshes_;
+    state_ = stepper_->start(better->mesh);
+    state_.time = time;
+    state_.u = better->fields.transpose().reshaped();
+    state_.u_past = state_.u;
+    look();
+    memory_.error += std::abs(now_.bending.energy - energy);
+    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.relaxation);
+}
+
 std::optional<StopReport> MotionAttempt::step() {
     const double left = left_until_output();
     double tau = left / std::ceil(left / memory_.next_step * (1 - 1e-9));  // arrives without a last short step
@@ -379,7 +412,9 @@ std::optional<StopReport> MotionAttempt::step() {
         last_checkpoint_ = seconds_since(started_);
         watch_.checkpoint(record());
     }
-    return check();
+    if (auto stop = check()) return stop;
+    if (wants_new_mesh()) make_new_mesh();
+    return std::nullopt;
 }
 
 void MotionAttempt::go() {
@@ -402,6 +437,7 @@ void MotionAttempt::go() {
                        {"steps", std::int64_t{steps_}},
                        {"rejected_steps", std::int64_t{rejected_}},
                        {"time_tolerance", memory_.tolerance},
+                       {"meshes", std::int64_t{meshes_}},
                        {"relaxation", memory_.relaxation},
                        {"dissipated", memory_.dissipated},
                        {"identity_defect", defect()},
