@@ -1,0 +1,263 @@
+#include "common/theory/dispersion.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace tubule::theory {
+
+namespace {
+
+using Complex = std::complex<double>;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+CurvatureJet<double> on(const UniformTube& tube) {
+    return density(tube.energy, -1 / tube.radius, 0.0);
+}
+CurvatureJet<double> on(const UniformSphere& sphere) {
+    return density(sphere.energy, -2 / sphere.radius, 1 / (sphere.radius * sphere.radius));
+}
+
+// f + F1/R + sigma0: what multiplies Z.
+double pull(const UniformTube& tube) {
+    const auto f = on(tube);
+    return f.f + f.H / tube.radius + tube.tension;
+}
+
+// F2 - 2 f_HK/R + f_KK/R^2, the principal symbol of waves along the axis.
+double symbol_along(const UniformTube& tube) {
+    const auto f = on(tube);
+    return f.HH - 2 * f.HK / tube.radius + f.KK / (tube.radius * tube.radius);
+}
+
+double squared_wave_number(const UniformTube& tube, double q, int m) {
+    return q * q + m * m / (tube.radius * tube.radius);
+}
+
+bool faster(const Complex& a, const Complex& b) {
+    return a.real() != b.real() ? a.real() > b.real() : a.imag() > b.imag();
+}
+
+// Real a s^2 + b s + c = 0, a > 0, without cancellation.
+std::vector<Complex> quadratic_roots(double a, double b, double c) {
+    const double discriminant = b * b - 4 * a * c;
+    if (discriminant < 0) {
+        const Complex s(-b / (2 * a), std::sqrt(-discriminant) / (2 * a));
+        return {s, std::conj(s)};
+    }
+    const double far = -(b + std::copysign(std::sqrt(discriminant), b)) / 2;
+    std::vector<Complex> roots{far / a, far != 0 ? c / far : 0.0};
+    std::sort(roots.begin(), roots.end(), faster);
+    return roots;
+}
+
+// Real s^3 + c2 s^2 + c1 s + c0 = 0: eigenvalues of the companion matrix, improved by Newton's method.
+std::vector<Complex> cubic_roots(double c2, double c1, double c0) {
+    Eigen::Matrix3d companion;
+    companion << 0, 0, -c0, 1, 0, -c1, 0, 1, -c2;
+    const Eigen::EigenSolver<Eigen::Matrix3d> eigen(companion, false);
+    std::vector<Complex> roots;
+    for (Complex s : eigen.eigenvalues()) {
+        for (int i = 0; i < 2; ++i) {
+            const Complex slope = (3.0 * s + 2 * c2) * s + c1, value = ((s + c2) * s + c1) * s + c0;
+            if (std::abs(value) < 0.1 * std::abs(slope) * std::abs(s)) s -= value / slope;
+        }
+        roots.push_back(s);
+    }
+    std::sort(roots.begin(), roots.end(), faster);
+    return roots;
+}
+
+// What resists in Stokes flow, over Q R^2: the braces of maths 5 (c).
+double stokes_drag(const Model& model, double R, double q, int m) {
+    const double mu = 1 / model.Re, Q = q * q + m * m / (R * R), twist = model.gamma + mu * Q, around = m / R;
+    const double drag = model.gamma * (Q * R * R + 1) + 4 * mu * q * q;
+    return m == 0 || q == 0 ? drag : drag - 4 * mu * mu * q * q * around * around / twist;
+}
+
+}  // namespace
+
+double radius_rate(const UniformTube& tube) {
+    const auto f = on(tube);
+    return -(f.f + f.H / tube.radius) / tube.radius;
+}
+
+double radius_rate(const UniformSphere& sphere) {
+    const auto f = on(sphere);
+    const double R = sphere.radius;
+    return -2 / R * (f.f + f.H / R - f.K / (R * R));
+}
+
+double tension_of_free_volume(const Bending& energy, double radius) {
+    return radius * radius_rate(UniformTube{energy, radius, 0});
+}
+
+double reduced_tension(const UniformTube& tube) {
+    return pull(tube) * tube.radius * tube.radius / on(tube).HH;
+}
+
+Stiffness stiffness(const UniformTube& tube, int m) {
+    const double R = tube.radius, z0 = (m * m - 1) / (R * R);  // Z = q^2 + z0
+    const auto f = on(tube);
+    return {symbol_along(tube), 2 * f.HH * z0 + pull(tube) - 2 * f.H / R - 2 * f.HK * z0 / R,
+            f.HH * z0 * z0 + pull(tube) * z0};
+}
+
+double stiffness(const UniformSphere& sphere, int l) {
+    const double R = sphere.radius, L = l * (l + 1.0) - 2;
+    const auto f = on(sphere);
+    return L / (R * R) * (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R)) + f.f - f.K / (R * R) + sphere.tension);
+}
+
+double mobility(const UniformTube& tube, const Model& model, double q, int m) {
+    const double R = tube.radius, QR2 = squared_wave_number(tube, q, m) * R * R;
+    switch (model.kind) {
+        case ModelKind::gradient_flow:
+            return 1;
+        case ModelKind::overdamped:
+        case ModelKind::fluid:
+            return QR2 / (QR2 + 1);
+        default:
+            return q == 0 && m == 0 ? 0 : QR2 / stokes_drag(model, R, q, m);
+    }
+}
+
+Growth growth(const UniformTube& tube, const Model& model, double q, int m) {
+    m = std::abs(m);
+    const double R = tube.radius, Q = squared_wave_number(tube, q, m), G = stiffness(tube, m)(q);
+    if (model.kind == ModelKind::gradient_flow) return {{-G}};
+    // A radius, or a place, that is kept.
+    const bool rigid = q == 0 && m < 2;
+    if (model.kind != ModelKind::fluid) return {{rigid || G == 0 ? 0.0 : -mobility(tube, model, q, m) * G}};
+    // maths 5 (d), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
+    // gamma, s [(a A + B)(a + D) - C] + Q R^2 G (a + D) = 0. Without C the factor a + D belongs to a swirl without a
+    // wave.
+    const double mu = 1 / model.Re, gamma = model.gamma, A = Q * R * R + 1, B = 4 * mu * q * q, D = mu * Q,
+                 C = 4 * mu * mu * q * q * m * m / (R * R), F = rigid ? 0.0 : Q * R * R * G;
+    if (C == 0) return {quadratic_roots(A, gamma * A + B, F)};
+    return {cubic_roots((2 * A * gamma + A * D + B) / A, ((A * gamma + A * D + B) * gamma + B * D - C + F) / A,
+                        F * (gamma + D) / A)};
+}
+
+Growth growth(const UniformSphere& sphere, const Model& model, int l) {
+    const double R = sphere.radius, Lam = l * (l + 1.0), L = Lam - 2, G = stiffness(sphere, l);
+    if (model.kind == ModelKind::gradient_flow) return {{-G}};
+    if (l < 2) return {{0.0}};  // its size, which is kept, and its place
+    const double drag = model.gamma * (Lam + 4) + 4 / model.Re * L / (R * R);
+    if (model.kind == ModelKind::overdamped) return {{-Lam * G / (Lam + 4)}};
+    if (model.kind == ModelKind::stokes) return {{-Lam * G / drag}};
+    return {quadratic_roots(Lam + 4, drag, Lam * G)};
+}
+
+double toroidal_rate(const UniformSphere& sphere, const Model& model, int l) {
+    return -model.gamma - (l * (l + 1.0) - 2) / (model.Re * sphere.radius * sphere.radius);
+}
+
+bool ill_posed_along(const UniformTube& tube) {
+    return !(symbol_along(tube) > 0);
+}
+bool ill_posed_around(const UniformTube& tube) {
+    return !(on(tube).HH > 0);
+}
+
+std::vector<Band> growing_bands(const UniformTube& tube, int m) {
+    const Stiffness G = stiffness(tube, m);
+    // The places in y = q^2 > 0 where G changes its sign.
+    std::vector<double> changes;
+    if (G.q4 != 0) {
+        const double sign = std::copysign(1.0, G.q4);
+        for (const Complex& y : quadratic_roots(sign * G.q4, sign * G.q2, sign * G.q0))
+            if (y.imag() == 0 && y.real() > 0) changes.push_back(y.real());
+    } else if (G.q2 != 0 && -G.q0 / G.q2 > 0) {
+        changes.push_back(-G.q0 / G.q2);
+    }
+    std::sort(changes.begin(), changes.end());
+    changes.insert(changes.begin(), 0.0);
+    std::vector<Band> bands;
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+        const bool last = i + 1 == changes.size();
+        const double middle = last ? 2 * changes[i] + 1 : (changes[i] + changes[i + 1]) / 2;
+        if (G(std::sqrt(middle)) < 0)
+            bands.push_back({std::sqrt(changes[i]), last ? infinity : std::sqrt(changes[i + 1])});
+    }
+    return bands;
+}
+
+std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& model, int m) {
+    std::optional<FastestWave> best;
+    const auto rate = [&](double q) { return growth(tube, model, q, m).rate(); };
+    for (const Band& band : growing_bands(tube, m)) {
+        if (!std::isfinite(band.to) || !std::isfinite(rate(band.from))) return std::nullopt;
+        // Rates have one or two maxima within a band: samples find the highest, golden sections refine it.
+        constexpr int samples = 64;
+        const double step = (band.to - band.from) / samples;
+        int top = 0;
+        for (int i = 1; i <= samples; ++i)
+            if (rate(band.from + i * step) > rate(band.from + top * step)) top = i;
+        double low = band.from + std::max(top - 1, 0) * step, high = band.from + std::min(top + 1, samples) * step;
+        const double golden = (std::sqrt(5.0) - 1) / 2;
+        while (high - low > 1e-9 * band.to) {  // a maximum is flat: no narrower than that
+            const double a = high - golden * (high - low), b = low + golden * (high - low);
+            if (rate(a) >= rate(b))
+                high = b;
+            else
+                low = a;
+        }
+        const double q = top == 0 && rate(band.from) >= rate((low + high) / 2) ? band.from : (low + high) / 2;
+        if (!best || rate(q) > best->rate) best = {q, rate(q)};
+    }
+    return best;
+}
+
+// With y = q^2 and T = f + F1/R + sigma0 the stiffness is q4 y^2 + (b + T) y + F2 z0^2 + T z0. None is negative if the
+// value at y = 0 is not, and either b + T >= 0 or (b + T)^2 <= 4 q4 (F2 z0^2 + T z0): an interval of T.
+std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m) {
+    if (ill_posed_along(tube)) return std::nullopt;
+    const double T = pull(tube), z0 = (m * m - 1) / (tube.radius * tube.radius), F2 = on(tube).HH;
+    const Stiffness G = stiffness(tube, m);
+    const double b = G.q2 - T, at_rest = F2 * z0 * z0;
+    StableTensions out;
+    if (m == 1) {
+        out.lowest = -b;
+    } else {
+        const double long_waves = -F2 * z0;  // T at which q = 0 is neutral: an upper bound for m = 0, else a lower one
+        // T^2 + 2 half T + rest <= 0 where waves of some q > 0 are neutral at most.
+        const double half = b - 2 * G.q4 * z0, rest = b * b - 4 * G.q4 * at_rest, square = half * half - rest;
+        const auto neutral = [&](double T) { return std::sqrt(std::max(-(b + T) / (2 * G.q4), 0.0)); };
+        if (m == 0 && square < 0) return std::nullopt;
+        const double root = std::sqrt(std::max(square, 0.0)), first = -half - root, second = -half + root;
+        if (m == 0) {
+            out.lowest = first, out.q_lowest = neutral(first);
+            out.highest = long_waves;
+            if (-b > long_waves) out.highest = second, out.q_highest = neutral(second);
+        } else if (-b > long_waves) {
+            out.lowest = first, out.q_lowest = neutral(first);
+        } else {
+            out.lowest = long_waves;
+        }
+    }
+    out.lowest += tube.tension - T, out.highest += tube.tension - T;
+    return out;
+}
+
+std::optional<StableTensions> common_stable_tensions(const UniformTube& tube, int last) {
+    StableTensions all;
+    for (int m = 0; m <= last; ++m) {
+        const auto one = stable_tensions(tube, m);
+        if (!one) return std::nullopt;
+        if (one->lowest > all.lowest) all.lowest = one->lowest, all.q_lowest = one->q_lowest;
+        if (one->highest < all.highest) all.highest = one->highest, all.q_highest = one->q_highest;
+    }
+    if (all.lowest > all.highest) return std::nullopt;
+    return all;
+}
+
+std::optional<double> least_f_KK(const UniformTube& tube) {
+    const Stiffness G = stiffness(tube, 0);
+    if (G.q0 < 0 || (G.q0 == 0 && G.q2 < 0)) return std::nullopt;
+    const double least_q4 = G.q2 < 0 ? G.q2 * G.q2 / (4 * G.q0) : 0, R = tube.radius;
+    return on(tube).KK + (least_q4 - G.q4) * R * R;
+}
+
+}  // namespace tubule::theory

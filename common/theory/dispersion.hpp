@@ -1,0 +1,98 @@
+// Small waves on straight tubes and on spheres: exact linear theory (maths 5, 6), for any density f(H, K).
+//
+// A tube is r = R + a cos(q z + m theta), a sphere r = R + a Y_l^m, with a(t) = a(0) exp(s t). Density, its derivatives
+// and the radius are those of the unperturbed surface. Where maths 5 and 6 have 2 k42 for f_KK and leave f_HK out, the
+// formulas here hold for both, from the linearised force of maths 2: tube, with Q = q^2 + m^2/R^2, Z = Q - 1/R^2,
+//   s = -[F2 Z^2 - 2 f_HK Z q^2/R + f_KK q^4/R^2 + (f + F1/R) Z - 2 F1 q^2/R]      gradient flow,
+// and sphere, with L = l(l+1) - 2,
+//   s = -(L/R^2)[f_HH L/R^2 - 2 f_HK L/R^3 + f_KK L/R^4 + f - f_K/R^2].
+#pragma once
+
+#include <complex>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/energy/bending.hpp"
+
+namespace tubule::theory {
+
+// A straight tube, and a sphere. The tension sigma0 is that of the membrane, minus its base pressure p0. A gradient
+// flow with a tension is that of E + sigma0 A.
+struct UniformTube {
+    Bending energy;
+    double radius = 1, tension = 0;
+};
+struct UniformSphere {
+    Bending energy;
+    double radius = 1, tension = 0;
+};
+
+// dR/dt of the gradient flow without tension.
+double radius_rate(const UniformTube& tube);
+double radius_rate(const UniformSphere& sphere);
+
+// The tension at which a tube is at rest without a difference of pressure: that of models that leave the volume free.
+double tension_of_free_volume(const Bending& energy, double radius);
+
+// P = sigma0 R^2/(2 k20) + (c^2 - 1)/2, c = H0 R (maths 5); with other terms, (f + F1/R + sigma0) R^2/F2, which is the
+// same for k20 alone. Not finite where F2 = 0.
+double reduced_tension(const UniformTube& tube);
+
+// G of maths 5 as a polynomial of q: the gradient flow's -s, and what drives the other models. A wave grows where G <
+// 0.
+struct Stiffness {
+    double q4 = 0, q2 = 0, q0 = 0;
+    double operator()(double q) const { return (q4 * q * q + q2) * q * q + q0; }
+};
+Stiffness stiffness(const UniformTube& tube, int m);
+double stiffness(const UniformSphere& sphere, int l);
+
+// All rates of one wave, the fastest (largest real part) first: one, or two or three of a fluid. Infinite where a
+// Stokes flow without friction meets no resistance (q = 0, m >= 2).
+struct Growth {
+    std::vector<std::complex<double>> roots;
+    double rate() const { return roots.front().real(); }
+    double frequency() const { return std::abs(roots.front().imag()); }
+};
+Growth growth(const UniformTube& tube, const Model& model, double q, int m);
+Growth growth(const UniformSphere& sphere, const Model& model, int l);
+// Of a sphere's tangential swirls, which leave its shape alone; for fluid and Stokes flow with friction.
+double toroidal_rate(const UniformSphere& sphere, const Model& model, int l);
+
+// M of the amplitude equations (maths 5, TRAP): models without inertia move as a' = -M G a. For a fluid, of a''.
+double mobility(const UniformTube& tube, const Model& model, double q, int m);
+
+// Where the principal symbol f_HH + 2 f_HK x + f_KK x^2 is not positive, waves grow the faster the shorter they are:
+// waves along the axis (x = -1/R), or around it (x = 0).
+bool ill_posed_along(const UniformTube& tube);
+bool ill_posed_around(const UniformTube& tube);
+
+// Wave numbers of one m that grow, q >= 0: none, one band, or two if ill-posed. The same for all models.
+struct Band {
+    double from = 0, to = std::numeric_limits<double>::infinity();
+};
+std::vector<Band> growing_bands(const UniformTube& tube, int m);
+
+// The fastest growing wave of this m, over all q >= 0. Nothing if none grows, or if there is no fastest one (ill-posed,
+// or infinite rates).
+struct FastestWave {
+    double q = 0, rate = 0;
+};
+std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& model, int m);
+
+// Where waves of one m begin to grow as the tension changes: from `lowest` to `highest` none does. `q_...` is the wave
+// number that is neutral there, 0 for long waves. Nothing if some wave grows at any tension.
+struct StableTensions {
+    double lowest = -std::numeric_limits<double>::infinity(), highest = std::numeric_limits<double>::infinity();
+    double q_lowest = 0, q_highest = 0;
+};
+std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m);
+// Of m = 0 ... last together.
+std::optional<StableTensions> common_stable_tensions(const UniformTube& tube, int last);
+
+// The f_KK (2 k42) above which no wave of m = 0 grows, all else kept. Nothing where long waves grow whatever it is.
+std::optional<double> least_f_KK(const UniformTube& tube);
+
+}  // namespace tubule::theory

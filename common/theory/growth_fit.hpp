@@ -1,0 +1,25 @@
+// The growth rate of a wave from its amplitudes at some times, such as those of a nonlinear run.
+#pragma once
+
+#include <vector>
+
+namespace tubule::theory {
+
+// The stretch of the run where log a is straightest. Of all stretches of at least 6 points over which log a changes by
+// at least 1, or by a third of its whole range if that is less, those with the smallest error bar are taken, up to
+// twice the smallest, and of these the one over which log a changes most. At most 200 points are looked at, evenly
+// taken from all.
+struct GrowthFit {
+    double rate = 0;
+    // Standard error of the slope, plus twice the range of the slopes of the stretch's three thirds
+    // (once would be less than what a slope that peaks within the stretch loses: .44 for .6).
+    double error = 0;
+    double from = 0, to = 0;  // times
+    int points = 0;           // in it
+};
+
+// `amplitudes` are not negative; those below `noise` do not count. Times ascend; points of the same time count once.
+// Throws std::invalid_argument if fewer than 6 points are left.
+GrowthFit fit_growth(const std::vector<double>& times, const std::vector<double>& amplitudes, double noise = 0);
+
+}  // namespace tubule::theory

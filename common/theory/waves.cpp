@@ -1,0 +1,192 @@
+#include "common/theory/waves.hpp"
+
+#include <fmt/format.h>
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_odeiv2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::theory {
+
+namespace {
+
+// One wave's coefficients in the amplitude equations: c = Q - 1/R^2, g = G without tension. Of a fluid with inertia
+//   a'' = -(gamma + drag) a' + swirl y - M (g - p0 c) a,     y' = a' - (gamma + decay) y,
+// y being what the tangential swirl leaves behind; swirl = 0 for m = 0.
+struct Coefficients {
+    double c, g, M, drag, swirl, decay;
+};
+
+struct Motion {
+    Model model;
+    UniformTube tube;
+    double length;
+    std::vector<Wave> waves;
+    std::vector<Coefficients> of;  // but for a radius that drifts
+    bool drifts, fluid, tension_is_outcome;
+
+    std::size_t per_wave() const { return fluid ? 3 : 1; }
+    double q(const Wave& wave) const { return 2 * pi * wave.n / length; }
+};
+
+Coefficients coefficients(const Motion& motion, const Wave& wave) {
+    UniformTube slack = motion.tube;
+    slack.tension = 0;
+    const double R = slack.radius, q = motion.q(wave), Q = q * q + wave.m * wave.m / (R * R), A = Q * R * R + 1,
+                 mu = 1 / motion.model.Re;
+    const int m = std::abs(wave.m);
+    return {Q - 1 / (R * R),
+            stiffness(slack, m)(q),
+            mobility(slack, motion.model, q, m),
+            4 * mu * q * q / A,
+            4 * mu * mu * q * q * m * m / (R * R) / A,
+            mu * Q};
+}
+
+Motion prepared(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves) {
+    Motion motion{model, tube, length, waves, {}, false, model.kind == ModelKind::fluid, false};
+    const bool flows = model.kind != ModelKind::gradient_flow;
+    motion.drifts = !flows && !keeps_volume(model);
+    motion.tension_is_outcome = flows && keeps_volume(model);
+    if (flows) motion.tube.tension = keeps_volume(model) ? 0 : tension_of_free_volume(tube.energy, tube.radius);
+    std::set<std::pair<int, int>> seen;
+    double moves = 0;
+    for (const Wave& wave : waves) {
+        if (wave.n < 0 || (wave.n == 0 && wave.m == 0))
+            throw std::invalid_argument(fmt::format("no wave has n = {}, m = {}", wave.n, wave.m));
+        if (!seen.insert({wave.n, wave.m}).second)
+            throw std::invalid_argument(fmt::format("the wave n = {}, m = {} is there twice", wave.n, wave.m));
+        motion.of.push_back(coefficients(motion, wave));
+        const Coefficients& k = motion.of.back();
+        if (!std::isfinite(k.M) && k.g != 0)
+            throw std::invalid_argument(
+                fmt::format("the wave n = 0, m = {} is infinitely fast in Stokes flow without friction", wave.m));
+        if (!std::isfinite(k.M)) motion.of.back().M = 0;
+        moves += k.c * k.c * motion.of.back().M * wave.amplitude * wave.amplitude;
+    }
+    if (motion.tension_is_outcome && !(moves > 0))
+        throw std::invalid_argument("the tension that keeps area and volume needs a wave with an amplitude");
+    return motion;
+}
+
+// minus p0 of maths 5 (TRAP).
+double tension(const Motion& motion, const double* y) {
+    if (!motion.tension_is_outcome) return motion.tube.tension;
+    double above = 0, below = 0;
+    for (std::size_t k = 0; k < motion.of.size(); ++k) {
+        const auto& [c, g, M, drag, swirl, decay] = motion.of[k];
+        const double* at = y + k * motion.per_wave();
+        const double a = at[0];
+        above += c * M * g * a * a;
+        if (motion.fluid) above += c * (a * ((motion.model.gamma + drag) * at[1] - swirl * at[2]) - at[1] * at[1]);
+        below += c * c * M * a * a;
+    }
+    return -above / below;
+}
+
+// The unknowns: the radius and log of each amplitude over that at the start; or amplitudes; or of each wave (a, a', y).
+int slope(double, const double* y, double* dy, void* parameters) {
+    const Motion& motion = *static_cast<const Motion*>(parameters);
+    if (motion.drifts) {
+        UniformTube tube = motion.tube;
+        tube.radius = y[0];
+        if (!(tube.radius > 0)) return GSL_EBADFUNC;
+        dy[0] = radius_rate(UniformTube{tube.energy, tube.radius, 0}) - tube.tension / tube.radius;
+        for (std::size_t k = 0; k < motion.waves.size(); ++k)
+            dy[k + 1] = -stiffness(tube, std::abs(motion.waves[k].m))(motion.q(motion.waves[k]));
+        return GSL_SUCCESS;
+    }
+    const double p0 = -tension(motion, y);
+    for (std::size_t k = 0; k < motion.of.size(); ++k) {
+        const auto& [c, g, M, drag, swirl, decay] = motion.of[k];
+        const std::size_t at = k * motion.per_wave();
+        const double force = -M * (g - p0 * c) * y[at];
+        if (!motion.fluid) {
+            dy[at] = force;
+            continue;
+        }
+        const double gamma = motion.model.gamma;
+        dy[at] = y[at + 1];
+        dy[at + 1] = force - (gamma + drag) * y[at + 1] + swirl * y[at + 2];
+        dy[at + 2] = y[at + 1] - (gamma + decay) * y[at + 2];
+    }
+    return GSL_SUCCESS;
+}
+
+std::vector<double> start(const Motion& motion) {
+    std::vector<double> y;
+    if (motion.drifts) {
+        y.assign(motion.waves.size() + 1, 0);
+        y[0] = motion.tube.radius;
+        return y;
+    }
+    for (const Wave& wave : motion.waves) {
+        y.push_back(wave.amplitude);
+        if (motion.fluid) y.insert(y.end(), {wave.rate, 0});
+    }
+    return y;
+}
+
+WaveState state(const Motion& motion, double time, const std::vector<double>& y) {
+    std::vector<double> dy(y.size());
+    slope(time, y.data(), dy.data(), const_cast<Motion*>(&motion));
+    WaveState out{time, motion.drifts ? y[0] : motion.tube.radius, tension(motion, y.data()), {}, {}};
+    for (std::size_t k = 0; k < motion.waves.size(); ++k) {
+        const std::size_t at = motion.drifts ? k + 1 : k * motion.per_wave();
+        const double a = motion.drifts ? motion.waves[k].amplitude * std::exp(y[at]) : y[at];
+        out.amplitudes.push_back(a);
+        out.rates.push_back(motion.drifts ? a * dy[at] : dy[at]);
+    }
+    return out;
+}
+
+struct FreeDriver {
+    void operator()(gsl_odeiv2_driver* driver) const { gsl_odeiv2_driver_free(driver); }
+};
+
+}  // namespace
+
+bool keeps_volume(const Model& model) {
+    return model.keeps_volume.value_or(model.kind != ModelKind::gradient_flow);
+}
+
+double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves) {
+    const Motion motion = prepared(tube, model, length, waves);
+    return tension(motion, start(motion).data());
+}
+
+std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model, double length,
+                                     const std::vector<Wave>& waves, const std::vector<double>& times) {
+    Motion motion = prepared(tube, model, length, waves);
+    std::vector<double> y = start(motion);
+    double scale = motion.drifts ? 1 : 0;
+    for (const double value : y) scale = std::max(scale, std::abs(value));
+    if (scale == 0) scale = 1;
+
+    gsl_odeiv2_system system{slope, nullptr, y.size(), &motion};
+    const std::unique_ptr<gsl_odeiv2_driver, FreeDriver> driver(
+        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd,
+                                      times.empty() ? 1 : std::max(times.back(), 1e-300) * 1e-6, 1e-13 * scale, 1e-12));
+    gsl_odeiv2_driver_set_nmax(driver.get(), 1000000);
+    std::vector<WaveState> out;
+    double t = 0;
+    for (const double until : times) {
+        if (until < t) throw std::invalid_argument(fmt::format("times must ascend from 0, and {} does not", until));
+        const int status = until > t ? gsl_odeiv2_driver_apply(driver.get(), &t, until, y.data()) : GSL_SUCCESS;
+        if (status != GSL_SUCCESS)
+            throw SolveError(fmt::format("the amplitude equations are not solved beyond t = {:.6g}: {}", t,
+                                         status == GSL_EBADFUNC ? "the radius vanishes" : gsl_strerror(status)));
+        out.push_back(state(motion, until, y));
+    }
+    return out;
+}
+
+}  // namespace tubule::theory

@@ -1,0 +1,37 @@
+// Several small waves of a tube in time, by integrating the ordinary differential equations of maths 5.
+#pragma once
+
+#include <vector>
+
+#include "common/theory/dispersion.hpp"
+
+namespace tubule::theory {
+
+// amplitude cos(2 pi n z/length + m theta + phase), n and |m| not both 0; for a fluid also its rate at the start.
+struct Wave {
+    int n = 1, m = 0;
+    double amplitude = 0, rate = 0;
+};
+
+struct WaveState {
+    double time = 0, radius = 1, tension = 0;
+    std::vector<double> amplitudes, rates;  // of each wave; rates are da/dt
+};
+
+// The waves at each of `times` (ascending, from 0), to about 1e-10 of the largest amplitude.
+//   Gradient flow: the radius drifts (maths 5), unless the model keeps the volume; amplitudes are multiplied by
+//     exp INT s dt. The tension is that of the tube, constant.
+//   Other models: the radius stays. Volume fixed: the tension is what keeps SUM w c a^2 constant (TRAP), and is given
+//     back; that of the tube does not matter. Volume free: tension_of_free_volume, constant.
+//   Fluids with m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
+// The equations leave out squares of amplitudes. Throws std::invalid_argument for waves without meaning (n = m = 0,
+// repeated, all without amplitude, infinitely fast), SolveError if the radius vanishes or the integrator fails.
+std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model, double length,
+                                     const std::vector<Wave>& waves, const std::vector<double>& times);
+
+// The tension that the constraints ask for at the start (TRAP); fluids, overdamped and Stokes flow of fixed volume.
+double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves);
+
+bool keeps_volume(const Model& model);
+
+}  // namespace tubule::theory
