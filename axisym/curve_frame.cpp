@@ -82,19 +82,6 @@ Result read_start(const Case& c, const ResultFrame& from) {
     }
 }
 
-Meridian of_record(const Case& c, const Record& frame) {
-    if (const Array* knots = find(frame, "knots"); knots && find(frame, "coefficients"))
-        return meridian(Revolution{static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data,
-                                   find(frame, "coefficients")->data});
-    const Array *r = find(frame, "r"), *z = find(frame, "z");
-    if (!r || !z) throw CaseError(fmt::format("{}: shape.path: holds no profile of tier \"axisym\"", c.path));
-    std::vector<std::array<double, 2>> points;
-    for (std::size_t i = 0; i < r->data.size(); ++i) points.push_back({r->data[i], z->data[i]});
-    const double r_max = *std::max_element(r->data.begin(), r->data.end());
-    const bool has_poles = std::abs(r->data.front()) < 1e-9 * r_max && std::abs(r->data.back()) < 1e-9 * r_max;
-    return meridian(points, has_poles ? Topology::cell : Topology::tube, number(frame, "length"));
-}
-
 struct MakeMeridian {
     const Case& c;
     template <class Exact>
@@ -109,7 +96,11 @@ struct MakeMeridian {
         if (number < 0 || number >= count)
             throw CaseError(fmt::format("{}: shape.frame must be one of the {} frames of {}, not {}", c.path, count,
                                         from.path, from.frame));
-        return of_record(c, result.frames[number]);
+        try {
+            return frame_meridian(result.frames[number]);
+        } catch (const std::invalid_argument& error) {
+            throw CaseError(fmt::format("{}: shape.path: {}", c.path, error.what()));
+        }
     }
 };
 
@@ -172,6 +163,19 @@ CurveRestart curve_restart(const Record& record) {
             number(record, "restart_dissipated"),
             number(record, "restart_error"),
             number(record, "restart_reference_energy")};
+}
+
+Meridian frame_meridian(const Record& frame) {
+    if (const Array* knots = find(frame, "knots"); knots && find(frame, "coefficients"))
+        return meridian(Revolution{static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data,
+                                   find(frame, "coefficients")->data});
+    const Array *r = find(frame, "r"), *z = find(frame, "z");
+    if (!r || !z) throw std::invalid_argument("holds no profile of tier \"axisym\"");
+    std::vector<std::array<double, 2>> points;
+    for (std::size_t i = 0; i < r->data.size(); ++i) points.push_back({r->data[i], z->data[i]});
+    const double r_max = *std::max_element(r->data.begin(), r->data.end());
+    const bool has_poles = std::abs(r->data.front()) < 1e-9 * r_max && std::abs(r->data.back()) < 1e-9 * r_max;
+    return meridian(points, has_poles ? Topology::cell : Topology::tube, number(frame, "length"));
 }
 
 Meridian start_meridian(const Case& c) {

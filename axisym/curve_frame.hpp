@@ -26,6 +26,10 @@ bool is_curve(const Record& record);
 // Throws std::runtime_error if the record is no curve of this tier.
 CurveRestart curve_restart(const Record& record);
 
+// The profile of a frame, of a graph or a curve, over its whole period or from pole to pole. Throws
+// std::invalid_argument for a record that has none.
+Meridian frame_meridian(const Record& frame);
+
 // Where a case begins. Throws CaseError for a result without a frame of this tier.
 Meridian start_meridian(const Case& c);
 

@@ -1,0 +1,114 @@
+#include "axisym/spectrum.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+Dissipation dissipation(const Model& model) {
+    switch (model.kind) {
+        case ModelKind::gradient_flow:
+            return Dissipation::gradient_flow;
+        case ModelKind::overdamped:
+            return Dissipation::overdamped;
+        default:
+            return Dissipation::stokes(model.Re, model.gamma);
+    }
+}
+
+bool area_is_kept(const Model& model) {
+    return model.kind != ModelKind::gradient_flow;
+}
+bool volume_is_kept(const Model& model) {
+    return model.keeps_volume.value_or(area_is_kept(model));
+}
+
+// The shape on so many elements, with the multipliers that leave the least force, in the norm (INT b^2 dS)^(1/2).
+Equilibrium balanced(const Bending& bending, const Model& model, const Meridian& shape, int elements,
+                     double& unbalanced) {
+    constexpr int degree = 5;
+    Equilibrium e;
+    const std::vector<double> breaks = shape.seams.empty()
+                                           ? equal_breaks(elements)
+                                           : graded_breaks(ArcLength(shape).seams(), 1.5 / elements, 0.5 / elements);
+    e.space = std::make_shared<CurveSpace>(shape.topology, breaks, degree, degree - 1, shape.length);
+    e.x = fit(*e.space, shape);
+    const CurveForms forms(*e.space, bending);
+    e.observed = forms.observe(e.x);
+    e.reference_energy = forms.reference_energy(e.x);
+
+    std::vector<Eigen::VectorXd> held;
+    if (area_is_kept(model)) held.push_back(forms.gradient({.area = 1}, e.x));
+    if (volume_is_kept(model)) held.push_back(forms.gradient({.volume = 1}, e.x));
+    const Eigen::MatrixXd mass = forms.mass(e.x);
+    const Eigen::LLT<Eigen::MatrixXd> factors(mass);
+    const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
+    Eigen::VectorXd force = scaled(forms.gradient({.energy = 1}, e.x));
+    Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
+    for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
+    if (!held.empty()) {
+        // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's
+        // error.
+        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+        solver.setThreshold(1e-6);
+        solver.compute(columns);
+        const Eigen::VectorXd multipliers = solver.solve(-force);
+        force += columns * multipliers;
+        if (area_is_kept(model)) e.sigma = multipliers[0];
+        if (volume_is_kept(model)) e.P = multipliers[multipliers.size() - 1];
+    }
+    unbalanced = force.norm() * e.observed.length * std::sqrt(e.observed.area) / e.reference_energy;
+    e.stop = Stop::finished;
+    return e;
+}
+
+// The largest difference of a rate, relative to the larger of it and the slowest rate of all.
+double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>& b) {
+    double slowest = std::numeric_limits<double>::infinity(), largest = 0;
+    for (const ModeRates& mode : b)
+        for (const double rate : mode.rates)
+            if (std::abs(rate) > 0) slowest = std::min(slowest, std::abs(rate));
+    for (std::size_t m = 0; m < b.size(); ++m)
+        for (std::size_t i = 0; i < std::min(a[m].rates.size(), b[m].rates.size()); ++i)
+            largest =
+                std::max(largest, std::abs(a[m].rates[i] - b[m].rates[i]) / std::max(std::abs(b[m].rates[i]), slowest));
+    return largest;
+}
+
+}  // namespace
+
+Spectrum spectrum(const Bending& bending, const Model& model, const Meridian& shape, const SpectrumSettings& settings) {
+    if (model.kind == ModelKind::fluid)
+        throw std::invalid_argument(
+            "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
+    StationaryProblem problem{bending, {}};
+    Spectrum out;
+    for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
+        const Equilibrium e = balanced(bending, model, shape, elements, out.unbalanced);
+        if (area_is_kept(model)) problem.constraints.area = e.observed.area;
+        if (volume_is_kept(model)) problem.constraints.volume = e.observed.volume;
+        const bool last = elements + elements / 2 > settings.max_elements;
+        if ((area_is_kept(model) || volume_is_kept(model)) && !out.at_rest()) {
+            if (!last) continue;  // perhaps a finer mesh shows it at rest
+            throw std::invalid_argument(
+                "the shape is not at rest: in motion, only the gradient flow with the volume free has a spectrum");
+        }
+        auto modes = mode_stability(problem, e, settings.last, dissipation(model), settings.count);
+        const bool first = out.modes.empty();
+        out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
+        out.modes = std::move(modes);
+        out.sigma = e.sigma, out.P = e.P;
+        out.elements = e.space->splines().elements();
+        if (out.estimated_error <= settings.accuracy) break;
+    }
+    return out;
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,35 @@
+// Growth rates of a given profile of any shape, by mode_stability on meshes fine enough.
+#pragma once
+
+#include <vector>
+
+#include "axisym/curve_start.hpp"
+#include "axisym/mode_stability.hpp"
+#include "common/case/case.hpp"
+
+namespace tubule::axisym {
+
+struct SpectrumSettings {
+    int last = 2;            // m = 0 ... last
+    int count = 3;           // rates of each m
+    double accuracy = 1e-6;  // of each rate, relative to the larger of it and the slowest rate there is
+    int max_elements = 200;
+};
+
+struct Spectrum {
+    std::vector<ModeRates> modes;
+    double sigma = 0, P = 0;     // multipliers that hold the shape: E + sigma A + P V is stationary
+    double unbalanced = 0;       // what is left of the force, relative to E_ref/(length of the meridian sqrt(A))
+    double estimated_error = 0;  // of the rates, as `accuracy`
+    int elements = 0;
+    bool at_rest() const { return unbalanced < 1e-3; }
+};
+
+// Of a whole tube or cell. A shape that is not at rest has rates only in the gradient flow with the volume free, those
+// of the flow linearised about its motion at this instant. For all else the multipliers are those that balance the
+// force best. Throws std::invalid_argument for a fluid (its inertia is not in the second variation), and for other
+// models of a shape that moves; SolveError if an eigenproblem is not solved.
+Spectrum spectrum(const Bending& bending, const Model& model, const Meridian& shape,
+                  const SpectrumSettings& settings = {});
+
+}  // namespace tubule::axisym

@@ -1,0 +1,180 @@
+// Linear theory against the axisymmetric tier: its linearised operators, its spectra, growth in its runs.
+#include "axisym/spectrum.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "axisym/curve_frame.hpp"
+#include "axisym/profile_modes.hpp"
+#include "axisym/start.hpp"
+#include "common/case/read.hpp"
+#include "common/theory/dispersion.hpp"
+#include "common/theory/growth_fit.hpp"
+#include "common/theory/waves.hpp"
+#include "tests/axisym/runs.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+using theory::UniformSphere;
+using theory::UniformTube;
+
+Model model(ModelKind kind, double Re = 1, double gamma = 0) {
+    return {.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}};
+}
+
+TEST(Dispersion, theGraphsLinearisedOperator) {
+    // Closed forms (maths 5 (a), m = 0, q = 0 included: d(dR/dt)/dR) against the eigenvalues of the discrete Jacobian
+    // at a tube, whose radius drifts: dF/dx w + s M w = 0. Errors are relative to
+    // the rate, or to 1.
+    for (const UniformTube& tube : {UniformTube{bending(0.3, -0.4, 0.02, 0.15), 0.8}, UniformTube{bending(0.2), 1},
+                                    UniformTube{bending(0.2, -1.5, 0, 0.06), 0.6}}) {
+        const double length = 3;
+        const Cell cell{0, length, false, 1};
+        const ProfileSpace space(cell, uniform_breaks(cell, 32), 7, 6);
+        const Forms forms(space, tube.energy);
+        const Eigen::VectorXd x = space.project([&](double) { return tube.radius; }), rate = forms.rate(x);
+        EXPECT_NEAR(rate.mean(), radius_rate(tube), 1e-9);
+        Eigen::SparseMatrix<double> J = forms.pattern();
+        forms.jacobian(x.data(), rate.data(), 0, J.valuePtr());
+        const Eigen::MatrixXd A = J, M = forms.mass(x);
+        const Eigen::VectorXcd found = -Eigen::PartialPivLU<Eigen::MatrixXd>(M).solve(A).eigenvalues();
+        for (int n = 0; n <= 5; ++n) {
+            const double q = 2 * pi * n / length, s = growth(tube, model(ModelKind::gradient_flow), q, 0).rate();
+            std::vector<double> distance;
+            for (const auto& value : found) distance.push_back(std::abs(value - s));
+            std::sort(distance.begin(), distance.end());
+            // Rounding: 1e-16 of the largest eigenvalue, which is that of waves as short as the elements.
+            for (int copy = 0; copy < (n == 0 ? 1 : 2); ++copy)
+                EXPECT_LT(distance[copy], 1e-8 * std::max(std::abs(s), 1.0)) << "n = " << n << ", s = " << s;
+        }
+    }
+}
+
+TEST(Dispersion, spectraOfTubesAndSpheres) {
+    // Closed forms of all m against the numerical spectrum of the same shape.
+    const Bending energy = bending(0.3, -0.4, 0.02, 0.15);
+    const double R = 0.8, length = 3;
+    const Meridian tube = meridian(Tube{R, length, {}});
+    const Meridian sphere = meridian(Sphere{1.2, {}});
+    for (const Model& law :
+         {model(ModelKind::gradient_flow), model(ModelKind::overdamped), model(ModelKind::stokes, 2, 0.3)}) {
+        SpectrumSettings settings;
+        settings.accuracy = 1e-8;
+        const Spectrum found = spectrum(energy, law, tube, settings);
+        const bool flows = law.kind != ModelKind::gradient_flow;
+        // Least multipliers that hold a tube: sigma/R + P = b0. Any of these give its rates for their tension.
+        const double b0 = radius_rate(UniformTube{energy, R});
+        if (flows) {
+            EXPECT_NEAR(found.sigma / R + found.P, b0, 1e-8);
+        }
+        const UniformTube exact{energy, R, found.sigma};
+        ASSERT_EQ(found.modes.size(), 3u);
+        for (int m = 0; m <= 2; ++m) {
+            std::vector<double> expected;
+            for (int n = 0; n <= 4; ++n) {
+                if (n == 0 && (m == 1 || (m == 0 && flows))) continue;  // rigid, or kept
+                expected.insert(expected.end(), n > 0 ? 2 : 1, growth(exact, law, 2 * pi * n / length, m).rate());
+            }
+            std::sort(expected.begin(), expected.end(), std::greater<>());
+            for (int i = 0; i < 3; ++i)
+                EXPECT_NEAR(found.modes[m].rates[i] / expected[i], 1, 1e-8) << "m " << m << ", rate " << i;
+        }
+        EXPECT_LT(found.estimated_error, 1e-6);
+        const Spectrum round = spectrum(energy, law, sphere, settings);
+        for (int m = 0; m <= 2; ++m)
+            for (int i = 0; i < 2; ++i) {
+                const UniformSphere ball{energy, 1.2, round.sigma};
+                std::vector<double> expected;
+                for (int l = m == 1 ? 2 : flows ? std::max(m, 2) : m; l <= 5; ++l)
+                    if (l != 1) expected.push_back(growth(ball, law, l).rate());
+                std::sort(expected.begin(), expected.end(), std::greater<>());
+                EXPECT_NEAR(round.modes[m].rates[i] / expected[i], 1, 1e-8) << "m " << m << ", rate " << i;
+            }
+    }
+}
+
+TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
+    const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
+    EXPECT_NO_THROW(spectrum(bending(1), model(ModelKind::gradient_flow), wavy));
+    EXPECT_THROW(spectrum(bending(1), model(ModelKind::overdamped), wavy), std::invalid_argument);
+    EXPECT_THROW(spectrum(bending(1), model(ModelKind::fluid), meridian(Tube{1, 3, {}})), std::invalid_argument);
+}
+
+TEST(ProfileModes, ofTubesAndCells) {
+    // Exact: the amplitudes the shapes were given. Of a sphere the middle of the volume is off by products of them.
+    const Meridian tube = meridian(Tube{1.1, 3, {{0.2, 1, 0, 0.3}, {0.05, 3, 0, 1}}});
+    EXPECT_NEAR(mean_radius(tube), 1.1, 1e-13);
+    EXPECT_NEAR(mode_amplitude(tube, 1), 0.2, 1e-13);
+    EXPECT_NEAR(mode_amplitude(tube, 2), 0, 1e-13);
+    EXPECT_NEAR(mode_amplitude(tube, 3), 0.05, 1e-13);
+    const Meridian cell = meridian(Sphere{1.2, {{1e-4, 2, 0}, {2e-4, 5, 0}}});
+    EXPECT_NEAR(mean_radius(cell), 1.2, 1e-7);
+    EXPECT_NEAR(mode_amplitude(cell, 2), 1e-4, 2e-7);
+    EXPECT_NEAR(mode_amplitude(cell, 5), 2e-4, 2e-7);
+    EXPECT_THROW(mode_amplitude(cell, 1), std::invalid_argument);
+    EXPECT_THROW(mode_amplitude(tube, 0), std::invalid_argument);
+    EXPECT_THROW(mode_amplitude(meridian(Torus{2, 1}), 2), std::invalid_argument);
+}
+
+// The fitted rate from the frames of a run.
+theory::GrowthFit fit_of_frames(const std::vector<Record>& frames, int n) {
+    std::vector<double> times, amplitudes;
+    for (const Record& frame : frames) {
+        times.push_back(frame.time);
+        amplitudes.push_back(mode_amplitude(frame_meridian(frame), n));
+    }
+    return theory::fit_growth(times, amplitudes);
+}
+
+std::vector<double> equally_spaced(double end, int n) {
+    std::vector<double> times;
+    for (int i = 1; i < n; ++i) times.push_back(end * i / n);
+    return times;
+}
+
+TEST(Growth, fittedToRunsAtThePreferredRadius) {
+    // H0 = -1/R, radius at rest: s = -(2 k20/R^4)[(1 + kappa) x^2 - 2 x + 1] (maths 5): grows for k42 < 0, neutral at
+    // q R = 1 for k42 = 0, decays for k42 > 0. Amplitudes stay below 3e-5 of R, so that their squares are below 1e-9.
+    for (const auto& [k42, length, end] : {std::tuple{-0.1, 2 * pi, 5.0}, {0.05, 2 * pi, 10.0}, {0.0, 9.0, 6.0}}) {
+        Case c = tube_case(bending(0.2, -1, 0, k42), 1, length, {{1e-5, 1, 0, 0.3}}, end, equally_spaced(end, 12));
+        explicitly(c, 24, 1e-12, 7);
+        const Outcome o = run_case(c);
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const UniformTube tube{c.energy, 1};
+        const double exact = growth(tube, c.model, 2 * pi / length, 0).rate();
+        EXPECT_EQ(exact > 0, k42 < 0);
+        const auto frames = fit_of_frames(o.log.frames, 1), series = theory::fit_growth(o["time"], o["mode_1"]);
+        EXPECT_NEAR(frames.rate / exact, 1, 1e-6) << k42;
+        EXPECT_NEAR(series.rate / exact, 1, 1e-6) << k42;
+        EXPECT_LT(frames.error, 1e-5 * std::abs(exact));
+    }
+}
+
+TEST(Growth, fittedToAFlowWithFreeVolume) {
+    // Models that flow keep the area. With the volume free too, the tension is known (P = 0) and a single wave follows
+    // maths 5 (b), (c); a fluid its fastest root, after the others have died.
+    for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {
+        const double length = 9, end = kind == ModelKind::fluid ? 30 : 10;
+        Case c = tube_case(bending(1, -1.3, 0, 0.05), 1, length, {{1e-4, 1, 0, 0}}, end, equally_spaced(end, 20));
+        c.model = model(kind, 2, 0.3);
+        if (kind == ModelKind::overdamped) c.model = model(kind);
+        c.model.keeps_volume = false;
+        c.accuracy.energy = 1e-8;
+        const Outcome o = run_case(c);
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const UniformTube tube{c.energy, 1, theory::tension_of_free_volume(c.energy, 1)};
+        const double exact = growth(tube, c.model, 2 * pi / length, 0).rate();
+        const auto fit = fit_of_frames(o.log.frames, 1);
+        EXPECT_NEAR(fit.rate / exact, 1, 1e-3) << exact << " found " << fit.rate << " +- " << fit.error;
+        const auto waves = theory::waves_in_time(tube, c.model, length, {{1, 0, 1e-4}}, {end});
+        EXPECT_NEAR(o.last("mode_1") / std::abs(waves[0].amplitudes[0]), 1, 2e-3);
+    }
+}
+
+}  // namespace
+}  // namespace tubule::axisym
