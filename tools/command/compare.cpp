@@ -2,16 +2,12 @@
 // says whether they agree within tolerances.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <iterator>
 #include <memory>
 #include <stdexcept>
@@ -32,7 +28,7 @@ using compare::FramePair;
 using compare::SeriesDifference;
 using compare::ShapeDifference;
 
-constexpr int beyond_tolerance = 1, bad_input = 2, no_picture = 4;
+constexpr int beyond_tolerance = 1, bad_input = 2;
 
 struct CompareOptions {
     std::vector<std::string> results, tolerances, frames, pictures;
@@ -325,9 +321,8 @@ std::string json_of(const ShapeDifference& s) {
 }
 
 std::string json_of(const Check& check) {
-    return fmt::format(
-        "{{\"quantity\": {}, \"value\": {}, \"tolerance\": {}, \"within\": {}}}", json(check.quantity.name),
-        std::isfinite(check.quantity.value) ? json(check.quantity.value) : "null", json(check.most), check.holds());
+    return fmt::format("{{\"quantity\": {}, \"value\": {}, \"tolerance\": {}, \"within\": {}}}",
+                       json(check.quantity.name), json(check.quantity.value), json(check.most), check.holds());
 }
 
 template <class T>
@@ -344,32 +339,6 @@ Text json_text(const Comparison& c) {
     return out;
 }
 
-// The script reads the JSON. Its exit status.
-int draw(const Comparison& c, const std::vector<std::string>& pictures) {
-    std::vector<std::string> arguments = plot_command("compare", "compare.py");
-    arguments.insert(arguments.end(), pictures.begin(), pictures.end());
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    const Text text = json_text(c);
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> input(std::tmpfile(), std::fclose);
-    if (!input || std::fwrite(text.data(), 1, text.size(), input.get()) != text.size() || std::fflush(input.get()) != 0)
-        throw std::runtime_error("tubule compare: cannot write a temporary file for the picture");
-    lseek(fileno(input.get()), 0, SEEK_SET);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, fileno(input.get()), STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);  // stdout is the table's
-    pid_t child = 0;
-    const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    int status = 0;
-    if (error != 0 || waitpid(child, &status, 0) != child)
-        throw std::runtime_error(
-            fmt::format("tubule compare: cannot start {}: {}", arguments[0], std::strerror(error)));
-    return WIFEXITED(status) ? WEXITSTATUS(status) : no_picture;
-}
-
 int run_compare(const CompareOptions& options) {
     Comparison c;
     try {
@@ -383,14 +352,9 @@ int run_compare(const CompareOptions& options) {
         fmt::print(stderr, "tubule compare: cannot write the output\n");
         return bad_input;
     }
-    if (!options.pictures.empty()) {
-        try {
-            if (const int status = draw(c, options.pictures)) return status;
-        } catch (const std::runtime_error& error) {
-            fmt::print(stderr, "{}\n", error.what());
-            return no_picture;
-        }
-    }
+    if (!options.pictures.empty())
+        if (const int status = draw_by_script("compare", "compare.py", options.pictures, to_string(json_text(c))))
+            return status;
     const bool agree = std::all_of(c.checks.begin(), c.checks.end(), [](const Check& check) { return check.holds(); });
     return agree ? 0 : beyond_tolerance;
 }

@@ -1,5 +1,7 @@
 #include "tools/command/json.hpp"
 
+#include <cmath>
+
 namespace tubule {
 
 std::string json(const std::string& text) {
@@ -16,6 +18,7 @@ std::string json(const std::string& text) {
 }
 // The shortest that reads back the same, with a point or exponent, so that 1.0 stays a floating-point number.
 std::string json(double value) {
+    if (!std::isfinite(value)) return "null";
     const std::string digits = fmt::format("{}", value);
     return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
 }

@@ -12,7 +12,7 @@
 namespace tubule {
 
 std::string json(const std::string& text);
-std::string json(double value);  // the shortest that reads back the same; finite
+std::string json(double value);  // the shortest that reads back the same; null unless finite
 std::string json(std::int64_t value);
 std::string json(int value);
 std::string json(std::size_t value);

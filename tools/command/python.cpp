@@ -1,16 +1,23 @@
 #include "tools/command/python.hpp"
 
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 namespace tubule {
 
 namespace {
 
+constexpr int no_picture = 4;
 constexpr const char* python = "/usr/bin/python3";  // PATH's python3 may lack Debian's modules
 
 // <prefix>/share/tubule/plot of an installed program, else the folder this program was built beside.
@@ -19,6 +26,26 @@ std::filesystem::path script_path(const std::string& script) {
     const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
     const auto installed = program.parent_path().parent_path() / "share/tubule/plot" / script;
     return std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path(TUBULE_PLOT_DIR) / script;
+}
+
+// Waits for the command, which reads the file from its beginning. Its exit status.
+int wait_for(const std::string& subcommand, std::vector<std::string> command, std::FILE* input) {
+    std::vector<char*> argv;
+    for (std::string& word : command) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    lseek(fileno(input), 0, SEEK_SET);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, fileno(input), STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    pid_t child = 0;
+    const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    int status = 0;
+    if (error != 0 || waitpid(child, &status, 0) != child)
+        throw std::runtime_error(
+            fmt::format("tubule {}: cannot start {}: {}", subcommand, command[0], std::strerror(error)));
+    return WIFEXITED(status) ? WEXITSTATUS(status) : no_picture;
 }
 
 }  // namespace
@@ -32,6 +59,20 @@ std::vector<std::string> plot_command(const std::string& subcommand, const std::
         throw std::runtime_error(
             fmt::format("tubule {}: its script {} is missing; install or build tubule again", subcommand, path));
     return {python, "-B", path};
+}
+
+int draw_by_script(const std::string& subcommand, const std::string& script, const std::vector<std::string>& arguments,
+                   const std::string& input) try {
+    std::vector<std::string> command = plot_command(subcommand, script);
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    // A file, not a pipe: a script that ends before it has read everything is then no trouble.
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), std::fclose);
+    if (!file || std::fwrite(input.data(), 1, input.size(), file.get()) != input.size() || std::fflush(file.get()) != 0)
+        throw std::runtime_error(fmt::format("tubule {}: cannot write a temporary file for the picture", subcommand));
+    return wait_for(subcommand, std::move(command), file.get());
+} catch (const std::runtime_error& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return no_picture;
 }
 
 }  // namespace tubule

@@ -10,4 +10,9 @@ namespace tubule {
 // Python or the script are missing.
 std::vector<std::string> plot_command(const std::string& subcommand, const std::string& script);
 
+// Runs the script with `input` on its standard input and waits for it. What it prints goes to standard error, for
+// standard output is the table's. Its exit status, or 4 where it cannot be run (said on standard error).
+int draw_by_script(const std::string& subcommand, const std::string& script, const std::vector<std::string>& arguments,
+                   const std::string& input);
+
 }  // namespace tubule
