@@ -23,16 +23,9 @@ Dissipation dissipation(const Model& model) {
     }
 }
 
-bool area_is_kept(const Model& model) {
-    return model.kind != ModelKind::gradient_flow;
-}
-bool volume_is_kept(const Model& model) {
-    return model.keeps_volume.value_or(area_is_kept(model));
-}
-
 // The shape on so many elements, with the multipliers that leave the least force, in the norm (INT b^2 dS)^(1/2).
-Equilibrium balanced(const Bending& bending, const Model& model, const Meridian& shape, int elements,
-                     double& unbalanced) {
+Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> sigma, const Meridian& shape,
+                     int elements, double& unbalanced) {
     constexpr int degree = 5;
     Equilibrium e;
     const std::vector<double> breaks = shape.seams.empty()
@@ -44,15 +37,18 @@ Equilibrium balanced(const Bending& bending, const Model& model, const Meridian&
     e.observed = forms.observe(e.x);
     e.reference_energy = forms.reference_energy(e.x);
 
+    const bool area = kept == Held::area || kept == Held::area_and_volume || kept == Held::reduced_volume,
+               volume = kept == Held::volume || kept == Held::area_and_volume || kept == Held::reduced_volume;
     std::vector<Eigen::VectorXd> held;
-    if (area_is_kept(model)) held.push_back(forms.gradient({.area = 1}, e.x));
-    if (volume_is_kept(model)) held.push_back(forms.gradient({.volume = 1}, e.x));
+    if (area && !sigma) held.push_back(forms.gradient({.area = 1}, e.x));
+    if (volume) held.push_back(forms.gradient({.volume = 1}, e.x));
     const Eigen::MatrixXd mass = forms.mass(e.x);
     const Eigen::LLT<Eigen::MatrixXd> factors(mass);
     const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
-    Eigen::VectorXd force = scaled(forms.gradient({.energy = 1}, e.x));
+    Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = sigma.value_or(0)}, e.x));
     Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
     for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
+    e.sigma = sigma.value_or(0);
     if (!held.empty()) {
         // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's
         // error.
@@ -61,8 +57,8 @@ Equilibrium balanced(const Bending& bending, const Model& model, const Meridian&
         solver.compute(columns);
         const Eigen::VectorXd multipliers = solver.solve(-force);
         force += columns * multipliers;
-        if (area_is_kept(model)) e.sigma = multipliers[0];
-        if (volume_is_kept(model)) e.P = multipliers[multipliers.size() - 1];
+        if (area && !sigma) e.sigma = multipliers[0];
+        if (volume) e.P = multipliers[multipliers.size() - 1];
     }
     unbalanced = force.norm() * e.observed.length * std::sqrt(e.observed.area) / e.reference_energy;
     e.stop = Stop::finished;
@@ -82,20 +78,34 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-}  // namespace
-
-Spectrum spectrum(const Bending& bending, const Model& model, const Meridian& shape, const SpectrumSettings& settings) {
+void refuse_what_has_none(const Model& model) {
     if (model.kind == ModelKind::fluid)
         throw std::invalid_argument(
             "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
+    if (model.kind != ModelKind::gradient_flow && !model.keeps_volume.value_or(true))
+        throw std::invalid_argument("the spectrum of a model that flows is that with the volume fixed");
+}
+
+}  // namespace
+
+Held held_by(const Model& model) {
+    if (model.kind != ModelKind::gradient_flow) return Held::area_and_volume;
+    return model.keeps_volume.value_or(false) ? Held::volume : Held::nothing;
+}
+
+Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
+                  const SpectrumSettings& settings) {
+    refuse_what_has_none(model);
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
-        const Equilibrium e = balanced(bending, model, shape, elements, out.unbalanced);
-        if (area_is_kept(model)) problem.constraints.area = e.observed.area;
-        if (volume_is_kept(model)) problem.constraints.volume = e.observed.volume;
+        const Equilibrium e = balanced(bending, held, settings.sigma, shape, elements, out.unbalanced);
+        Constraints& c = problem.constraints;
+        if (held == Held::area || held == Held::area_and_volume) c.area = e.observed.area;
+        if (held == Held::volume || held == Held::area_and_volume) c.volume = e.observed.volume;
+        if (held == Held::reduced_volume) c.reduced_volume = reduced_volume(e.observed.area, e.observed.volume);
         const bool last = elements + elements / 2 > settings.max_elements;
-        if ((area_is_kept(model) || volume_is_kept(model)) && !out.at_rest()) {
+        if (held != Held::nothing && !out.at_rest()) {
             if (!last) continue;  // perhaps a finer mesh shows it at rest
             throw std::invalid_argument(
                 "the shape is not at rest: in motion, only the gradient flow with the volume free has a spectrum");

@@ -1,6 +1,7 @@
 // Growth rates of a given profile of any shape, by mode_stability on meshes fine enough.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "axisym/curve_start.hpp"
@@ -14,6 +15,7 @@ struct SpectrumSettings {
     int count = 3;           // rates of each m
     double accuracy = 1e-6;  // of each rate, relative to the larger of it and the slowest rate there is
     int max_elements = 200;
+    std::optional<double> sigma;  // the tension, where the shape leaves it open (a straight tube, a sphere)
 };
 
 struct Spectrum {
@@ -25,11 +27,15 @@ struct Spectrum {
     bool at_rest() const { return unbalanced < 1e-3; }
 };
 
-// Of a whole tube or cell. A shape that is not at rest has rates only in the gradient flow with the volume free, those
-// of the flow linearised about its motion at this instant. For all else the multipliers are those that balance the
-// force best. Throws std::invalid_argument for a fluid (its inertia is not in the second variation), and for other
-// models of a shape that moves; SolveError if an eigenproblem is not solved.
-Spectrum spectrum(const Bending& bending, const Model& model, const Meridian& shape,
+// What a model holds fixed by itself: nothing, or the volume, in gradient flow; area and volume otherwise.
+Held held_by(const Model& model);
+
+// Of a whole tube or cell. A shape that is not at rest has rates only in the gradient flow with nothing held, those of
+// the flow linearised about its motion at this instant. For all else the multipliers are those that balance the force
+// best. Throws std::invalid_argument for a fluid (its inertia is not in the second variation), for a model that flows
+// with the volume free, and for other models than the gradient flow of a shape that moves; SolveError if an
+// eigenproblem is not solved.
+Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
                   const SpectrumSettings& settings = {});
 
 }  // namespace tubule::axisym

@@ -65,7 +65,7 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
          {model(ModelKind::gradient_flow), model(ModelKind::overdamped), model(ModelKind::stokes, 2, 0.3)}) {
         SpectrumSettings settings;
         settings.accuracy = 1e-8;
-        const Spectrum found = spectrum(energy, law, tube, settings);
+        const Spectrum found = spectrum(energy, law, held_by(law), tube, settings);
         const bool flows = law.kind != ModelKind::gradient_flow;
         // Least multipliers that hold a tube: sigma/R + P = b0. Any of these give its rates for their tension.
         const double b0 = radius_rate(UniformTube{energy, R});
@@ -85,7 +85,7 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
                 EXPECT_NEAR(found.modes[m].rates[i] / expected[i], 1, 1e-8) << "m " << m << ", rate " << i;
         }
         EXPECT_LT(found.estimated_error, 1e-6);
-        const Spectrum round = spectrum(energy, law, sphere, settings);
+        const Spectrum round = spectrum(energy, law, held_by(law), sphere, settings);
         for (int m = 0; m <= 2; ++m)
             for (int i = 0; i < 2; ++i) {
                 const UniformSphere ball{energy, 1.2, round.sigma};
@@ -100,9 +100,16 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
 
 TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
     const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
-    EXPECT_NO_THROW(spectrum(bending(1), model(ModelKind::gradient_flow), wavy));
-    EXPECT_THROW(spectrum(bending(1), model(ModelKind::overdamped), wavy), std::invalid_argument);
-    EXPECT_THROW(spectrum(bending(1), model(ModelKind::fluid), meridian(Tube{1, 3, {}})), std::invalid_argument);
+    const Meridian straight = meridian(Tube{1, 3, {}});
+    const auto found = [](Model law, const Meridian& shape) {
+        return spectrum(bending(1), law, held_by(law), shape).modes.size();
+    };
+    EXPECT_EQ(found(model(ModelKind::gradient_flow), wavy), 3u);
+    EXPECT_THROW(found(model(ModelKind::overdamped), wavy), std::invalid_argument);
+    EXPECT_THROW(found(model(ModelKind::fluid), straight), std::invalid_argument);
+    Model free = model(ModelKind::overdamped);
+    free.keeps_volume = false;
+    EXPECT_THROW(found(free, straight), std::invalid_argument);
 }
 
 TEST(ProfileModes, ofTubesAndCells) {

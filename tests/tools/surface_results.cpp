@@ -4,7 +4,8 @@
 //
 // closed_K.hdf and tube_K.hdf, K = 2, 3, 4: flat triangulations moved by a polynomial map of degree K, which elements
 // of order K represent exactly (vtk_test.py knows the map). Two frames, the second one twice as large. mixed.hdf: two
-// meshes, one after the other. shapes_*.hdf: known shapes with recovered curvatures, for pictures.
+// meshes, one after the other. shapes_*.hdf: known shapes with recovered curvatures, for pictures. growing_*.hdf: waves
+// that grow at known rates, 1e-3 exp(0.5 t) for n, m = 1, 2 of a tube and l, m = 3, 1 of a sphere.
 #include <cmath>
 #include <filesystem>
 #include <string>
@@ -128,6 +129,24 @@ void write_shapes(const std::filesystem::path& file, const std::string& title, c
     writer.finish({{"stop", "finished"}});
 }
 
+// ---- waves that grow
+
+template <class Shape>
+void write_growth(const std::filesystem::path& file, const TriangleMesh& base, const Shape& at_start,
+                  double& (*wave)(Shape&)) {
+    auto writer = ResultWriter::create(file, {"tier = \"surface3d\"\n", {}}, {}, {"time"});
+    const std::size_t number = writer.mesh(cells_of(flat_mesh(base, 3)));
+    for (int i = 0; i <= 8; ++i) {
+        const double time = 0.25 * i;
+        Shape shape = at_start;
+        wave(shape) *= std::exp(0.5 * time);
+        const CurvedMesh mesh =
+            mapped_mesh(base, 3, [&](const Eigen::Vector3d& p) { return Eigen::Vector3d(position(shape, p)); });
+        writer.frame({time, {}, {array_of("points", positions(mesh))}, number});
+    }
+    writer.finish({});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -149,4 +168,8 @@ int main(int argc, char** argv) {
     for (const double amplitude : {0.05, 0.1, 0.2, 0.3})
         tubes.push_back({0.5, 2, {{amplitude, 1, 0, 0}, {amplitude / 3, 1, 3, 1}}});
     write_shapes(folder / "shapes_tube.hdf", "A tube", tube_rings(0.5, 2, 16, 18), 4, tubes);
+    write_growth<Tube>(folder / "growing_tube.hdf", tube_rings(0.8, 2, 12, 16), {0.8, 2, {{1e-3, 1, 2, 0.3}}},
+                       [](Tube& tube) -> double& { return tube.modes[0].amplitude; });
+    write_growth<Sphere>(folder / "growing_sphere.hdf", icosphere(5), {1.2, {{1e-3, 3, 1}}},
+                         [](Sphere& sphere) -> double& { return sphere.modes[0].amplitude; });
 }

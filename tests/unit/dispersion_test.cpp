@@ -366,6 +366,23 @@ TEST(Waves, aDriftingTube) {
                 1e-3 * std::exp(end * growth(tube, fixed, q, 2).rate()), 1e-13);
 }
 
+TEST(Waves, meetTheReferenceRunsOnceSmall) {
+    // Independent nonlinear runs of the figure (k20 = 0.2, H0 = -2, L = 2) from t = 0.2, where waves are small, to 0.5:
+    // r_min, r_max and mode 1 there. What is left out is (a/R)^2: 4e-6 and less.
+    struct Run {
+        double k42, r_min, r_max, mode, r_min_end, r_max_end, mode_end;
+    };
+    for (const Run& run : {Run{0, 0.8723241046390244, 0.8757917975851919, 0.0017338484568305064, 0.6945517096341042,
+                               0.6945545585803669, 1.4244731301314578e-06},
+                           Run{0.06, 0.8838568455555245, 0.8840842908078685, 0.00011372262691308577, 0.7035518268561033,
+                               0.7035518274564397, 3.001695680452704e-10}}) {
+        const UniformTube tube{bending(0.2, -2, 0, run.k42), (run.r_min + run.r_max) / 2};
+        const auto end = waves_in_time(tube, model(ModelKind::gradient_flow), 2, {{1, 0, run.mode}}, {0.3})[0];
+        EXPECT_NEAR(end.radius, (run.r_min_end + run.r_max_end) / 2, 2e-6);
+        EXPECT_NEAR(end.amplitudes[0] / run.mode_end, 1, 1e-4);
+    }
+}
+
 TEST(Waves, areConservedTogether) {
     // maths 5, TRAP: SUM w c a^2 stays, so a single wave is frozen; the tension is p0 = G/c for it.
     const UniformTube tube{bending(1, 0, 0, 0.1), 1};

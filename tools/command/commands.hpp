@@ -15,6 +15,7 @@ namespace tubule {
 
 void add_run(CLI::App& app, int& exit_status);
 void add_equilibrium(CLI::App& app, int& exit_status);
+void add_stability(CLI::App& app, int& exit_status);
 void add_check(CLI::App& app, int& exit_status);
 void add_show(CLI::App& app, int& exit_status);
 void add_plot(CLI::App& app, int& exit_status);

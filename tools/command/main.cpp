@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
     int status = 0;
     tubule::add_run(app, status);
     tubule::add_equilibrium(app, status);
+    tubule::add_stability(app, status);
     tubule::add_check(app, status);
     tubule::add_show(app, status);
     tubule::add_plot(app, status);

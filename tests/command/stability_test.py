@@ -1,0 +1,226 @@
+#!/usr/bin/python3
+"""`tubule stability`: its tables against closed forms, spectra of other shapes, fits of results, pictures, what it
+refuses. Arguments: the program, the program that writes results with surfaces."""
+import csv
+import io
+import json
+import math
+import subprocess
+import sys
+import unittest
+
+from program import ProgramTest, series
+
+WRITER = sys.argv[2]
+
+TUBE = """tier = "axisym"
+[energy]
+k20 = 0.2
+H0 = -1.0
+k42 = -0.04
+[shape]
+kind = "tube"
+radius = 1.0
+length = 7.0
+[[shape.mode]]
+amplitude = 1e-4
+n = 1
+[accuracy]
+energy = 1e-8
+[time]
+end = 4.0
+output = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]
+"""
+FLUID = TUBE.replace("[shape]", '[model]\nkind = "fluid"\nRe = 2.0\ngamma = 0.3\n[shape]')
+CAPSULE = """tier = "axisym"
+[energy]
+k20 = 0.125
+H0 = -2.0
+k42 = 0.12
+[shape]
+kind = "capsule"
+radius = 0.5
+length = 2.0
+[accuracy]
+energy = 1e-8
+[equilibrium]
+"""
+
+
+def rate_at_rest(q, k20=0.2, kappa=-0.2):
+    """maths 5 at H0 = -1/R, R = 1, P = 0: s = -2 k20 [(1 + kappa) x^2 - 2 x + 1], x = q^2."""
+    return -2 * k20 * ((1 + kappa) * q**4 - 2 * q**2 + 1)
+
+
+class Stability(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.tube = self.write("tube.toml", TUBE)
+
+    def table(self, *arguments):
+        return list(csv.DictReader(io.StringIO(self.tubule("stability", *arguments, "--csv")[0])))
+
+    def json(self, *arguments):
+        return json.loads(self.tubule("stability", *arguments, "--json")[0])
+
+    def refused(self, message, *arguments):
+        _, err = self.tubule("stability", *arguments, status=2)
+        self.assertIn(message, err)
+
+    def test_table_of_a_tube(self):
+        rows = {(row["m"], row["n"]): row for row in self.table(self.tube)}
+        self.assertEqual({m for m, _ in rows}, {"0", "1", "2"})
+        for n in (1, 2, 3, 4):
+            self.assertAlmostEqual(float(rows["0", str(n)]["rate"]), rate_at_rest(2 * math.pi * n / 7), delta=1e-12)
+        # The radius is at rest, so the factor until the end is that of the rate.
+        row = rows["0", "1"]
+        self.assertAlmostEqual(float(row["factor"]), math.exp(4 * float(row["rate"])), delta=1e-9)
+        self.assertNotIn(("1", "0"), rows)  # the place of the tube
+
+    def test_words(self):
+        out, _ = self.tubule("stability", self.tube)
+        # Fastest at x = 1/(1 + kappa): q = 1.118034, rate 2 k20 (1/(1 + kappa) - 1) = 0.1.
+        self.assertIn("fastest of all with m = 0: q = 1.118034 (length 5.61985), rate 0.1\n", out)
+        self.assertIn("beyond the threshold of: pearling\n", out)
+        self.assertIn("no wave with m = 0 grows for k42 >= 0\n", out)
+        # Buckling: P < -2 (1 + c) = 0, the tension being 2 k20 P; rings: P < -3.
+        lines = [line.split() for line in out.splitlines()]
+        buckling = next(line for line in lines if line[:2] == ["buckling", "1"])
+        self.assertAlmostEqual(float(buckling[4]), 0, delta=1e-12)
+        rings = next(line for line in lines if line[:2] == ["rings", "2"])
+        self.assertAlmostEqual(float(rings[4]), -3 * 0.4, delta=1e-9)
+
+    def test_known_threshold(self):
+        # H0 = 0: pearling of long waves beyond sigma0 R^2/(2 k20) = 3/2.
+        found = self.json(self.tube, "--set", "energy.H0=0.0", "--set", "energy.k42=0.0")
+        above = next(t for t in found["thresholds"] if t["grows"] == "above")
+        self.assertEqual((above["m"], above["q"]), (0, 0))
+        self.assertAlmostEqual(above["tension"] / 0.4, 1.5, delta=1e-12)
+        for tension, grows in ((0.599, False), (0.601, True)):
+            sets = ("--set", "energy.H0=0.0", "--set", "energy.k42=0.0", "--set", "shape.length=300.0")
+            rows = self.table(self.tube, *sets, "--model", "overdamped", "--tension", tension)
+            self.assertEqual(any(float(row["rate"]) > 0 for row in rows), grows)
+
+    def test_models(self):
+        fluid = self.write("fluid.toml", FLUID)
+        one = self.json(fluid)["models"][0]
+        # A single wave is frozen by area and volume: that decides the tension (maths 5, TRAP).
+        frozen = next(w for w in one["waves"] if (w["m"], w["n"]) == (0, 1))
+        self.assertAlmostEqual(frozen["rate"], 0, delta=1e-9)
+        self.assertEqual(len(next(w for w in one["waves"] if (w["m"], w["n"]) == (1, 1))["roots"]), 3)
+        every = self.json(fluid, "--model", "all", "--tension", "-2")["models"]
+        self.assertEqual([m["model"] for m in every], ["gradient-flow", "overdamped", "stokes", "fluid"])
+        for waves in zip(*(m["waves"][1:] for m in every[1:])):
+            self.assertEqual(len({w["rate"] > 0 for w in waves}), 1)  # they grow in all models or in none
+        # With the volume free the tension is R b0 = -(f + F1/R) = 0 at H0 = -1/R.
+        self.assertAlmostEqual(self.json(fluid, "--set", 'model.volume="free"')["models"][0]["tension"], 0, delta=1e-12)
+        viscous = self.json(self.tube, "--model", "stokes", "--Re", "4", "--gamma", "0.5", "--tension", "1")["models"][0]
+        self.assertEqual((viscous["Re"], viscous["gamma"]), (4, 0.5))
+
+    def test_wave_numbers(self):
+        rows = self.table(self.tube, "--q", "0.5,1", "--modes", "0")
+        self.assertEqual([(row["n"], float(row["q"])) for row in rows], [("", 0.5), ("", 1.0)])
+        self.assertAlmostEqual(float(rows[1]["rate"]), rate_at_rest(1), delta=1e-13)
+        self.assertEqual(len(self.table(self.tube, "--q", "0.1:2:20", "--modes", "1")), 40)
+        self.assertEqual(len(self.table(self.tube, "--waves", "2", "--modes", "0")), 3)
+
+    def test_spheres(self):
+        case = self.write("sphere.toml", '[energy]\nk20 = 1.0\n[shape]\nkind = "sphere"\nradius = 1.0\n[time]\nend = 1.0\n')
+        case.write_text('tier = "axisym"\n' + case.read_text())
+        # maths 6, H0 = 0: s = -L (2 L + 4).
+        rows = {row["l"]: float(row["rate"]) for row in self.table(case)}
+        for l in (2, 3, 4):
+            L = l * (l + 1) - 2
+            self.assertAlmostEqual(rows[str(l)], -L * (2 * L + 4), delta=1e-9)
+        spectrum = self.table(case, "--numerical", "--modes", "3")
+        fastest = {row["m"]: float(row["rate"]) for row in spectrum if row["number"] == "0"}
+        self.assertAlmostEqual(fastest["2"] / rows["2"], 1, delta=1e-5)
+        self.assertAlmostEqual(fastest["3"] / rows["3"], 1, delta=1e-5)
+        # With a tension, G = (L/R^2)(F2 L/R^2 + f + sigma0), overdamped: Lam/(Lam + 4) of -G, Lam = 6, L = 4.
+        tense = ("--tension", "-3", "--model", "overdamped")
+        exact = -0.6 * 4 * (2 * 4 + 4 - 3)
+        self.assertAlmostEqual(float(self.table(case, *tense)[0]["rate"]), exact, delta=1e-9)
+        self.assertAlmostEqual(float(self.table(case, *tense, "--numerical")[0]["rate"]) / exact, 1, delta=1e-5)
+
+    def test_spectra(self):
+        case = self.write("cell.toml", CAPSULE)
+        out, _ = self.tubule("stability", case)
+        self.assertIn("at rest", out)
+        # As `tubule equilibrium` has them.
+        self.tubule("equilibrium", "--quiet", case, "--set", "equilibrium.modes=2")
+        known = series(self.folder / "cell.hdf")
+        for source in (case, self.folder / "cell.hdf"):
+            for row in self.table(source):
+                if row["number"] == "0":
+                    self.assertAlmostEqual(float(row["rate"]) / known[f"growth_{row['m']}"][0], 1, delta=1e-4)
+        # The tube as it is: the closed form, for a wave of 1e-4.
+        numerical = [row for row in self.table(self.tube, "--numerical") if row["m"] == "0"]
+        self.assertAlmostEqual(float(numerical[0]["rate"]), rate_at_rest(2 * math.pi / 7), delta=1e-5)
+        wavy = ("--set", "shape.mode.0.amplitude=0.2", "--numerical")
+        self.refused("not at rest", self.tube, *wavy, "--model", "overdamped")
+        self.tubule("stability", self.tube, *wavy)
+        self.refused("inertia", self.write("fluid.toml", FLUID), "--numerical")
+
+    def test_fits_of_tier_1(self):
+        self.tubule("run", "--quiet", self.tube)
+        result = self.folder / "tube.hdf"
+        out, _ = self.tubule("stability", result, "--fit", "1")
+        self.assertIn("rows (mode_1)", out)
+        fit = self.json(result, "--fit", "1")
+        exact = rate_at_rest(2 * math.pi / 7)
+        self.assertAlmostEqual(fit["rate"] / exact, 1, delta=1e-3)
+        self.assertAlmostEqual(fit["linear_rate"], exact, delta=1e-9)
+        self.assertLess(fit["error"], 1e-4 * exact)
+        self.assertEqual(len(self.table(result, "--fit", "1")), len(fit["time"]))
+        # Mode 2 is made by mode 1 alone, as its square, and is known from the frames.
+        squared = self.json(result, "--fit", "2")
+        self.assertEqual(squared["source"], "frames")
+        self.assertLess(max(squared["amplitude"]), 1e-7)
+        # A straight frame has the closed form; a frame that is not, a spectrum.
+        self.assertEqual(self.json(result)["shape"], "tube")
+        self.assertEqual(self.json(result, "--frame", "0", "--numerical")["shape"], "profile")
+
+    def test_fits_of_surfaces(self):
+        subprocess.run([WRITER, self.folder], check=True)
+        for name, wave in (("growing_tube", "1,2"), ("growing_sphere", "3,1")):
+            fit = self.json(self.folder / f"{name}.hdf", "--fit", wave)
+            self.assertAlmostEqual(fit["rate"], 0.5, delta=1e-3)
+            self.assertLess(fit["error"], 5e-3)
+            self.assertAlmostEqual(fit["amplitude"][0], 1e-3, delta=2e-6)
+
+    def test_pictures(self):
+        for more in ((), ("--model", "all", "--tension", "-1"), ("--q", "0.1:3:5",)):
+            self.tubule("stability", self.tube, *more, "--plot", "waves.svg")
+            picture = self.folder / "waves.svg"
+            text = picture.read_text()
+            for word in ("wave number q", "growth rate", "buckling", "tension"):
+                self.assertIn(word, text)
+            picture.unlink()
+
+    def test_bad_input_is_refused(self):
+        result = self.folder / "tube.hdf"
+        self.tubule("run", "--quiet", self.tube)
+        self.refused("--fit needs a result", self.tube, "--fit", "1")
+        self.refused("--frame needs a result", self.tube, "--frame", "1")
+        self.refused("--set needs a case", result, "--set", "energy.k20=1.0")
+        self.refused("there are 0 to", result, "--frame", "99")
+        for wave in ("x", "1,", "-1", "0", "1,2,3"):
+            self.refused("--fit must be n or n,m", result, f"--fit={wave}")
+        self.refused("no waves around the axis", result, "--fit", "1,2")
+        self.refused("--fit goes with", result, "--fit", "1", "--tension", "1")
+        self.refused("exclude each other", self.tube, "--q", "1", "--waves", "3")
+        self.refused("from:to:count", self.tube, "--q", "1:2")
+        self.refused("2 to 100000", self.tube, "--q", "2:1:5")
+        self.refused("'x' is no number", self.tube, "--q", "1,x")
+        self.refused("are >= 0", self.tube, "--q=-1")
+        self.refused("--Re and --gamma belong", self.tube, "--Re", "3")
+        self.refused("with the volume free", self.write("fluid.toml", FLUID), "--set", 'model.volume="free"', "--tension", "1")
+        self.refused("a picture is written as", self.tube, "--plot", "waves.txt")
+        self.refused("belong to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")
+        self.refused("missing.hdf", self.folder / "missing.hdf")
+        self.tubule("stability", self.tube, "--model", "solid", status=2)
+        self.tubule("stability", self.tube, "--modes", "-1", status=2)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,249 @@
+// tubule stability FILE: growth rates of waves, in closed form for tubes and spheres, numerically for other shapes of
+// tier axisym, fitted for results.
+#include "tools/command/stability.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <variant>
+
+#include "axisym/curve_frame.hpp"
+#include "axisym/equilibrium_run.hpp"
+#include "axisym/profile_modes.hpp"
+#include "common/case/read.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/theory/waves.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/command/python.hpp"
+
+namespace tubule {
+
+std::string name(ModelKind kind) {
+    static const char* names[] = {"gradient-flow", "overdamped", "stokes", "fluid"};
+    return names[static_cast<int>(kind)];
+}
+
+std::string words(const Model& model) {
+    std::string text = name(model.kind);
+    if (model.kind == ModelKind::stokes || model.kind == ModelKind::fluid)
+        text += fmt::format(", Re = {:g}, gamma = {:g}", model.Re, model.gamma);
+    if (model.keeps_volume) text += *model.keeps_volume ? ", volume fixed" : ", volume free";
+    return text;
+}
+
+namespace {
+
+// The exit status of the script, which has said why.
+struct NoPicture {
+    int status;
+};
+
+const ModelKind all_models[] = {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid};
+
+bool is_result(const std::string& file) {
+    return std::filesystem::path(file).extension() == ".hdf";
+}
+
+Record frame_of(const StabilityOptions& options, const Result& result) {
+    const long count = static_cast<long>(result.frames.size()), asked = options.frame.value_or(-1);
+    if (asked >= count || asked < -count)
+        throw std::invalid_argument(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
+                                              : "has no frames yet");
+    return result.frames[static_cast<std::size_t>(asked < 0 ? count + asked : asked)];
+}
+
+StabilitySubject subject_of(const StabilityOptions& options) {
+    StabilitySubject subject;
+    if (!is_result(options.file)) {
+        if (!options.fit.empty())
+            throw std::invalid_argument("--fit needs a result, NAME.hdf, not a case: run it first");
+        if (options.frame) throw std::invalid_argument("--frame needs a result, NAME.hdf, not a case");
+        subject.c = read_case(options.file, options.sets);
+        return subject;
+    }
+    if (!options.sets.empty()) throw std::invalid_argument("--set needs a case: what made a result cannot be changed");
+    try {
+        subject.result = read_result(options.file);
+    } catch (const std::runtime_error& error) {
+        throw std::invalid_argument(error.what());
+    }
+    try {
+        subject.c = parse_case(subject.result->case_text.text, subject.result->case_text.sets, options.file);
+    } catch (const CaseError&) {
+        if (options.fit.empty()) throw;
+        subject.case_is_known = false;
+    }
+    if (options.fit.empty()) subject.frame = frame_of(options, *subject.result);
+    return subject;
+}
+
+std::vector<Model> models_of(const StabilityOptions& options, const Model& own) {
+    const bool all = options.model == "all";
+    std::vector<Model> models;
+    bool viscous = false;
+    for (const ModelKind kind : all_models) {
+        if (!all && (options.model.empty() ? kind != own.kind : options.model != name(kind))) continue;
+        Model model = own;
+        model.kind = kind;
+        if (kind != own.kind) model.keeps_volume.reset();
+        if (options.Re) model.Re = *options.Re;
+        if (options.gamma) model.gamma = *options.gamma;
+        viscous = viscous || kind == ModelKind::stokes || kind == ModelKind::fluid;
+        models.push_back(model);
+    }
+    if (!viscous && (options.Re || options.gamma))
+        throw std::invalid_argument("--Re and --gamma belong to --model stokes, fluid or all");
+    return models;
+}
+
+// The shape of a case of motion, if its waves are known in closed form.
+std::optional<TubeSubject> tube_of(const Case& c) {
+    const Tube* shape = std::get_if<Tube>(&c.shape);
+    if (!shape || c.equilibrium) return std::nullopt;
+    TubeSubject out;
+    out.tube = {c.energy, shape->radius, 0};
+    out.length = shape->length, out.end = c.time.end;
+    for (const TubeMode& mode : shape->modes)
+        if (mode.n == 0 && mode.m == 0)
+            out.tube.radius += mode.amplitude * std::cos(mode.phase);
+        else if (mode.amplitude != 0)
+            out.waves.push_back(mode);
+    std::sort(out.waves.begin(), out.waves.end(),
+              [](const TubeMode& a, const TubeMode& b) { return std::abs(a.amplitude) > std::abs(b.amplitude); });
+    return out;
+}
+
+std::optional<double> mean_of(const Record& frame, const std::string& array) {
+    for (const Array& a : frame.arrays)
+        if (a.name == array && !a.data.empty()) {
+            double sum = 0;
+            for (const double value : a.data) sum += value;
+            return sum / static_cast<double>(a.data.size());
+        }
+    return std::nullopt;
+}
+
+// A frame that is a straight tube, to a thousandth of its radius.
+std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
+    const axisym::Meridian profile = axisym::frame_meridian(frame);
+    if (profile.topology != axisym::Topology::tube || !(profile.length > 0)) return std::nullopt;
+    TubeSubject out;
+    out.tube = {c.energy, axisym::mean_radius(profile), 0};
+    out.length = profile.length;
+    for (int i = 0; i < 400; ++i)
+        if (std::abs(profile.at(i / 400.0)[0] - out.tube.radius) > 1e-3 * out.tube.radius) return std::nullopt;
+    for (const auto& [key, value] : frame.numbers)
+        if (key == "sigma") out.tension = value, out.tension_source = "sigma of the frame";
+    if (const auto pressure = mean_of(frame, "p"))
+        out.tension = -*pressure, out.tension_source = "minus the mean pressure of the frame";
+    return out;
+}
+
+// The shape that a case with [equilibrium] finds, as a frame.
+Record equilibrium_frame(Case c) {
+    struct Keep : RunObserver {
+        std::vector<Record> frames;
+        void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
+    } keep;
+    c.equilibrium->modes.reset();
+    c.equilibrium->branch = {};
+    const auto summary = axisym::run_equilibrium(c, keep);
+    if (summary.stop.reason != Stop::finished)
+        throw SolveError(
+            fmt::format("{}: no equilibrium: {}: {}", c.path, name(summary.stop.reason), summary.stop.message));
+    return keep.frames.back();
+}
+
+std::string answer(const StabilityOptions& options, StabilitySubject subject) {
+    if (!options.fit.empty()) return fit_report(options, subject);
+    const std::vector<Model> models = models_of(options, subject.c.model);
+    std::optional<TubeSubject> tube;
+    if (subject.frame && subject.frame->mesh)
+        throw std::invalid_argument(
+            "the frame is a surface in three dimensions: spectra are of tier \"axisym\"; --fit N,M gives growth rates");
+    if (!options.numerical) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
+    if (tube) {
+        if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
+        if (!options.plot.empty())
+            if (const int status = draw_by_script("stability", "stability.py", {"--output", options.plot},
+                                                  tube_curves(options, *tube, models)))
+                throw NoPicture{status};
+        return tube_report(options, *tube, models);
+    }
+    if (!options.plot.empty() || !options.q.empty())
+        throw std::invalid_argument("--plot and --q belong to straight tubes, in closed form");
+    const Sphere* sphere = std::get_if<Sphere>(&subject.c.shape);
+    if (sphere && !subject.frame && !options.numerical && !subject.c.equilibrium && sphere->modes.empty())
+        return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
+    if (options.waves) throw std::invalid_argument("--waves belongs to tubes and spheres, in closed form");
+    if (subject.c.tier == Tier::surface3d)
+        throw std::invalid_argument("tier \"surface3d\" has no spectra but those of straight tubes and of spheres");
+    if (subject.c.equilibrium && !subject.frame) subject.frame = equilibrium_frame(subject.c);
+    return spectrum_report(options, subject, models);
+}
+
+void refuse_contradictions(const StabilityOptions& o) {
+    if (!o.q.empty() && o.waves)
+        throw std::invalid_argument("--q and --waves exclude each other: both choose the waves");
+    if (!o.fit.empty() && (!o.q.empty() || o.waves || o.tension || o.frame || o.numerical || !o.plot.empty() ||
+                           !o.model.empty() || o.Re || o.gamma))
+        throw std::invalid_argument("--fit goes with --csv and --json only");
+}
+
+int stability(const StabilityOptions& options) {
+    try {
+        refuse_contradictions(options);
+        const std::string text = answer(options, subject_of(options));
+        if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+            throw std::invalid_argument("cannot write the output");
+        return 0;
+    } catch (const NoPicture& failure) {
+        return failure.status;
+    } catch (const std::invalid_argument& error) {
+        const std::string message = error.what();
+        const bool named = message.find(options.file) != std::string::npos;
+        fmt::print(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", message);
+        return 2;
+    }
+}
+
+}  // namespace
+
+void add_stability(CLI::App& app, int& exit_status) {
+    CLI::App* command =
+        app.add_subcommand("stability", "Growth rates of waves: in closed form, of any profile, or fitted");
+    const auto o = std::make_shared<StabilityOptions>();
+    command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required();
+    command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
+        ->allow_extra_args(false);
+    command->add_option("--model", o->model, "another model than the case's, or all")
+        ->check(CLI::IsMember({"gradient-flow", "overdamped", "stokes", "fluid", "all"}));
+    command->add_option("--Re", o->Re, "of stokes and fluid, where the case has none")->check(CLI::PositiveNumber);
+    command->add_option("--gamma", o->gamma, "friction of stokes and fluid, where the case has none")
+        ->check(CLI::NonNegativeNumber);
+    command->add_option("--tension", o->tension, "sigma (default: what model, case and shape come to)");
+    command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
+        ->check(CLI::Range(0, 100))
+        ->capture_default_str();
+    command->add_option("--waves", o->waves, "tube: n = 0 ... this; sphere: l (default: all that grow, and some)")
+        ->check(CLI::Range(1, 10000));
+    command->add_option("--q", o->q, "tube: these wave numbers instead, as 0.5,1,1.5 or from:to:count");
+    command->add_option("--rates", o->rates, "other shapes: how many rates for each m")
+        ->check(CLI::Range(1, 100))
+        ->capture_default_str();
+    command->add_option("--frame", o->frame, "of a result (default: -1, the last one)");
+    command->add_flag("--numerical", o->numerical, "the numerical spectrum, also for tubes and spheres");
+    command->add_option("--fit", o->fit, "n[,m]: the growth rate of this wave (of a closed shape l[,m]) in a result");
+    CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");
+    command->add_flag("--json", o->json, "everything, in full precision")->excludes(csv);
+    command->add_option("--plot", o->plot, "tube: draws rates over wave numbers, to a .svg, .png or .pdf");
+    command->callback([o, &exit_status] { exit_status = stability(*o); });
+}
+
+}  // namespace tubule

@@ -1,0 +1,59 @@
+// The parts of `tubule stability`: what is asked, and one report for each kind of answer.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/result.hpp"
+#include "common/theory/dispersion.hpp"
+
+namespace tubule {
+
+enum class Output { words, csv, json };
+
+struct StabilityOptions {
+    std::string file, model, q, fit, plot;
+    std::vector<std::string> sets;
+    std::optional<double> Re, gamma, tension;
+    std::optional<int> waves;
+    std::optional<long> frame;
+    int modes = 2, rates = 3;
+    bool numerical = false, csv = false, json = false;
+    Output output() const { return csv ? Output::csv : json ? Output::json : Output::words; }
+};
+
+// The case, and the frame of a result that is asked about; `result` where all of it is at hand.
+struct StabilitySubject {
+    Case c;
+    bool case_is_known = true;  // not if a result to be fitted has a case of another version's keys
+    std::optional<Result> result;
+    std::optional<Record> frame;
+};
+
+// A tube whose waves are known in closed form.
+struct TubeSubject {
+    theory::UniformTube tube;
+    double length = 1;
+    std::vector<TubeMode> waves;    // of the case, largest amplitude first
+    std::optional<double> tension;  // as asked, or as the frame has it
+    std::string tension_source;     // of the above
+    double end = 0;                 // until when the case runs; 0: nothing moves
+};
+
+// Reports throw std::invalid_argument for what cannot be asked.
+std::string tube_report(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
+std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
+                          const std::vector<Model>& models);
+std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
+                            const std::vector<Model>& models);
+std::string fit_report(const StabilityOptions& options, const StabilitySubject& subject);
+// What the picture of --plot is drawn from, as JSON.
+std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
+
+// "gradient-flow", ...; and with its numbers.
+std::string name(ModelKind kind);
+std::string words(const Model& model);
+
+}  // namespace tubule

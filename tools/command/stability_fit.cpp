@@ -1,0 +1,136 @@
+// Growth rates fitted to the amplitudes of a wave in a result of either tier.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <variant>
+
+#include "axisym/curve_frame.hpp"
+#include "axisym/profile_modes.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/theory/growth_fit.hpp"
+#include "common/theory/waves.hpp"
+#include "surface3d/surface_modes.hpp"
+#include "tools/command/json.hpp"
+#include "tools/command/stability.hpp"
+
+namespace tubule {
+
+namespace {
+
+struct WaveNumbers {
+    int n = 0, m = 0;
+};
+
+struct Amplitudes {
+    std::vector<double> times, values;
+    std::string source;
+};
+
+WaveNumbers wave_of(const std::string& text) {
+    WaveNumbers wave;
+    const char *at = text.data(), *const end = at + text.size();
+    auto read = std::from_chars(at, end, wave.n);
+    if (read.ec == std::errc{} && read.ptr != end && *read.ptr == ',')
+        read = std::from_chars(read.ptr + 1, end, wave.m);
+    if (read.ec != std::errc{} || read.ptr != end || wave.n < 0 || wave.m < 0 || (wave.n == 0 && wave.m == 0))
+        throw std::invalid_argument(
+            fmt::format("--fit must be n or n,m with n, m >= 0 and not both 0, such as 1 or 2,1; not {}", text));
+    return wave;
+}
+
+double amplitude_of(const Result& result, const Record& frame, WaveNumbers wave) {
+    if (frame.mesh) {
+        const SurfaceCells& cells = result.meshes.at(*frame.mesh);
+        const surface3d::CurvedMesh surface = surface3d::frame_surface(frame, cells);
+        return cells.period > 0 ? surface3d::tube_mode_amplitude(surface, wave.n, wave.m)
+                                : surface3d::sphere_mode_amplitude(surface, wave.n, wave.m);
+    }
+    if (wave.m > 0)
+        throw std::invalid_argument(
+            fmt::format("--fit {},{}: a result of tier \"axisym\" has no waves around the axis", wave.n, wave.m));
+    return axisym::mode_amplitude(axisym::frame_meridian(frame), wave.n);
+}
+
+// The rows have every step, the frames only what was asked for.
+Amplitudes amplitudes_of(const Result& result, WaveNumbers wave) {
+    const std::string name = fmt::format("mode_{}", wave.n);
+    const auto series = result.series.find(name);
+    if (wave.m == 0 && series != result.series.end())
+        return {result.series.at("time"), series->second, fmt::format("rows ({})", name)};
+    Amplitudes out;
+    for (const Record& frame : result.frames) {
+        out.times.push_back(frame.time);
+        out.values.push_back(amplitude_of(result, frame, wave));
+    }
+    out.source = "frames";
+    return out;
+}
+
+// The mean rate between two times by linear theory, if the case began as a tube with known tension.
+std::optional<double> linear_rate(const Case& c, WaveNumbers wave, double from, double to) {
+    const Tube* shape = std::get_if<Tube>(&c.shape);
+    if (!shape || c.equilibrium || !(to > from)) return std::nullopt;
+    theory::UniformTube tube{c.energy, shape->radius, 0};
+    std::vector<theory::Wave> waves;
+    std::optional<std::size_t> ours;
+    for (const TubeMode& mode : shape->modes) {
+        if (mode.n == 0 && mode.m == 0) {
+            tube.radius += mode.amplitude * std::cos(mode.phase);
+            continue;
+        }
+        if (mode.n == wave.n && std::abs(mode.m) == wave.m) ours = waves.size();
+        waves.push_back({mode.n, mode.m, mode.amplitude, 0});
+    }
+    const bool together = c.model.kind != ModelKind::gradient_flow && theory::keeps_volume(c.model);
+    if (!ours && together) return std::nullopt;  // its amplitude decides nothing, but is not known
+    if (!ours) ours = waves.size(), waves.push_back({wave.n, wave.m, 1, 0});
+    try {
+        const auto states = theory::waves_in_time(tube, c.model, shape->length, waves, {from, to});
+        return std::log(std::abs(states[1].amplitudes[*ours] / states[0].amplitudes[*ours])) / (to - from);
+    } catch (const std::invalid_argument&) {  // one wave twice, with two phases
+        return std::nullopt;
+    }
+}
+
+std::string words_of(WaveNumbers wave, const Amplitudes& a, const theory::GrowthFit& fit,
+                     std::optional<double> linear) {
+    const auto [low, high] = std::minmax_element(a.values.begin(), a.values.end());
+    std::string out = fmt::format("wave {},{}: {} amplitudes from the {}, {:.4g} to {:.4g}\n", wave.n, wave.m,
+                                  a.values.size(), a.source, *low, *high);
+    out += fmt::format("rate {:.10g} +- {:.2g} for t = {:.6g} to {:.6g} ({} points), e-fold in {:.6g}\n", fit.rate,
+                       fit.error, fit.from, fit.to, fit.points, 1 / std::abs(fit.rate));
+    if (!(fit.error < 0.1 * std::abs(fit.rate)))
+        out += "the amplitude is no exponential anywhere: the error bar is that large\n";
+    if (linear)
+        out += fmt::format("linear theory of the case over the same time: {:.10g}, differs by {:.2g}\n", *linear,
+                           fit.rate - *linear);
+    return out;
+}
+
+}  // namespace
+
+std::string fit_report(const StabilityOptions& options, const StabilitySubject& subject) {
+    const WaveNumbers wave = wave_of(options.fit);
+    const Amplitudes a = amplitudes_of(*subject.result, wave);
+    const theory::GrowthFit fit = theory::fit_growth(a.times, a.values, 0);
+    const auto linear = subject.case_is_known ? linear_rate(subject.c, wave, fit.from, fit.to) : std::nullopt;
+    if (options.csv) {
+        std::string out = "time,amplitude\n";
+        for (std::size_t i = 0; i < a.times.size(); ++i)
+            out += fmt::format("{:.17g},{:.17g}\n", a.times[i], a.values[i]);
+        return out;
+    }
+    if (options.json)
+        return fmt::format(
+            "{{\"n\": {}, \"m\": {}, \"source\": {}, \"rate\": {}, \"error\": {}, \"from\": {}, \"to\": {}, "
+            "\"points\": "
+            "{}, \"linear_rate\": {},\n\"time\": {},\n\"amplitude\": {}}}\n",
+            wave.n, wave.m, json(a.source), json(fit.rate), json(fit.error), json(fit.from), json(fit.to), fit.points,
+            linear ? json(*linear) : "null", json(a.times), json(a.values));
+    return words_of(wave, a, fit, linear);
+}
+
+}  // namespace tubule

@@ -1,0 +1,109 @@
+// Numerical spectra of profiles of tier axisym.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+#include <stdexcept>
+
+#include "axisym/curve_frame.hpp"
+#include "axisym/spectrum.hpp"
+#include "tools/command/json.hpp"
+#include "tools/command/stability.hpp"
+
+namespace tubule {
+
+namespace {
+
+struct Found {
+    Model model;
+    axisym::Spectrum spectrum;
+};
+
+// What the case says is held, where it looked for an equilibrium.
+Held held_in(const Case& c, const Model& model) {
+    return c.equilibrium && model.kind == ModelKind::gradient_flow ? c.equilibrium->held : axisym::held_by(model);
+}
+
+std::string words_of(const std::vector<Found>& found) {
+    std::string out;
+    for (const auto& [model, spectrum] : found) {
+        out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words(model));
+        if (spectrum.at_rest())
+            out += fmt::format("  at rest with sigma = {:.8g}, P = {:.8g}\n", spectrum.sigma, spectrum.P);
+        else
+            out += "  in motion: rates are those of this instant\n";
+        out += fmt::format("    m {:>14} ...\n", "rates");
+        const axisym::ModeRates* fastest = nullptr;
+        for (const axisym::ModeRates& mode : spectrum.modes) {
+            out += fmt::format("{:>5}", mode.m);
+            for (const double rate : mode.rates) out += fmt::format(" {:>14.7g}", rate);
+            out += mode.stable() ? "\n" : "  grows\n";
+            if (!mode.rates.empty() && (!fastest || mode.rates[0] > fastest->rates[0])) fastest = &mode;
+        }
+        if (fastest && !fastest->stable())
+            out += fmt::format("  fastest: m = {}, rate {:.7g}, e-fold in {:.6g}\n", fastest->m, fastest->rates[0],
+                               1 / fastest->rates[0]);
+        else if (fastest)
+            out += fmt::format("  none grows; slowest to decay: m = {}, rate {:.7g}\n", fastest->m, fastest->rates[0]);
+        out += std::isfinite(spectrum.estimated_error)
+                   ? fmt::format("  estimated error of the rates {:.1e} (relative)", spectrum.estimated_error)
+                   : std::string("  error of the rates unknown: only the finest mesh was fine enough");
+        out += fmt::format(", {} elements\n", spectrum.elements);
+    }
+    return out;
+}
+
+std::string csv_of(const std::vector<Found>& found) {
+    std::string out = "model,m,number,rate\n";
+    for (const auto& [model, spectrum] : found)
+        for (const axisym::ModeRates& mode : spectrum.modes)
+            for (std::size_t i = 0; i < mode.rates.size(); ++i)
+                out += fmt::format("{},{},{},{:.17g}\n", name(model.kind), mode.m, i, mode.rates[i]);
+    return out;
+}
+
+std::string json_of(const std::vector<Found>& found) {
+    std::string models;
+    for (const auto& [model, spectrum] : found) {
+        std::string modes;
+        for (const axisym::ModeRates& mode : spectrum.modes)
+            modes += fmt::format("{}\n  {{\"m\": {}, \"rates\": {}, \"shape\": {}}}", modes.empty() ? "" : ",", mode.m,
+                                 json(mode.rates), json(mode.shape));
+        models += fmt::format(
+            "{}\n{{\"model\": {}, \"at_rest\": {}, \"sigma\": {}, \"P\": {}, \"estimated_error\": {}, \"elements\": "
+            "{}, \"modes\": [{}]}}",
+            models.empty() ? "" : ",", json(name(model.kind)), spectrum.at_rest() ? "true" : "false",
+            json(spectrum.sigma), json(spectrum.P), json(spectrum.estimated_error), spectrum.elements, modes);
+    }
+    return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
+}
+
+}  // namespace
+
+std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
+                            const std::vector<Model>& models) {
+    const axisym::Meridian shape =
+        subject.frame ? axisym::frame_meridian(*subject.frame) : axisym::start_meridian(subject.c);
+    axisym::SpectrumSettings settings;
+    settings.last = options.modes, settings.count = options.rates;
+    settings.sigma = options.tension;
+    std::vector<Found> found;
+    std::string refused;
+    for (const Model& model : models) try {
+            found.push_back(
+                {model, axisym::spectrum(subject.c.energy, model, held_in(subject.c, model), shape, settings)});
+        } catch (const std::invalid_argument& error) {
+            if (models.size() == 1) throw;
+            refused += fmt::format("\n{}: none: {}\n", name(model.kind), error.what());
+        }
+    switch (options.output()) {
+        case Output::csv:
+            return csv_of(found);
+        case Output::json:
+            return json_of(found);
+        default:
+            return words_of(found) + refused;
+    }
+}
+
+}  // namespace tubule

@@ -1,0 +1,479 @@
+// Tubes and spheres in closed form.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+#include <stdexcept>
+
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/theory/waves.hpp"
+#include "tools/command/json.hpp"
+#include "tools/command/stability.hpp"
+
+namespace tubule {
+
+namespace {
+
+using theory::UniformTube;
+using Text = fmt::memory_buffer;
+
+template <class... Args>
+void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+struct Threshold {
+    std::string name;
+    int m = 0;
+    bool grows_above = false;
+    double tension = 0, q = 0;
+};
+
+struct WaveRow {
+    int m = 0;
+    std::optional<int> n;
+    double q = 0;
+    theory::Growth growth;
+    std::optional<double> factor;  // by which it grows until the case ends
+};
+
+// One model's answer.
+struct ModelReport {
+    Model model;
+    UniformTube tube;  // with the tension of this model
+    std::string tension_source;
+    std::vector<WaveRow> rows;
+    std::vector<std::optional<theory::FastestWave>> fastest;  // of each m, any q
+    std::optional<double> radius_at_end;
+};
+
+// ---- what is asked
+
+double number(const std::string& text, const std::string& option) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
+        throw std::invalid_argument(fmt::format("{}: '{}' is no number", option, text));
+    return value;
+}
+
+std::vector<std::string> split(const std::string& text, char at) {
+    std::vector<std::string> parts{""};
+    for (const char c : text)
+        if (c == at)
+            parts.emplace_back();
+        else
+            parts.back() += c;
+    return parts;
+}
+
+std::vector<double> wave_numbers(const std::string& text) {
+    std::vector<double> q;
+    if (text.find(':') != std::string::npos) {
+        const auto parts = split(text, ':');
+        if (parts.size() != 3)
+            throw std::invalid_argument("--q must be a list q1,q2,... or from:to:count, not " + text);
+        const double from = number(parts[0], "--q"), to = number(parts[1], "--q"), count = number(parts[2], "--q");
+        if (!(to > from) || count != std::floor(count) || count < 2 || count > 100000)
+            throw std::invalid_argument("--q from:to:count needs to > from and 2 to 100000 wave numbers, not " + text);
+        for (int i = 0; i < count; ++i) q.push_back(from + (to - from) * i / (count - 1));
+    } else {
+        for (const std::string& part : split(text, ',')) q.push_back(number(part, "--q"));
+    }
+    for (const double value : q)
+        if (value < 0) throw std::invalid_argument(fmt::format("--q: wave numbers are >= 0, not {:g}", value));
+    return q;
+}
+
+// ---- answers
+
+std::string instability(int m) {
+    return m == 0 ? "pearling" : m == 1 ? "buckling" : m == 2 ? "rings" : fmt::format("{} waves around", m);
+}
+
+std::vector<Threshold> thresholds(const UniformTube& tube, int last) {
+    std::vector<Threshold> out;
+    for (int m = 0; m <= last; ++m) {
+        const auto stable = theory::stable_tensions(tube, m);
+        if (!stable) continue;
+        if (std::isfinite(stable->highest))
+            out.push_back({instability(m), m, true, stable->highest, stable->q_highest});
+        if (std::isfinite(stable->lowest)) out.push_back({instability(m), m, false, stable->lowest, stable->q_lowest});
+    }
+    return out;
+}
+
+// What of m = 0 ... last grows in a tube that is long enough.
+std::vector<std::string> instabilities(const UniformTube& tube, int last) {
+    std::vector<std::string> names;
+    for (int m = 0; m <= last; ++m)
+        if (!theory::growing_bands(tube, m).empty()) names.push_back(instability(m));
+    return names;
+}
+
+std::vector<theory::Wave> case_waves(const TubeSubject& subject) {
+    std::vector<theory::Wave> waves;
+    for (const TubeMode& mode : subject.waves) {
+        const auto same = std::find_if(waves.begin(), waves.end(),
+                                       [&](const auto& wave) { return wave.n == mode.n && wave.m == mode.m; });
+        if (same == waves.end())
+            waves.push_back({mode.n, mode.m, mode.amplitude, 0});
+        else  // two phases of one wave: together a wave again
+            same->amplitude = std::hypot(same->amplitude, mode.amplitude);
+    }
+    return waves;
+}
+
+void set_tension(const TubeSubject& subject, ModelReport& report) {
+    const bool flows = report.model.kind != ModelKind::gradient_flow, fixed = theory::keeps_volume(report.model);
+    if (flows && !fixed) {
+        if (subject.tension_source == "as asked")
+            throw std::invalid_argument(
+                "--tension must be absent: with the volume free, the tube's balance decides it");
+        report.tube.tension = theory::tension_of_free_volume(subject.tube.energy, subject.tube.radius);
+        report.tension_source = "of a tube whose volume is free";
+    } else if (subject.tension && (flows || subject.tension_source != "minus the mean pressure of the frame")) {
+        report.tube.tension = *subject.tension, report.tension_source = subject.tension_source;
+    } else if (flows && !subject.waves.empty()) {
+        report.tube.tension = theory::tension_of_waves(subject.tube, report.model, subject.length, case_waves(subject));
+        report.tension_source = "what keeps area and volume under the waves of the case, at its start";
+    } else {
+        report.tension_source =
+            flows ? "not known without waves; choose with --tension" : "a gradient flow has none of itself";
+    }
+}
+
+int waves_of_interest(const StabilityOptions& options, const ModelReport& report, double length) {
+    if (options.waves) return *options.waves;
+    double edge = 0;
+    for (int m = 0; m <= options.modes; ++m)
+        for (const theory::Band& band : theory::growing_bands(report.tube, m))
+            if (std::isfinite(band.to)) edge = std::max(edge, band.to);
+    return std::clamp(static_cast<int>(std::ceil(edge * length / (2 * pi))) + 1, 4, 40);
+}
+
+bool drifts(const ModelReport& report) {
+    return report.model.kind == ModelKind::gradient_flow && !theory::keeps_volume(report.model);
+}
+
+// Zero where only rounding is left.
+double rounded(double value, double scale) {
+    return std::abs(value) < 1e-12 * scale ? 0 : value;
+}
+double radius_rate_of(const ModelReport& report) {
+    const auto& [energy, R, tension] = report.tube;
+    if (!drifts(report)) return 0;
+    return rounded(theory::radius_rate(report.tube) - tension / R,
+                   std::abs(density(energy, -1 / R, 0.0).HH) / (R * R * R));
+}
+std::optional<double> least_f_KK_of(const UniformTube& tube) {
+    const auto least = theory::least_f_KK(tube);
+    if (!least) return least;
+    const double R = tube.radius;
+    return rounded(*least, std::abs(density(tube.energy, -1 / R, 0.0).HH) * R * R);
+}
+
+// By which factors the waves of the table have grown when the case ends, in gradient flow.
+void add_factors(const TubeSubject& subject, ModelReport& report) {
+    if (report.model.kind != ModelKind::gradient_flow || !(subject.end > 0)) return;
+    std::vector<theory::Wave> waves;
+    for (const WaveRow& row : report.rows)
+        if (row.n && (*row.n > 0 || row.m > 0)) waves.push_back({*row.n, row.m, 1, 0});
+    if (waves.empty()) return;
+    const auto end = theory::waves_in_time(report.tube, report.model, subject.length, waves, {subject.end}).front();
+    std::size_t k = 0;
+    for (WaveRow& row : report.rows)
+        if (row.n && (*row.n > 0 || row.m > 0)) row.factor = end.amplitudes[k++];
+    report.radius_at_end = end.radius;
+}
+
+ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Model& model) {
+    ModelReport report{model, subject.tube, "", {}, {}, {}};
+    set_tension(subject, report);
+    const auto add_row = [&](std::optional<int> n, double q, int m) {
+        if (q == 0 && m < 2 && !(m == 0 && drifts(report))) return;  // its radius, or its place
+        report.rows.push_back({m, n, q, theory::growth(report.tube, model, q, m), std::nullopt});
+    };
+    for (int m = 0; m <= options.modes; ++m) {
+        if (!options.q.empty())
+            for (const double q : wave_numbers(options.q)) add_row({}, q, m);
+        else
+            for (int n = 0; n <= waves_of_interest(options, report, subject.length); ++n)
+                add_row(n, 2 * pi * n / subject.length, m);
+        report.fastest.push_back(theory::fastest_wave(report.tube, model, m));
+    }
+    if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
+    return report;
+}
+
+const WaveRow* fastest_row(const ModelReport& report) {
+    const WaveRow* best = nullptr;
+    for (const WaveRow& row : report.rows)
+        if ((row.q > 0 || row.m > 0) && (!best || row.growth.rate() > best->growth.rate())) best = &row;
+    return best;
+}
+
+std::string moduli(const Bending& energy) {
+    std::string text;
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        if (energy.k[i] != 0) text += fmt::format("{} = {:g}, ", term.key, energy.k[i]);
+    });
+    return text + fmt::format("H0 = {:g}", energy.H0);
+}
+
+std::string ill_posed_words(const UniformTube& tube) {
+    const bool along = theory::ill_posed_along(tube), around = theory::ill_posed_around(tube);
+    if (!along && !around) return "";
+    return fmt::format("ill-posed: waves {} grow the faster the shorter they are\n", along && around
+                                                                                         ? "of any direction"
+                                                                                     : along ? "along the axis"
+                                                                                             : "around the axis");
+}
+
+// ---- words
+
+void add_rows(Text& out, const ModelReport& report, double end) {
+    const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.model.kind == ModelKind::fluid,
+               factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; });
+    add(out, "    m {}{:>12} {:>14}{} {:>12}{}\n", numbered ? "   n " : "", "q", "rate",
+        swings ? "      frequency" : "", "e-fold in", factors ? fmt::format("  factor until t = {:g}", end) : "");
+    for (const WaveRow& row : report.rows) {
+        const double s = row.growth.rate();
+        add(out, "{:>5} ", row.m);
+        if (row.n) add(out, "{:>4} ", *row.n);
+        add(out, "{:>12.6g} {:>14.7g}", row.q, s);
+        if (swings) add(out, " {:>14.7g}", row.growth.frequency());
+        add(out, " {:>12.6g}", 1 / std::abs(s));
+        if (row.factor) add(out, " {:>14.6g}", *row.factor);
+        add(out, "{}\n", row.q == 0 && row.m == 0 ? "  the radius" : s > 0 ? "  grows" : "");
+    }
+}
+
+void add_model(Text& out, const ModelReport& report, int last, double end) {
+    add(out, "\n{}\n", words(report.model));
+    add(out, "  tension {:.8g} ({}); P = {:.8g}\n", report.tube.tension, report.tension_source,
+        theory::reduced_tension(report.tube));
+    const auto grown = instabilities(report.tube, last);
+    const bool ill = theory::ill_posed_along(report.tube) || theory::ill_posed_around(report.tube);
+    add(out, "  beyond the threshold of: {}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")));
+    if (const double rate = radius_rate_of(report); rate != 0)
+        add(out, "  the radius changes at the rate {:.6g}{}: rates are those of this instant\n", rate,
+            report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end) : "");
+    if (const auto least = least_f_KK_of(report.tube); least && !ill)
+        add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least / 2);
+    add_rows(out, report, end);
+    const auto name_of = [](const WaveRow& row) {
+        return row.n ? fmt::format("n = {}, m = {}", *row.n, row.m) : fmt::format("q = {:.6g}, m = {}", row.q, row.m);
+    };
+    if (const WaveRow* row = fastest_row(report)) {
+        const double s = row->growth.rate();
+        if (s > 0)
+            add(out, "  fastest of these: {}, rate {:.7g}\n", name_of(*row), s);
+        else
+            add(out, "  none of these grows; slowest to decay: {}, rate {:.7g}\n", name_of(*row), s);
+    }
+    for (std::size_t m = 0; m < report.fastest.size(); ++m)
+        if (const auto& fastest = report.fastest[m])
+            add(out, "  fastest of all with m = {}: q = {:.7g}{}, rate {:.7g}\n", m, fastest->q,
+                fastest->q > 0 ? fmt::format(" (length {:.6g})", 2 * pi / fastest->q) : "", fastest->rate);
+}
+
+void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Threshold>& limits, int last) {
+    add(out, "\nwhere waves begin to grow, all else kept\n  {:<16} {:>3} {:>12}  {:>20} {:>14}\n", "", "m", "q",
+        "tension", "P");
+    for (const Threshold& limit : limits) {
+        UniformTube there = tube;
+        there.tension = limit.tension;
+        add(out, "  {:<16} {:>3} {:>12.6g}  {} {:>14.8g} {:>14.8g}\n", limit.name, limit.m, limit.q,
+            limit.grows_above ? "above" : "below", limit.tension, theory::reduced_tension(there));
+    }
+    for (int m = 0; m <= last; ++m)
+        if (!theory::stable_tensions(tube, m)) add(out, "  {:<16} {:>3} at every tension\n", instability(m), m);
+    if (const auto stable = theory::common_stable_tensions(tube, last))
+        add(out, "  no wave with m <= {} grows for tensions from {:.8g} to {:.8g}\n", last, stable->lowest,
+            stable->highest);
+    else
+        add(out, "  at every tension some wave with m <= {} grows\n", last);
+}
+
+std::string words_of(const TubeSubject& subject, const std::vector<ModelReport>& reports,
+                     const std::vector<Threshold>& limits, int last) {
+    Text out;
+    add(out, "tube of radius {:.8g} and length {:.8g}; {}\n", subject.tube.radius, subject.length,
+        moduli(subject.tube.energy));
+    if (!subject.waves.empty())
+        add(out, "its waves (amplitudes up to {:.4g}) are taken as small; --numerical takes the shape as it is\n",
+            std::abs(subject.waves.front().amplitude));
+    add(out, "{}", ill_posed_words(subject.tube));
+    for (const ModelReport& report : reports) add_model(out, report, last, subject.end);
+    add_thresholds(out, subject.tube, limits, last);
+    return to_string(out);
+}
+
+// ---- CSV and JSON
+
+std::string csv_of(const std::vector<ModelReport>& reports) {
+    Text out;
+    add(out, "model,tension,m,n,q,rate,frequency,factor\n");
+    for (const ModelReport& report : reports)
+        for (const WaveRow& row : report.rows)
+            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.model.kind), report.tube.tension,
+                row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
+                row.factor ? fmt::format("{:.17g}", *row.factor) : "");
+    return to_string(out);
+}
+
+std::string json_of(const std::vector<std::complex<double>>& roots) {
+    std::string list;
+    for (const auto& s : roots)
+        list += fmt::format("{}[{}, {}]", list.empty() ? "" : ", ", json(s.real()), json(s.imag()));
+    return "[" + list + "]";
+}
+
+std::string json_of(const WaveRow& row) {
+    return fmt::format(
+        "{{\"m\": {}, \"n\": {}, \"q\": {}, \"rate\": {}, \"frequency\": {}, \"roots\": {}, \"factor\": {}}}", row.m,
+        row.n ? json(*row.n) : "null", json(row.q), json(row.growth.rate()), json(row.growth.frequency()),
+        json_of(row.growth.roots), row.factor ? json(*row.factor) : "null");
+}
+
+std::string json_of(const Threshold& limit) {
+    return fmt::format("{{\"name\": {}, \"m\": {}, \"q\": {}, \"tension\": {}, \"grows\": {}}}", json(limit.name),
+                       limit.m, json(limit.q), json(limit.tension), limit.grows_above ? "\"above\"" : "\"below\"");
+}
+
+template <class T, class Make>
+std::string list_of(const std::vector<T>& items, const Make& make) {
+    std::string text;
+    for (std::size_t i = 0; i < items.size(); ++i) text += fmt::format("{}\n  {}", i > 0 ? "," : "", make(items[i], i));
+    return "[" + text + "]";
+}
+
+std::string json_of(const ModelReport& report) {
+    const auto fastest = list_of(report.fastest, [](const auto& wave, std::size_t m) {
+        return wave ? fmt::format("{{\"m\": {}, \"q\": {}, \"rate\": {}}}", m, json(wave->q), json(wave->rate))
+                    : fmt::format("{{\"m\": {}, \"q\": null, \"rate\": null}}", m);
+    });
+    const auto least = least_f_KK_of(report.tube);
+    return fmt::format(
+        "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, \"P\": "
+        "{}, "
+        "\"radius_rate\": "
+        "{},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": {}}}",
+        json(name(report.model.kind)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
+        json(report.model.Re), json(report.model.gamma), json(report.tube.tension), json(report.tension_source),
+        json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least / 2) : "null",
+        list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest);
+}
+
+std::string json_head(const TubeSubject& subject, const std::vector<Threshold>& limits, int last) {
+    const auto stable = theory::common_stable_tensions(subject.tube, last);
+    const bool ill = theory::ill_posed_along(subject.tube) || theory::ill_posed_around(subject.tube);
+    return fmt::format(
+        "\"shape\": \"tube\", \"radius\": {}, \"length\": {}, \"energy\": {}, \"ill_posed\": {},\n\"thresholds\": "
+        "{},\n\"stable_tensions\": {}",
+        json(subject.tube.radius), json(subject.length), json(moduli(subject.tube.energy)), ill ? "true" : "false",
+        list_of(limits, [](const auto& limit, std::size_t) { return json_of(limit); }),
+        stable ? fmt::format("[{}, {}]", json(stable->lowest), json(stable->highest)) : "null");
+}
+
+}  // namespace
+
+std::string tube_report(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models) {
+    std::vector<ModelReport> reports;
+    for (const Model& model : models) reports.push_back(report_of(options, subject, model));
+    const std::vector<Threshold> limits = thresholds(subject.tube, options.modes);
+    switch (options.output()) {
+        case Output::csv:
+            return csv_of(reports);
+        case Output::json:
+            return fmt::format("{{{},\n\"models\": {}}}\n", json_head(subject, limits, options.modes),
+                               list_of(reports, [](const auto& report, std::size_t) { return json_of(report); }));
+        default:
+            return words_of(subject, reports, limits, options.modes);
+    }
+}
+
+// Rates over a range of wave numbers that holds all bands and the waves of the table.
+std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models) {
+    std::vector<ModelReport> reports;
+    double q_end = 0;
+    for (const Model& model : models) {
+        reports.push_back(report_of(options, subject, model));
+        for (int m = 0; m <= options.modes; ++m)
+            for (const theory::Band& band : theory::growing_bands(reports.back().tube, m))
+                if (std::isfinite(band.to)) q_end = std::max(q_end, 1.4 * band.to);
+    }
+    q_end = std::max(q_end, 1.6 / subject.tube.radius);
+    if (!options.q.empty()) {
+        const std::vector<double> asked = wave_numbers(options.q);
+        q_end = std::max(*std::max_element(asked.begin(), asked.end()), 1e-6 / subject.tube.radius);
+    }
+    std::string panels;
+    for (const ModelReport& report : reports) {
+        Model short_of_volume = report.model;
+        short_of_volume.keeps_volume.reset();
+        const std::string title = words(short_of_volume);
+        std::string curves;
+        for (int m = 0; m <= options.modes; ++m) {
+            std::vector<double> q, rate, neutral;
+            constexpr int samples = 400;
+            for (int i = 0; i <= samples; ++i) {
+                // The limit of long waves: q = 0 itself may stand for a radius that is kept.
+                q.push_back(std::max(i * q_end / samples, 1e-6 * q_end));
+                rate.push_back(theory::growth(report.tube, report.model, q.back(), m).rate());
+            }
+            for (const theory::Band& band : theory::growing_bands(report.tube, m))
+                for (const double edge : {band.from, band.to})
+                    if (edge > 0 && std::isfinite(edge)) neutral.push_back(edge);
+            curves += fmt::format("{}\n {{\"m\": {}, \"q\": {}, \"rate\": {}, \"neutral\": {}}}", m > 0 ? "," : "", m,
+                                  json(q), json(rate), json(neutral));
+        }
+        panels += fmt::format("{}\n{{\"title\": {}, \"report\": {},\n\"curves\": [{}]}}", panels.empty() ? "" : ",",
+                              json(title), json_of(report), curves);
+    }
+    return fmt::format("{{{},\n\"models\": [{}]}}\n",
+                       json_head(subject, thresholds(subject.tube, options.modes), options.modes), panels);
+}
+
+std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
+                          const std::vector<Model>& models) {
+    const int last = options.waves.value_or(6);
+    Text out;
+    std::string list;
+    if (options.csv) add(out, "model,l,rate,frequency\n");
+    if (!options.csv)
+        add(out, "sphere of radius {:.8g}; {}; tension {:.8g}; for any m <= l\n", sphere.radius, moduli(sphere.energy),
+            sphere.tension);
+    for (const Model& model : models) {
+        const bool swings = model.kind == ModelKind::fluid,
+                   moves = model.kind == ModelKind::gradient_flow && !theory::keeps_volume(model);
+        if (!options.csv) add(out, "\n{}\n", words(model));
+        if (!options.csv && moves)
+            add(out, "  the radius changes at the rate {:.6g}: rates are those of this instant\n", radius_rate(sphere));
+        if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
+        for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
+            const theory::Growth found = growth(sphere, model, l);
+            const double s = found.rate();
+            if (options.csv) {
+                add(out, "{},{},{:.17g},{:.17g}\n", name(model.kind), l, s, found.frequency());
+            } else {
+                add(out, "{:>5} {:>14.7g}", l, s);
+                if (swings) add(out, " {:>14.7g}", found.frequency());
+                add(out, " {:>12.6g}{}\n", 1 / std::abs(s), s > 0 ? "  grows" : "");
+            }
+            list += fmt::format("{}\n  {{\"model\": {}, \"l\": {}, \"rate\": {}, \"roots\": {}}}",
+                                list.empty() ? "" : ",", json(name(model.kind)), l, json(s), json_of(found.roots));
+        }
+    }
+    if (options.json)
+        return fmt::format("{{\"shape\": \"sphere\", \"radius\": {}, \"energy\": {}, \"waves\": [{}]}}\n",
+                           json(sphere.radius), json(moduli(sphere.energy)), list);
+    return to_string(out);
+}
+
+}  // namespace tubule
