@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -45,7 +46,7 @@ Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> si
     const Eigen::MatrixXd mass = forms.mass(e.x);
     const Eigen::LLT<Eigen::MatrixXd> factors(mass);
     const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
-    Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = sigma.value_or(0)}, e.x));
+    const Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = sigma.value_or(0)}, e.x));
     Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
     for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
     e.sigma = sigma.value_or(0);
@@ -56,11 +57,16 @@ Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> si
         solver.setThreshold(1e-6);
         solver.compute(columns);
         const Eigen::VectorXd multipliers = solver.solve(-force);
-        force += columns * multipliers;
         if (area && !sigma) e.sigma = multipliers[0];
         if (volume) e.P = multipliers[multipliers.size() - 1];
     }
-    unbalanced = force.norm() * e.observed.length * std::sqrt(e.observed.area) / e.reference_energy;
+    const double size = e.observed.length / (2 * pi), gauge = 0.01 * e.reference_energy;
+    // A little resistance, for what is neutral: places, and sizes of an energy that knows none.
+    const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
+    const Eigen::MatrixXd hessian = Eigen::MatrixXd(forms.hessian({1, e.sigma, e.P, gauge}, e.x)) + resistance * mass;
+    const Eigen::VectorXd step =
+        Eigen::PartialPivLU<Eigen::MatrixXd>(hessian).solve(forms.gradient({1, e.sigma, e.P, 0}, e.x));
+    unbalanced = std::sqrt(step.dot(mass * step) / e.observed.area) / size;
     e.stop = Stop::finished;
     return e;
 }

@@ -20,8 +20,10 @@ struct SpectrumSettings {
 
 struct Spectrum {
     std::vector<ModeRates> modes;
-    double sigma = 0, P = 0;     // multipliers that hold the shape: E + sigma A + P V is stationary
-    double unbalanced = 0;       // what is left of the force, relative to E_ref/(length of the meridian sqrt(A))
+    double sigma = 0, P = 0;  // multipliers that hold the shape: E + sigma A + P V is stationary
+    // How far from rest it is: the root mean square of the displacement of a Newton step, over length/(2 pi) of the
+    // meridian. (The force itself is a fourth derivative, of which little is known from points on a profile.)
+    double unbalanced = 0;
     double estimated_error = 0;  // of the rates, as `accuracy`
     int elements = 0;
     bool at_rest() const { return unbalanced < 1e-3; }

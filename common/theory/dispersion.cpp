@@ -3,7 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <functional>
+
+#include "common/geometry/profile_point.hpp"
 
 namespace tubule::theory {
 
@@ -207,6 +208,22 @@ std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& mo
         const double q = top == 0 && rate(band.from) >= rate((low + high) / 2) ? band.from : (low + high) / 2;
         if (!best || rate(q) > best->rate) best = {q, rate(q)};
     }
+    return best;
+}
+
+std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const Model& model, double length, int last) {
+    std::optional<FittingWave> best;
+    for (int m = 0; m <= last; ++m)
+        for (const Band& band : growing_bands(tube, m)) {
+            if (!std::isfinite(band.to)) return std::nullopt;
+            for (int n = static_cast<int>(std::ceil(band.from * length / (2 * pi))); 2 * pi * n / length < band.to;
+                 ++n) {
+                if (n == 0 && m < 2) continue;
+                const double q = 2 * pi * n / length, rate = growth(tube, model, q, m).rate();
+                if (!std::isfinite(rate)) return std::nullopt;
+                if (rate > 0 && (!best || rate > best->rate)) best = {n, m, q, rate};
+            }
+        }
     return best;
 }
 

@@ -82,6 +82,14 @@ struct FastestWave {
 };
 std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& model, int m);
 
+// The fastest growing wave with m = 0 ... last of those that fit a length, q = 2 pi n/length, rigid motions and the
+// change of radius left out. Nothing if none grows, or as above.
+struct FittingWave {
+    int n = 0, m = 0;
+    double q = 0, rate = 0;
+};
+std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const Model& model, double length, int last);
+
 // Where waves of one m begin to grow as the tension changes: from `lowest` to `highest` none does. `q_...` is the wave
 // number that is neutral there, 0 for long waves. Nothing if some wave grows at any tension.
 struct StableTensions {

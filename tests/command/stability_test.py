@@ -153,6 +153,10 @@ class Stability(ProgramTest):
             for row in self.table(source):
                 if row["number"] == "0":
                     self.assertAlmostEqual(float(row["rate"]) / known[f"growth_{row['m']}"][0], 1, delta=1e-4)
+        # A shape without a size of its own, with the reduced volume held.
+        held = CAPSULE.replace("[equilibrium]", "[equilibrium]\nheld = 'reduced-volume'").replace("k42 = 0.12", "")
+        vesicle = self.write("vesicle.toml", held.replace("H0 = -2.0", ""))
+        self.assertIn("at rest", self.tubule("stability", vesicle)[0])
         # The tube as it is: the closed form, for a wave of 1e-4.
         numerical = [row for row in self.table(self.tube, "--numerical") if row["m"] == "0"]
         self.assertAlmostEqual(float(numerical[0]["rate"]), rate_at_rest(2 * math.pi / 7), delta=1e-5)

@@ -334,6 +334,20 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
                 }
                 EXPECT_EQ(growth(tube, law, fastest->q, m).rate(), fastest->rate);
             }
+        // Of those that fit: the best of all.
+        const Model law = model(ModelKind::fluid, 2, 0.3);
+        theory::FittingWave best;
+        for (int m = 0; m <= 2; ++m)
+            for (int n = m < 2 ? 1 : 0; n < 10; ++n) {
+                const double q = 2 * pi * n / 17, rate = growth(tube, law, q, m).rate();
+                if (rate > best.rate) best = {n, m, q, rate};
+            }
+        const auto found = fastest_fitting_wave(tube, law, 17, 2);
+        ASSERT_TRUE(found);
+        EXPECT_EQ(found->n, best.n);
+        EXPECT_EQ(found->m, best.m);
+        EXPECT_EQ(found->rate, best.rate);
+        EXPECT_FALSE(fastest_fitting_wave(tube, law, 0.5, 1));
     }
 }
 
@@ -368,7 +382,8 @@ TEST(Waves, aDriftingTube) {
 
 TEST(Waves, meetTheReferenceRunsOnceSmall) {
     // Independent nonlinear runs of the figure (k20 = 0.2, H0 = -2, L = 2) from t = 0.2, where waves are small, to 0.5:
-    // r_min, r_max and mode 1 there. What is left out is (a/R)^2: 4e-6 and less.
+    // r_min, r_max and mode 1 there. What is left out goes with (a/R)^2: 4e-6 and 2e-8, times some dozen. The
+    // reference's modes end in noise of 5e-14 (it has that at t = 1.4, where the wave is gone).
     struct Run {
         double k42, r_min, r_max, mode, r_min_end, r_max_end, mode_end;
     };
@@ -378,8 +393,9 @@ TEST(Waves, meetTheReferenceRunsOnceSmall) {
                                0.7035518274564397, 3.001695680452704e-10}}) {
         const UniformTube tube{bending(0.2, -2, 0, run.k42), (run.r_min + run.r_max) / 2};
         const auto end = waves_in_time(tube, model(ModelKind::gradient_flow), 2, {{1, 0, run.mode}}, {0.3})[0];
-        EXPECT_NEAR(end.radius, (run.r_min_end + run.r_max_end) / 2, 2e-6);
-        EXPECT_NEAR(end.amplitudes[0] / run.mode_end, 1, 1e-4);
+        const double squares = run.mode * run.mode;
+        EXPECT_NEAR(end.radius, (run.r_min_end + run.r_max_end) / 2, squares + 1e-9);
+        EXPECT_NEAR(end.amplitudes[0] / run.mode_end, 1, 60 * squares + 1e-13 / run.mode_end);
     }
 }
 

@@ -48,6 +48,7 @@ struct ModelReport {
     std::string tension_source;
     std::vector<WaveRow> rows;
     std::vector<std::optional<theory::FastestWave>> fastest;  // of each m, any q
+    std::optional<theory::FittingWave> fastest_fitting;
     std::optional<double> radius_at_end;
 };
 
@@ -192,7 +193,7 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
 }
 
 ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Model& model) {
-    ModelReport report{model, subject.tube, "", {}, {}, {}};
+    ModelReport report{model, subject.tube, "", {}, {}, {}, {}};
     set_tension(subject, report);
     const auto add_row = [&](std::optional<int> n, double q, int m) {
         if (q == 0 && m < 2 && !(m == 0 && drifts(report))) return;  // its radius, or its place
@@ -206,6 +207,7 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
                 add_row(n, 2 * pi * n / subject.length, m);
         report.fastest.push_back(theory::fastest_wave(report.tube, model, m));
     }
+    report.fastest_fitting = theory::fastest_fitting_wave(report.tube, model, subject.length, options.modes);
     if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
     return report;
 }
@@ -269,12 +271,12 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
     const auto name_of = [](const WaveRow& row) {
         return row.n ? fmt::format("n = {}, m = {}", *row.n, row.m) : fmt::format("q = {:.6g}, m = {}", row.q, row.m);
     };
+    if (report.fastest_fitting)
+        add(out, "  fastest that fits the length: n = {}, m = {}, rate {:.7g}\n", report.fastest_fitting->n,
+            report.fastest_fitting->m, report.fastest_fitting->rate);
     if (const WaveRow* row = fastest_row(report)) {
         const double s = row->growth.rate();
-        if (s > 0)
-            add(out, "  fastest of these: {}, rate {:.7g}\n", name_of(*row), s);
-        else
-            add(out, "  none of these grows; slowest to decay: {}, rate {:.7g}\n", name_of(*row), s);
+        if (s <= 0) add(out, "  none of these grows; slowest to decay: {}, rate {:.7g}\n", name_of(*row), s);
     }
     for (std::size_t m = 0; m < report.fastest.size(); ++m)
         if (const auto& fastest = report.fastest[m])
@@ -358,16 +360,20 @@ std::string json_of(const ModelReport& report) {
         return wave ? fmt::format("{{\"m\": {}, \"q\": {}, \"rate\": {}}}", m, json(wave->q), json(wave->rate))
                     : fmt::format("{{\"m\": {}, \"q\": null, \"rate\": null}}", m);
     });
+    const auto& fits = report.fastest_fitting;
+    const std::string fitting = fits ? fmt::format("{{\"n\": {}, \"m\": {}, \"q\": {}, \"rate\": {}}}", fits->n,
+                                                   fits->m, json(fits->q), json(fits->rate))
+                                     : "null";
     const auto least = least_f_KK_of(report.tube);
     return fmt::format(
         "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, \"P\": "
         "{}, "
         "\"radius_rate\": "
-        "{},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": {}}}",
+        "{},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": {},\n\"fastest_fitting\": {}}}",
         json(name(report.model.kind)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
         json(report.model.Re), json(report.model.gamma), json(report.tube.tension), json(report.tension_source),
         json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least / 2) : "null",
-        list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest);
+        list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest, fitting);
 }
 
 std::string json_head(const TubeSubject& subject, const std::vector<Threshold>& limits, int last) {

@@ -16,7 +16,8 @@ def rate_limits(models):
     for model in models:
         rates = [rate for curve in model["curves"] for rate in curve["rate"] if rate is not None]
         top = max([rate for rate in rates if rate > 0], default=0.0)
-        lowest = min(rates, default=-1.0)
+        # Rings may be infinitely fast without friction, so m = 0 tells the scale.
+        lowest = min([rate for rate in model["curves"][0]["rate"] if rate is not None], default=-1.0)
         bottom = max(lowest, -2.0 * top) if top > 0 else lowest / 4
         limits.append((1.06 * bottom, 1.25 * top if top > 0 else -0.12 * bottom))
     return limits
