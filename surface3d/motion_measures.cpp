@@ -38,7 +38,7 @@ Sums integrals(const MotionStepper& stepper, const MotionState& s, const CurvedM
 
 void measure_mesh(const SurfaceSpace& space, const CurvedMesh& mesh, MotionMeasures& m) {
     const Tabulation& table = space.tabulation();
-    m.quality = std::numeric_limits<double>::infinity();
+    m.quality = m.neck_radius = std::numeric_limits<double>::infinity();
     for (int cell = 0; cell < space.cells(); ++cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
         double widest = 0;  // squared
@@ -52,8 +52,10 @@ void measure_mesh(const SurfaceSpace& space, const CurvedMesh& mesh, MotionMeasu
         for (int a = 0; a < space.width(); ++a) {
             const int i = space.node(cell, a);
             const double H = m.fields.H[i], K = m.fields.K[i];
-            const double turn =
-                (std::abs(H) / 2 + std::sqrt(std::max(H * H / 4 - K, 0.0))) * std::sqrt(widest) / space.order();
+            const double half = std::sqrt(std::max(H * H / 4 - K, 0.0)), sharp = std::abs(H) / 2 + half;
+            const double hoop = half - H / 2;  // curvature around a neck, -kappa of the tube that it is
+            const double turn = sharp * std::sqrt(widest) / space.order();
+            if (K < 0 && hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.nodes[i];
             if (!(turn <= m.turn)) m.turn = turn, m.sharpest = mesh.nodes[i], m.neck = K < 0;
         }
     }

@@ -22,6 +22,8 @@ struct MotionMeasures {
     double turn = 0;               // largest angle by which the normal turns between neighbouring nodes
     Eigen::Vector3d sharpest;      // where that is
     bool neck = false;             // and whether the surface is a saddle there
+    double neck_radius = 0;       // of the narrowest place where the surface is a saddle; infinity if there is none
+    Eigen::Vector3d narrowest;    // where that is
     double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
     Eigen::Vector3d least_symbol;  // where it is
 };

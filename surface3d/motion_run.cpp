@@ -35,7 +35,8 @@ constexpr double worst_quality = 0.03, sharpest_turn = 2;
 // A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5;
 constexpr int steps_between_meshes = 20;
-constexpr int steps_between_looks = 10;
+constexpr int steps_between_looks = 10, most_crawling = 100;
+constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere
 constexpr double seconds_between_checkpoints = 20;
 constexpr double same_everywhere = 1e-8;  // variation_of_H
 
@@ -175,6 +176,8 @@ private:
     std::size_t next_output_ = 0, mesh_number_ = 0;
     double error_now_ = 0;
     double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
+    double crawl_begun_ = 0;
+    int crawl_since_ = 0;
     int steps_ = 0, rejected_ = 0, mesh_since_ = 0, meshes_ = 1;
     std::vector<double> row_;
 };
@@ -320,6 +323,10 @@ std::optional<StopReport> MotionAttempt::check_shape() const {
         return StopReport{Stop::ill_posed, t,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(now_.least_symbol),
                           "no resolution helps: the energy does not resist short waves there"};
+    if (now_.neck_radius < case_.accuracy.r_min)
+        return StopReport{Stop::pinch_off, t,
+                          fmt::format("the neck radius fell to {:.4g} at {}", now_.neck_radius, where(now_.narrowest)),
+                          "lower accuracy.r_min to follow the neck further"};
     if (now_.turn > sharpest_turn)
         return StopReport{
             now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
@@ -412,6 +419,10 @@ std::optional<StopReport> MotionAttempt::step() {
         last_checkpoint_ = seconds_since(started_);
         watch_.checkpoint(record());
     }
+    if (t > (1 + least_progress) * crawl_begun_) crawl_begun_ = t, crawl_since_ = steps_;
+    if (steps_ > crawl_since_ + most_crawling && state_.step < first_step * memory_.relaxation)
+        return StopReport{Stop::solver_failed, t, fmt::format("stuck with steps of {:.2g}", state_.step),
+                          "ask for less accuracy, or use more elements"};
     if (auto stop = check()) return stop;
     if (wants_new_mesh()) make_new_mesh();
     return std::nullopt;
@@ -552,6 +563,7 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
     const bool resizable = start_mesh(c, settings.elements).resizable;
     const bool by_order = !resizable || coarser(settings).elements < least_triangles;
     Trace trace = restart ? Trace(restart->record) : Trace();
+    StopReport coarse_stop;
     if (trace.empty()) {
         Case lower = c;
         if (by_order) lower.surface.order = std::max(element_order(c) - 1, 2);
@@ -565,6 +577,7 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
             return coarse.summary;
         }
         trace = coarse.trace;
+        coarse_stop = coarse.summary.stop;
     }
     for (int pair = 1;; ++pair) {
         auto fine =
@@ -583,7 +596,8 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
             settings.elements * 1.6 > most_triangles || ended_early(reason)) {
             if (!known)
                 fine->summary.warnings.push_back(fmt::format(
-                    "the coarser run of the pair came to t = {:.6g} only: the error is not known", compared_until));
+                    "the coarser run of the pair came to t = {:.6g} only: the error is not known ({})", compared_until,
+                    coarse_stop.message));
             accept(fine->summary, c, given);
             return fine->summary;
         }
@@ -591,6 +605,7 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         observer.discard();
         restart = nullptr;
         trace = std::move(fine->trace);
+        coarse_stop = fine->summary.stop;
     }
 }
 

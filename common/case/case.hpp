@@ -49,7 +49,7 @@ enum class Parametrisation {
 
 struct Accuracy {
     double energy = 1e-4;  // asked error of the energy at all times, relative to E_ref
-    double r_min = 1e-3;   // tier axisym, floor of the neck radius: below it the run stops with pinch-off
+    double r_min = 1e-3;   // floor of the neck radius, below which the run stops with pinch-off; 1e-2 in tier surface3d
 };
 
 // Explicit choices of tier axisym; where absent, the asked accuracy decides.

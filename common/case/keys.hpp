@@ -158,12 +158,12 @@ void keys(Keys& k, Velocity& velocity, const Model& model) {
 }
 
 template <class Keys>
-void keys(Keys& k, Accuracy& accuracy, Tier tier) {
+void keys(Keys& k, Accuracy& accuracy, bool moves) {
     k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
-    if (tier == Tier::axisym)
+    if (moves)
         k.number("r_min", accuracy.r_min, {.above = 0});
     else
-        k.absent("r_min", "must be absent: it belongs to tier \"axisym\"");
+        k.absent("r_min", "must be absent: without a table [time] nothing moves");
 }
 
 template <class Keys>
@@ -386,7 +386,7 @@ void keys(Keys& k, Case& c) {
     else
         surface_motion_keys(k, c);
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
-    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier); });
+    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier == Tier::axisym || c.moves()); });
     k.table("discretisation", [&](auto& k) {
         if (c.tier == Tier::surface3d)
             keys(k, c.surface, c.moves());

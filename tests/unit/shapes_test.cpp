@@ -116,7 +116,7 @@ TEST(ShapeKeys, WhatEachTierTakes) {
     const auto still = [](const std::string& more) { return refusal(surface + shape("kind = \"dumbbell\"\n") + more); };
     EXPECT_EQ(still(time_span), "case.toml:6:1: time must be absent: tier \"surface3d\" does not move surfaces yet");
     EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
-              "case.toml:7:9: accuracy.r_min must be absent: it belongs to tier \"axisym\"");
+              "case.toml:7:9: accuracy.r_min must be absent: without a table [time] nothing moves");
 }
 
 TEST(ModelKeys, WhatGoesTogether) {
