@@ -49,15 +49,17 @@ void measure_mesh(const SurfaceSpace& space, const CurvedMesh& mesh, MotionMeasu
             if (!(quality >= m.quality)) m.quality = quality, m.worst = p.x;
             widest = std::max(widest, 2 * mean / 3);
         }
+        // Curvature around a neck: that which all nodes of a cell have, as single ones may be off.
+        double hoop = std::numeric_limits<double>::infinity();
         for (int a = 0; a < space.width(); ++a) {
             const int i = space.node(cell, a);
             const double H = m.fields.H[i], K = m.fields.K[i];
             const double half = std::sqrt(std::max(H * H / 4 - K, 0.0)), sharp = std::abs(H) / 2 + half;
-            const double hoop = half - H / 2;  // curvature around a neck, -kappa of the tube that it is
+            hoop = std::min(hoop, K < 0 ? half - H / 2 : 0);
             const double turn = sharp * std::sqrt(widest) / space.order();
-            if (K < 0 && hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.nodes[i];
             if (!(turn <= m.turn)) m.turn = turn, m.sharpest = mesh.nodes[i], m.neck = K < 0;
         }
+        if (hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.nodes[space.node(cell, 0)];
     }
 }
 
