@@ -1,0 +1,81 @@
+// What tests of moving surfaces share: a motion in steps as given, and waves measured on it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/shapes/sphere.hpp"
+#include "common/shapes/tube.hpp"
+#include "surface3d/base_meshes.hpp"
+#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/motion_measures.hpp"
+#include "surface3d/motion_step.hpp"
+
+namespace tubule::surface3d {
+
+template <class Shape>
+CurvedMesh mesh_of(const Shape& shape, const TriangleMesh& base, int order) {
+    return mapped_mesh(base, order, [&](const auto& p) { return position(shape, p); });
+}
+
+inline CurvedMesh tube_mesh(const Tube& tube, int n_z, int n_theta, int order) {
+    return mesh_of(tube, tube_rings(tube.radius, tube.length, n_z, n_theta), order);
+}
+
+// From rest, in steps of one size. Area and volume are held at those of the start, as in a run.
+struct Motion {
+    Motion(const CurvedMesh& mesh, const Model& model, const Bending& bending, MotionControl control = {})
+        : bending(bending), stepper(mesh, motion_law(model), bending, held(mesh, control)), state(stepper.start(mesh)) {}
+
+    static MotionControl held(const CurvedMesh& mesh, MotionControl control) {
+        const Extent e = extent(SurfaceSpace(mesh), mesh);
+        control.area = e.area, control.volume = e.volume;
+        return control;
+    }
+    void steps(double tau, int n) {
+        for (int i = 0; i < n; ++i) state = stepper.step(state, tau).state;
+    }
+    void until(double end, int n) { steps(end / n, n); }
+    CurvedMesh mesh() const { return stepper.mesh(state.X); }
+    MotionMeasures measures() { return measure(stepper, state, bending); }
+
+    Bending bending;
+    MotionStepper stepper;
+    MotionState state;
+};
+
+// INT f(x) dS.
+template <class F>
+double integral(const CurvedMesh& mesh, const F& f) {
+    const SurfaceSpace space(mesh);
+    const Tabulation& table = space.tabulation();
+    double sum = 0;
+    for (int cell = 0; cell < space.cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            sum += table.weight[q] * p.area * f(p.x);
+        }
+    }
+    return sum;
+}
+
+// a of r = R + a cos(2 pi n z/length + m theta), small.
+inline double tube_wave(const CurvedMesh& mesh, int n, int m) {
+    const auto r = [](const Eigen::Vector3d& x) { return x.head<2>().norm(); };
+    const double area = integral(mesh, [](const auto&) { return 1.0; }), mean = integral(mesh, r) / area;
+    return 2 / area * integral(mesh, [&](const Eigen::Vector3d& x) {
+               return (r(x) - mean) * std::cos(2 * pi * n * x.z() / mesh.period + m * std::atan2(x.y(), x.x()));
+           });
+}
+
+// a of r = R + a Re Y_l^m, small. INT (Re Y)^2 over the unit sphere is 1 for m = 0, else 1/2.
+inline double sphere_wave(const CurvedMesh& mesh, int l, int m) {
+    const double area = integral(mesh, [](const auto&) { return 1.0; });
+    const double mean = integral(mesh, [](const Eigen::Vector3d& x) { return x.norm(); }) / area;
+    return (m == 0 ? 1 : 2) * 4 * pi / area * integral(mesh, [&](const Eigen::Vector3d& x) {
+               return (x.norm() - mean) * real_harmonic<double>(l, m, x.normalized());
+           });
+}
+
+}  // namespace tubule::surface3d

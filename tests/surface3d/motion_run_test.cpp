@@ -1,0 +1,197 @@
+// Runs of moving surfaces: what is kept, what stops them, and how they go on.
+#include "surface3d/motion_run.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/case/read.hpp"
+#include "surface3d/motion_frame.hpp"
+#include "surface3d/run.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+struct Watch : RunObserver {
+    std::vector<std::vector<double>> rows;
+    std::vector<Record> frames;
+    std::vector<SurfaceCells> meshes;
+    std::size_t most_rows = 1000000;  // then it is interrupted
+
+    void row(std::span<const double> row) override { rows.emplace_back(row.begin(), row.end()); }
+    std::size_t mesh(const SurfaceCells& cells) override {
+        meshes.push_back(cells);
+        return meshes.size() - 1;
+    }
+    void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
+    void discard() override { rows.clear(), frames.clear(), meshes.clear(); }
+    bool interrupted() override { return rows.size() >= most_rows; }
+};
+
+struct Outcome {
+    Case c;
+    Watch watch;
+    RunSummary summary;
+
+    std::vector<double> series(const std::string& name) const {
+        const std::vector<std::string> names = series_names(c);
+        const auto column = std::find(names.begin(), names.end(), name) - names.begin();
+        std::vector<double> out;
+        for (const auto& row : watch.rows) out.push_back(row.at(column));
+        return out;
+    }
+    double last(const std::string& name) const { return series(name).back(); }
+};
+
+Outcome begin(const std::string& text, const std::vector<std::string>& sets) {
+    return {parse_case("tier = \"surface3d\"\n" + text, sets, "case.toml"), {}, {}};
+}
+
+Outcome run_case(const std::string& text, const std::vector<std::string>& sets = {}) {
+    Outcome out = begin(text, sets);
+    out.summary = run(out.c, out.watch);
+    std::printf("%s at %g: %s; %s; error %.3g\n", name(out.summary.stop.reason), out.summary.stop.time,
+                out.summary.stop.message.c_str(), out.summary.effort.c_str(), out.summary.estimated_error);
+    return out;
+}
+
+const std::string wavy = R"(
+[energy]
+k20 = 0.2
+k42 = 0.05
+[shape]
+kind = "sphere"
+radius = 1
+mode = [{amplitude = 0.25, l = 2, m = 1}, {amplitude = 0.15, l = 3, m = 2}]
+[discretisation]
+elements = 80
+order = 3
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.05
+)";
+
+TEST(MotionRun, EveryModelKeepsWhatItMust) {
+    // maths 3: the dissipation identity within the asked accuracy; area and volume to 1e-8 at every accepted step.
+    for (const std::string kind : {"gradient-flow", "overdamped", "stokes", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome o = run_case(wavy, {"model.kind=" + kind});
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double asked = o.c.accuracy.energy * o.summary.reference_energy;
+        double worst = 0;
+        for (const double defect : o.series("identity_defect")) worst = std::max(worst, std::abs(defect));
+        EXPECT_LT(worst, asked);
+        std::printf("%s: defect %.3g of E_ref\n", kind.c_str(), worst / o.summary.reference_energy);
+        const std::vector<double> energy = o.series("energy"), kinetic = o.series("kinetic_energy");
+        EXPECT_LT(energy.back(), energy.front() - asked);  // something has happened
+        for (std::size_t i = 1; i < energy.size(); ++i)
+            EXPECT_LT(energy[i] + kinetic[i], energy[i - 1] + kinetic[i - 1] + asked / 4);
+        if (kind == "gradient-flow") continue;
+        for (const char* kept : {"area", "volume"})
+            for (const double value : o.series(kept)) EXPECT_NEAR(value / o.series(kept).front(), 1, 1e-8) << kept;
+    }
+}
+
+TEST(MotionRun, GradientFlowOfFixedVolume) {
+    const Outcome o = run_case(wavy, {"model.volume=fixed"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    for (const double value : o.series("volume")) EXPECT_NEAR(value / o.series("volume").front(), 1, 1e-8);
+    EXPECT_NE(o.last("lambda"), 0);
+    EXPECT_GT(std::abs(o.last("area") / o.series("area").front() - 1), 1e-4);  // the area is free
+}
+
+TEST(MotionRun, AnInextensibleSphereIsRigid) {
+    // maths 6: area and volume leave it nothing to do. There lambda and the pressure are the same condition.
+    for (const std::string kind : {"overdamped", "stokes", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome o = run_case("[energy]\nk20 = 1\nk42 = 0.3\nH0 = -1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
+                                   "[discretisation]\nelements = 80\norder = 4\n",
+                                   {"model.kind=" + kind});
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        std::printf("%s: r %.3g %.3g speed %.3g\n", kind.c_str(), o.last("r_min") - 1, o.last("r_max") - 1, o.last("speed"));
+        EXPECT_NEAR(o.last("r_min"), 1, 1e-3);
+        EXPECT_NEAR(o.last("r_max"), 1, 1e-3);
+        EXPECT_NEAR(o.last("energy"), o.series("energy").front(), 1e-4 * o.summary.reference_energy);
+    }
+}
+
+TEST(MotionGuards, IllPosed) {
+    // maths 2: f_HH + f_KK x^2 = 2 k20 + 2 k42 x^2 with x = -1 on the unit sphere: negative for k42 < -k20.
+    const std::string sphere = "[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
+                               "[discretisation]\nelements = 80\norder = 3\nstep = 0.05\n";
+    const Outcome lost = run_case(sphere, {"energy.k42=-1.05"});
+    EXPECT_EQ(lost.summary.stop.reason, Stop::ill_posed) << lost.summary.stop.message;
+    EXPECT_EQ(lost.summary.stop.time, 0);
+    EXPECT_EQ(lost.watch.frames.size(), 1u);
+    EXPECT_EQ(run_case(sphere, {"energy.k42=-0.95"}).summary.stop.reason, Stop::finished);
+}
+
+TEST(MotionGuards, PinchOff) {
+    // The deep neck of cases/pinch_off.toml, which closes at t = 0.1418 there: the mesh follows it until its width.
+    const Outcome o = run_case(
+        "[energy]\nk20 = 0.2\nH0 = -2\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\nmode = [{amplitude = 0.6, n = "
+        "1}]\n[accuracy]\nenergy = 1e-2\n[discretisation]\nelements = 200\norder = 3\n[time]\nend = 0.5\n");
+    EXPECT_EQ(o.summary.stop.reason, Stop::pinch_off) << o.summary.stop.message;
+    EXPECT_NEAR(o.summary.stop.time, 0.1418, 0.02);
+    EXPECT_LT(o.last("r_min"), 0.2);
+}
+
+TEST(MotionGuards, SelfIntersection) {
+    // As cases/curve_meets_itself.toml: oblates of so small a reduced volume meet themselves.
+    const Outcome o = run_case(
+        "[energy]\nk20 = 1\n[model]\nkind = \"overdamped\"\n[shape]\nkind = \"ellipsoid\"\na = 1\nb = 1\nc = "
+        "0.18\n[accuracy]\nenergy = 2e-2\n[discretisation]\nelements = 180\norder = 3\n[time]\nend = 20\n");
+    EXPECT_EQ(o.summary.stop.reason, Stop::self_intersection) << o.summary.stop.message;
+}
+
+TEST(MotionGuards, StepsThatAreTooLarge) {
+    const Outcome o = run_case(wavy, {"discretisation.step=0.05", "energy.k20=20", "time.end=1"});
+    EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost) << o.summary.stop.message;
+}
+
+TEST(MotionGuards, MeshLost) {
+    const Outcome o = run_case(
+        "[energy]\nk20 = 1\n[model]\nkind = \"stokes\"\n[shape]\nkind = \"ellipsoid\"\na = 0.3\nb = 0.3\nc = "
+        "3\n[accuracy]\nenergy = 2e-2\n[discretisation]\nelements = 80\norder = 2\nrelaxation = 1e6\n[time]\nend = 5\n");
+    EXPECT_EQ(o.summary.stop.reason, Stop::mesh_lost) << o.summary.stop.message;
+}
+
+TEST(MotionGuards, TimeLimit) {
+    const Outcome o = run_case(wavy, {"time.limit=1e-9"});
+    EXPECT_EQ(o.summary.stop.reason, Stop::time_limit);
+    EXPECT_GT(o.watch.frames.size(), 0u);
+}
+
+TEST(MotionRun, RefusedStepsAreTriedAgain) {
+    // A tolerance that jumps is felt at once: the first step of a new run is small, later ones grow until one is
+    // refused.
+    const Outcome o = run_case(wavy, {"discretisation.time_tolerance=1e-6"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished);
+}
+
+TEST(MotionRun, ResumedRunsEndAsUndisturbedOnes) {
+    for (const std::string kind : {"gradient-flow", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const std::vector<std::string> sets{"model.kind=" + kind, "time.output=[0.02]"};
+        const Outcome whole = run_case(wavy, sets);
+        Outcome first = begin(wavy, sets);
+        first.watch.most_rows = whole.watch.rows.size() / 2;
+        first.summary = run(first.c, first.watch);
+        ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
+        ASSERT_LT(first.last("time"), 0.05);
+        const Restart restart{first.watch.frames.back(), first.watch.meshes.back()};
+        Outcome second = begin(wavy, sets);
+        second.summary = run(second.c, second.watch, &restart);
+        ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+        const double asked = whole.c.accuracy.energy * whole.summary.reference_energy;
+        for (const char* name : {"energy", "kinetic_energy", "identity_defect", "correction_energy"})
+            EXPECT_NEAR(second.last(name), whole.last(name), 1e-2 * asked) << name;
+        // Nothing of the past is forgotten: steps go on as if there had been no end.
+        EXPECT_EQ(first.watch.rows.size() + second.watch.rows.size(), whole.watch.rows.size());
+        EXPECT_NEAR(second.summary.estimated_error, whole.summary.estimated_error, 0.5 * whole.summary.estimated_error);
+    }
+}
+
+}  // namespace
+}  // namespace tubule::surface3d

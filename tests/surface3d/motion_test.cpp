@@ -1,0 +1,235 @@
+// Steps of the moving surface against exact solutions (maths 3, 5, 6): spheres and tubes in gradient flow, waves of
+// tubes that flow, balances of momentum.
+#include "motion.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/theory/waves.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+const Bending all_terms{.k = {0.3, 0.02, 0.1}, .H0 = -1};
+
+// Radius of a sphere and amplitude of a wave of it, as the exact linear theory has them at time `end` (maths 6).
+struct SphereAt {
+    double radius, amplitude;
+};
+SphereAt sphere_at(double end, const Bending& energy, double R, int l = 2) {
+    const int steps = 2000;
+    const double h = end / steps;
+    const auto rate = [&](const Eigen::Vector2d& y) {
+        const theory::UniformSphere s{energy, y[0], 0};
+        return Eigen::Vector2d(theory::radius_rate(s), theory::growth(s, {}, l).rate());
+    };
+    Eigen::Vector2d y(R, 0);
+    for (int i = 0; i < steps; ++i) {  // the classical method of Runge and Kutta
+        const Eigen::Vector2d a = rate(y), b = rate(y + h / 2 * a), c = rate(y + h / 2 * b), d = rate(y + h * c);
+        y += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+    return {y[0], std::exp(y[1])};
+}
+
+double radius(const CurvedMesh& mesh) {
+    return std::sqrt(integral(mesh, [](const auto&) { return 1.0; }) / (4 * pi));
+}
+
+TEST(SphereFlow, RadiusFollowsItsEquation) {
+    // maths 6 (a); without k20 also R^6 = 1 + 12 (k42 + 16 k40) t in closed form.
+    EXPECT_NEAR(sphere_at(1, {.k = {0, 0.02, 0.1}}, 1).radius, std::pow(1 + 12 * 0.42, 1.0 / 6), 1e-12);
+    const double end = 0.4, exact = sphere_at(end, all_terms, 1).radius;
+    for (const auto& [second_order, least, most] : {std::tuple{true, 3.3, 1e-4}, {false, 1.8, 1e-2}}) {
+        double error[2];
+        for (int i : {0, 1}) {
+            Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, {.second_order = second_order});
+            motion.until(end, 10 << i);
+            error[i] = std::abs(radius(motion.mesh()) - exact);
+        }
+        std::printf("sphere R = %.6g: errors %.3g %.3g\n", exact, error[0], error[1]);
+        EXPECT_GT(error[0] / error[1], least) << second_order;
+        EXPECT_LT(error[1], most) << second_order;
+    }
+}
+
+TEST(SphereFlow, VelocityConvergesWithTheMesh) {
+    const double exact = theory::radius_rate(theory::UniformSphere{all_terms, 1.5, 0});
+    for (const auto& [order, least, most] : {std::tuple{2, 1.8, 1e-2}, {3, 3.5, 1e-4}, {4, 3.5, 1e-5}}) {
+        double error[2];
+        for (int i : {0, 1}) {
+            Motion motion(mesh_of(Sphere{.radius = 1.5, .modes = {}}, icosphere(2 << i), order), {}, all_terms);
+            motion.steps(1e-8, 1);
+            const CurvedMesh mesh = motion.mesh();
+            const double rate = motion.stepper.flux(motion.state.u, mesh, motion.stepper.fields(mesh)).sum() /
+                                (4 * pi * 1.5 * 1.5);
+            error[i] = std::abs(rate / exact - 1);
+        }
+        std::printf("order %d: errors %.3g %.3g, rate %.2f\n", order, error[0], error[1], std::log2(error[0] / error[1]));
+        EXPECT_GT(std::log2(error[0] / error[1]), least) << order;
+        EXPECT_LT(error[1], most) << order;
+    }
+}
+
+TEST(SphereFlow, WavesDecayAtTheirRates) {
+    for (const auto& [l, m, end] : {std::tuple{2, 1, 0.2}, {3, 2, 0.02}}) {
+        const double a0 = 1e-4;
+        double error[2];
+        for (int i : {0, 1}) {
+            Motion motion(mesh_of(Sphere{.radius = 1, .modes = {{a0, l, m}}}, icosphere(2), 4), {}, all_terms);
+            const double start = sphere_wave(motion.mesh(), l, m);
+            EXPECT_NEAR(start, a0, 1e-3 * a0);
+            motion.until(end, 8 << i);
+            const double exact = sphere_at(end, all_terms, 1, l).amplitude;
+            error[i] = std::abs(sphere_wave(motion.mesh(), l, m) / start - exact);
+            std::printf("Y %d %d: exact %.5g, error %.3g\n", l, m, exact, error[i]);
+        }
+        EXPECT_GT(error[0] / error[1], 3) << l;
+        EXPECT_LT(error[1], 2e-3) << l;
+    }
+}
+
+// Largest difference of the amplitudes at the end from those of the linear theory, relative to the largest at the start.
+double error_of_waves(const Bending& energy, const Model& model, const std::vector<theory::Wave>& waves, double length,
+                      double end, int steps, int n_z = 8, int n_theta = 8, int order = 4) {
+    Tube tube{.radius = 1, .length = length, .modes = {}};
+    double largest = 0;
+    for (const theory::Wave& w : waves) {
+        tube.modes.push_back({w.amplitude, w.n, w.m});
+        largest = std::max(largest, std::abs(w.amplitude));
+    }
+    Motion motion(tube_mesh(tube, n_z, n_theta, order), model, energy);
+    motion.until(end, steps);
+    const theory::WaveState exact = theory::waves_in_time({energy, 1, 0}, model, length, waves, {end}).back();
+    double error = 0;
+    const CurvedMesh mesh = motion.mesh();
+    for (std::size_t i = 0; i < waves.size(); ++i) {
+        const double a = tube_wave(mesh, waves[i].n, waves[i].m);
+        std::printf("  wave %d %d: %.6g -> %.6g, exact %.6g\n", waves[i].n, waves[i].m, waves[i].amplitude, a,
+                    exact.amplitudes[i]);
+        error = std::max(error, std::abs(a - exact.amplitudes[i]) / largest);
+    }
+    return error;
+}
+
+TEST(TubeFlow, WavesAlongAndAroundFollowLinearTheory) {
+    // maths 5 (a) with the radius drifting: the exact multiplier is exp INT s dt.
+    const double a = 1e-4;
+    const std::vector<theory::Wave> waves{{1, 0, a}, {1, 1, a}, {1, 2, a}, {2, 0, a}, {0, 2, a}};
+    double error[2];
+    for (int i : {0, 1}) error[i] = error_of_waves(all_terms, {}, waves, 5, 0.2, 6 << i);
+    std::printf("tube flow: %.3g %.3g\n", error[0], error[1]);
+    EXPECT_GT(error[0] / error[1], 3);
+    EXPECT_LT(error[1], 3e-3);
+}
+
+TEST(TubeWaves, FollowTheAmplitudeEquations) {
+    // maths 5, TRAP: several waves, whose pressure varies in time so that SUM w c a^2 stays. They leave out squares of
+    // amplitudes, here 1e-3.
+    const Bending energy{.k = {1, 0, 0.1}, .H0 = 0};
+    const std::vector<theory::Wave> waves{{1, 0, 1e-3}, {2, 0, 5e-4}, {1, 2, 3e-4}};
+    for (const auto& [kind, end] :
+         {std::pair{ModelKind::overdamped, 0.3}, {ModelKind::stokes, 0.3}, {ModelKind::fluid, 0.6}}) {
+        const Model model{.kind = kind, .Re = 2, .gamma = kind == ModelKind::overdamped ? 0 : 0.3, .keeps_volume = {}};
+        double error[2];
+        for (int i : {0, 1}) error[i] = error_of_waves(energy, model, waves, 6, end, 8 << i, 8, 8, 3);
+        std::printf("model %d: %.3g %.3g\n", static_cast<int>(kind), error[0], error[1]);
+        EXPECT_LT(error[1], 0.01);
+        EXPECT_GT(error[0] / error[1], 2);
+    }
+}
+
+const Sphere wavy{.radius = 1, .modes = {{0.3, 2, 1}, {0.2, 3, 2}}};
+
+// Mean square difference of two nodal velocities, relative to the second.
+double difference(const VectorField& u, const VectorField& v) {
+    return (u - v).norm() / v.norm();
+}
+
+TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
+    // maths 3: with u = 0 the fluid's equation for d_t u is the overdamped one for u. Approached with the mesh, for one
+    // has Taylor-Hood elements and the other a scalar.
+    const double tau = 1e-9;
+    double gap[2];
+    for (int i : {0, 1}) {
+        const CurvedMesh mesh = mesh_of(wavy, icosphere(2 + 2 * i), 3);
+        Motion fluid(mesh, {.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}}, all_terms);
+        Motion overdamped(mesh, {.kind = ModelKind::overdamped, .keeps_volume = {}}, all_terms);
+        fluid.steps(tau, 1), overdamped.steps(tau, 1);
+        gap[i] = difference(fluid.measures().velocity / tau, overdamped.measures().velocity);
+        EXPECT_NEAR(fluid.state.lambda, overdamped.state.lambda, (i ? 0.02 : 0.1) * std::abs(overdamped.state.lambda));
+    }
+    std::printf("acceleration: %.3g %.3g\n", gap[0], gap[1]);
+    EXPECT_GT(std::log2(gap[0] / gap[1]), 1.5);
+    EXPECT_LT(gap[1], 0.05);
+}
+
+TEST(Models, MomentumDecaysByFriction) {
+    // maths 3: momentum and angular momentum fall as exp(-gamma t), whatever the membrane does.
+    const double gamma = 0.8, end = 0.2;
+    double error[2];
+    for (int i : {0, 1}) {
+        Motion motion(mesh_of(wavy, icosphere(2), 3),
+                      {.kind = ModelKind::fluid, .Re = 1, .gamma = gamma, .keeps_volume = {}}, {.k = {0.1, 0, 0.05}});
+        const int n = motion.mesh().size();
+        const Eigen::Vector3d omega(0.3, -0.2, 0.5), translation(0.1, 0.2, -0.3);
+        for (int j = 0; j < n; ++j) {
+            const Eigen::Vector3d u = translation + omega.cross(motion.state.X.col(j));
+            for (int d = 0; d < 3; ++d) motion.state.u[d * n + j] = u[d];
+        }
+        motion.state.u_past = motion.state.u;
+        const MotionMeasures start = motion.measures();
+        motion.until(end, 16 << i);
+        const MotionMeasures now = motion.measures();
+        const double factor = std::exp(-gamma * end);
+        error[i] = std::max((now.momentum - factor * start.momentum).norm() / start.momentum.norm(),
+                            (now.angular_momentum - factor * start.angular_momentum).norm() /
+                                start.angular_momentum.norm());
+    }
+    std::printf("momentum: %.3g %.3g\n", error[0], error[1]);
+    EXPECT_LT(error[1], 1e-3);
+    EXPECT_GT(error[0] / error[1], 3);
+}
+
+TEST(Models, RotatingTubeStaysStraight) {
+    // maths 5: lambda0 = b0 + p0/R + omega^2 R. On a straight tube the pressure stands for lambda; without friction the
+    // rotation goes on.
+    const double R = 0.8, omega = 0.7;
+    const Bending energy{.k = {0.5, 0, 0.1}, .H0 = -0.4};
+    Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4),
+                  {.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = false}, energy);
+    const int n = motion.mesh().size();
+    for (int j = 0; j < n; ++j) {
+        motion.state.u[j] = -omega * motion.state.X(1, j);
+        motion.state.u[n + j] = omega * motion.state.X(0, j);
+    }
+    motion.state.u_past = motion.state.u;
+    motion.until(0.5, 40);
+    const MotionMeasures m = motion.measures();
+    const double b0 = theory::radius_rate(theory::UniformTube{energy, R, 0});
+    std::printf("rotating: p %.8g..%.8g, exact %.8g, r %.3g %.3g, spin %.3g\n", motion.state.p.minCoeff(), motion.state.p.maxCoeff(),
+                -(b0 + omega * omega * R) * R, m.r_min - R, m.r_max - R, m.angular_momentum.z() / (omega * 2 * pi * R * R * R * 2) - 1);
+    EXPECT_NEAR(m.r_min, R, 1e-5);
+    EXPECT_NEAR(m.r_max, R, 1e-5);
+    EXPECT_NEAR(m.angular_momentum.z(), omega * 2 * pi * R * R * R * 2, 1e-3);
+    for (const double p : {motion.state.p.minCoeff(), motion.state.p.maxCoeff()})
+        EXPECT_NEAR(motion.state.lambda, b0 + p / R + omega * omega * R, 2e-3 * std::abs(b0));
+}
+
+TEST(Models, StokesFlowWithoutFrictionDoesNotDrift) {
+    // Nothing resists rigid motions: they are held at rest.
+    Motion motion(mesh_of(wavy, icosphere(2), 3), {.kind = ModelKind::stokes, .Re = 1, .gamma = 0, .keeps_volume = {}},
+                  {.k = {0.1, 0, 0.05}});
+    for (int i = 0; i < 3; ++i) {
+        motion.steps(1e-3, 1);
+        const MotionMeasures m = motion.measures();
+        // Against the integrals of |u| and |x| |u|, both about speed times area. The step holds them on the surface it
+        // expects.
+        const double size = m.speed * m.bending.area;
+        std::printf("stokes: %.3g %.3g speed %.3g\n", m.momentum.norm() / size, m.angular_momentum.norm() / size, m.speed);
+        EXPECT_LT(m.momentum.norm(), 1e-3 * size);
+        EXPECT_LT(m.angular_momentum.norm(), 1e-3 * size);
+        EXPECT_GT(m.speed, 0);
+    }
+}
+
+}  // namespace
+}  // namespace tubule::surface3d
