@@ -149,6 +149,72 @@ class Kill(ProgramTest):
         self.assert_ends_like_the_undisturbed_run()
 
 
+# A surface that moves, a second or so, in steps as given: 200 of them and a frame at every fifth.
+SURFACE = """tier = "surface3d"
+[energy]
+k20 = 0.2
+k42 = 0.05
+[model]
+kind = "fluid"
+[shape]
+kind = "sphere"
+radius = 1.0
+mode = [{amplitude = 0.2, l = 2, m = 1}]
+[discretisation]
+elements = 80
+order = 2
+step = 1e-3
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.2
+output = %s
+""" % [i / 200 for i in range(1, 40)]
+
+
+class Surface(ProgramTest):
+    """The same of tier surface3d. All steps are given, so that a resumed run takes those of an undisturbed one."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("case.toml", SURFACE)
+        self.tubule("run", self.case, "-o", "whole.hdf")
+        self.whole = series(self.folder / "whole.hdf")
+
+    def assert_ends_like_the_undisturbed_run(self):
+        ends = series(self.result)
+        self.assertEqual(about(self.result)["stop"], "finished")
+        self.assertEqual(list(ends["time"]), list(self.whole["time"]))
+        for name in ("energy", "kinetic_energy", "identity_defect", "area", "volume", "r_min", "r_max"):
+            # What a step leaves of its system: rounding, and GMRES to 1e-11.
+            self.assertLess(abs(ends[name] - self.whole[name]).max(), 1e-7, name)
+
+    def disturbed(self, number, rows):
+        """Killed by a signal after so many rows; the rows it had written."""
+        process = self.start("run", self.case, "--resume", "--quiet")
+        self.addCleanup(process.kill)
+        while not self.result.exists() or len(self.shown(self.result)[1]) < rows:
+            self.assertIsNone(process.poll(), "the run ended before it could be disturbed")
+            time.sleep(0.01)
+        process.send_signal(number)
+        process.communicate()
+        self.assertNotEqual(process.returncode, 0)
+        return self.shown(self.result)[1]
+
+    def test_kills_and_signals_lose_nothing(self):
+        for number, rows in ((signal.SIGKILL, 20), (signal.SIGTERM, 60), (signal.SIGKILL, 100)):
+            written = self.disturbed(number, rows)
+            self.assertLess(len(written), len(self.whole["time"]))
+            energy = list(self.shown(self.result)[0]).index("energy")
+            for mine, its in zip(written, self.whole["energy"]):
+                self.assertAlmostEqual(float(mine[energy]), its, delta=1e-7)
+        self.tubule("run", self.case, "--resume", "--quiet")
+        self.assert_ends_like_the_undisturbed_run()
+        with h5py.File(self.result) as file:
+            self.assertEqual(len(file["frames"]), 41)  # the start, 39 outputs, the end
+            self.assertEqual(len(file["meshes"]), 1)
+
+
 class Resume(ProgramTest):
     def test_a_complete_result_is_left_alone(self):
         self.tubule("run", self.case)

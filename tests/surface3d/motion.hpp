@@ -60,12 +60,12 @@ double integral(const CurvedMesh& mesh, const F& f) {
     return sum;
 }
 
-// a of r = R + a cos(2 pi n z/length + m theta), small.
-inline double tube_wave(const CurvedMesh& mesh, int n, int m) {
+// a of r = R + a cos(2 pi n z/length + m theta + phase), small.
+inline double tube_wave(const CurvedMesh& mesh, int n, int m, double phase = 0) {
     const auto r = [](const Eigen::Vector3d& x) { return x.head<2>().norm(); };
     const double area = integral(mesh, [](const auto&) { return 1.0; }), mean = integral(mesh, r) / area;
     return 2 / area * integral(mesh, [&](const Eigen::Vector3d& x) {
-               return (r(x) - mean) * std::cos(2 * pi * n * x.z() / mesh.period + m * std::atan2(x.y(), x.x()));
+               return (r(x) - mean) * std::cos(2 * pi * n * x.z() / mesh.period + m * std::atan2(x.y(), x.x()) + phase);
            });
 }
 

