@@ -41,7 +41,9 @@ TEST(SphereFlow, RadiusFollowsItsEquation) {
     for (const auto& [second_order, least, most] : {std::tuple{true, 3.3, 5e-4}, {false, 1.8, 1e-2}}) {
         double error[2];
         for (int i : {0, 1}) {
-            Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, {.second_order = second_order});
+            MotionControl control;
+            control.second_order = second_order;
+            Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, control);
             motion.until(end, 10 << i);
             error[i] = std::abs(radius(motion.mesh()) - exact);
         }
