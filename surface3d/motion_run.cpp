@@ -83,6 +83,10 @@ private:
     std::vector<std::array<double, 2>> points_;
 };
 
+bool ended_early(Stop reason) {
+    return reason == Stop::interrupted || reason == Stop::time_limit;
+}
+
 struct Settings {
     int elements = first_triangles;
     double tolerance = 1e-4;
@@ -438,7 +442,10 @@ void MotionAttempt::go() {
     summary.reference_energy = memory_.reference_energy;
     if (!stepper_) return;
     write_row();
-    write_frame();
+    if (!ended_early(stop->reason))
+        write_frame();
+    else if (recorded_)
+        watch_.checkpoint(record());  // what a resumed run goes on from is no frame of its own
     const int nodes = static_cast<int>(state_.X.cols());
     summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", steps_, rejected_,
                                  summary.elements, element_order(case_), nodes);
@@ -515,10 +522,6 @@ void accept(RunSummary& s, const Case& c, bool chosen) {
     s.warnings.pop_back();
 }
 
-bool ended_early(Stop reason) {
-    return reason == Stop::interrupted || reason == Stop::time_limit;
-}
-
 }  // namespace
 
 std::vector<std::string> motion_series_names(const Case&) {
@@ -572,9 +575,12 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         MotionAttempt coarse(lower, observer, false, with, nullptr, started);
         coarse.begin();
         coarse.go();
-        if (ended_early(coarse.summary.stop.reason)) {  // nothing is known of the error yet
-            describe(coarse.summary, c, coarse.summary.reference_energy, 1);
-            return coarse.summary;
+        if (ended_early(coarse.summary.stop.reason)) {
+            MotionAttempt first(c, observer, true, settings, nullptr, started);  // ends as soon: a step to go on from
+            restart ? first.resume(*restart) : first.begin();
+            first.go();
+            describe(first.summary, c, first.summary.reference_energy, 1);  // nothing is known of the error yet
+            return first.summary;
         }
         trace = coarse.trace;
         coarse_stop = coarse.summary.stop;
