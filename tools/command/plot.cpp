@@ -5,6 +5,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -22,15 +24,24 @@ namespace tubule {
 namespace {
 
 struct PlotOptions {
-    std::vector<std::string> results, outputs;
+    std::vector<std::string> results, outputs, colours;
     std::vector<double> times;
-    std::string kind = "all";
+    std::string kind = "all", plane = "z=0";
 };
+
+bool is_plane(const std::string& text) {
+    if (text.size() < 3 || text.find_first_of("xyz") != 0 || text[1] != '=') return false;
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data() + 2, text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
 
 std::vector<std::string> script_arguments(const PlotOptions& options) {
     std::vector<std::string> arguments = plot_command("plot", "plot.py");
     arguments.push_back("--kind=" + options.kind);
+    arguments.push_back("--plane=" + options.plane);
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
+    if (!options.colours.empty()) arguments.push_back(fmt::format("--colour={}", fmt::join(options.colours, ",")));
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
     for_each_bending_term([&](std::size_t, const auto& term) {
         arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
@@ -68,7 +79,7 @@ int plot(const PlotOptions& options) {
 
 void add_plot(CLI::App& app, int& exit_status) {
     CLI::App* command =
-        app.add_subcommand("plot", "Draw profiles and surfaces at the output times, and energies over time");
+        app.add_subcommand("plot", "Draw shapes and cuts through them at the output times, and energies over time");
     const auto options = std::make_shared<PlotOptions>();
     command->add_option("RESULT", options->results, "result files; several are labelled by what differs in their cases")
         ->required();
@@ -80,8 +91,18 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->add_option("--times", options->times, "times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
         ->delimiter(',')
         ->allow_extra_args(false);
-    command->add_option("--kind", options->kind, "what to draw: profiles, surface, energy, all")
-        ->check(CLI::IsMember({"profiles", "surface", "energy", "all"}))
+    command->add_option("--kind", options->kind, "what to draw: profiles, surface, cuts, energy, balance, all")
+        ->check(CLI::IsMember({"profiles", "surface", "cuts", "energy", "balance", "all"}))
+        ->capture_default_str();
+    command
+        ->add_option("--colour", options->colours,
+                     "quantities to colour surfaces by: u_n (with arrows for the flow along them), H, K, p, or several "
+                     "as in u_n,H (default: u_n of surfaces that move, else H,K)")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"u_n", "H", "K", "p"}));
+    command->add_option("--plane", options->plane, "of the cuts through surfaces: x, y or z = number")
+        ->check([](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }

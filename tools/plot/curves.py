@@ -10,17 +10,13 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
 
 from colours import draw_bar
+from flow import LONGEST_ARROW, ROUNDING, SHORTEST_ARROW, STILL, SYMBOLS, VELOCITY, arrow_style, draw_arrow_key
 from labels import power, symbol
 from tubes import ProfilePanel, caption
 
 BAND, OUTLINE = 2.8, 3.8  # points: the coloured line and what shows around it
 POINTS_PER_INCH, MIN_POINTS = 150, 200  # along a profile
-ARROW_SPACING, LONGEST_ARROW, SHORTEST_ARROW = 0.19, 0.17, 0.035  # inches along a profile
-ARROW_DISTANCE = 0.075  # inches outside of it
-STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
-ROUNDING = 1e-6  # of lengths per unit of time: the speed of a start at rest
-VELOCITY = "RdBu_r"
-SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
+ARROW_SPACING, ARROW_DISTANCE = 0.19, 0.075  # inches along a profile, and outside of it
 
 
 class Section:
@@ -56,13 +52,6 @@ def arrows(section, u_t):
         np.clip(np.linspace(middle - length / 2, middle + length / 2, 9), 0, section.length)
         for middle, length in zip(middles[seen], lengths[seen])
     ]
-
-
-def arrow_style(length):
-    """Of an arrow that long in inches: short ones have small heads."""
-    head = 2.6 * min(1.0, 0.25 + length / LONGEST_ARROW)
-    style = f"-|>,head_length={head},head_width={head / 2}"
-    return dict(arrowstyle=style, mutation_scale=1, color="0.1", linewidth=0.8, shrinkA=0, shrinkB=0)
 
 
 class CurvePanel(ProfilePanel):
@@ -135,10 +124,5 @@ class CurvePanel(ProfilePanel):
         draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
                  f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the shape, > 0: outward")  # fmt: skip
         if flows:
-            x, y = (left + width + 0.05) * figure.get_figwidth(), bottom + 0.42
-            tall, wide = figure.get_figheight(), figure.get_figwidth()
-            ends = (x / wide, y / tall), ((x + LONGEST_ARROW) / wide, y / tall)
-            style = arrow_style(LONGEST_ARROW)
-            figure.add_artist(FancyArrowPatch(*ends, transform=figure.transFigure, **style))
             words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the shape"
-            figure.text((x + LONGEST_ARROW + 0.08) / wide, y / tall, words, va="center", fontsize=8, linespacing=1.3)
+            draw_arrow_key(figure, left + width + 0.05, bottom, words)

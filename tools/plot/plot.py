@@ -1,13 +1,23 @@
 #!/usr/bin/python3
-"""Draws results of tubule: profiles and surfaces at the output times, energies over time. See `tubule plot --help`."""
+"""Draws results of tubule: shapes and cuts at the output times, energies over time. See `tubule plot --help`."""
 
 import argparse
 import os
+import re
 import sys
 from operator import attrgetter
 
 EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
+COLOURS = ("u_n", "H", "K", "p")
+NOTHING = {
+    "profiles": "no profiles",
+    "surface": "no surfaces",
+    "cuts": "no surfaces",
+    "energy": "no energy series",
+    "balance": "no dissipation over time",
+    "all": "neither frames nor an energy series",
+}
 
 
 def arguments():
@@ -15,64 +25,101 @@ def arguments():
     parser.add_argument("results", nargs="+")
     parser.add_argument("-o", "--output", action="append", default=[])
     parser.add_argument("--times", default="")
-    parser.add_argument("--kind", choices=("profiles", "surface", "energy", "all"), default="all")
+    parser.add_argument("--colour", default="", help="quantities to colour surfaces by: u_n,H,K,p")
+    parser.add_argument("--plane", default="z=0", help="of the cuts")
+    parser.add_argument("--kind", choices=NOTHING, default="all")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
 
 
-def draw(paths, outputs, times, kind, term_labels):
+class Page:
+    """What there is to draw, in panels: of shapes first, then of series with the times of the shapes marked."""
+
+    def __init__(self, results, labels, options):
+        self.results, self.labels, self.options = results, labels, options
+        self.marked = []
+
+    def wants(self, *kinds):
+        return self.options.kind in (*kinds, "all")
+
+    def profiles(self):
+        from curves import CurvePanel
+        from tubes import TubePanel, choose_columns
+
+        if not any(r.frames for r in self.results):
+            return
+        columns = choose_columns(self.results, self.options.times)
+        self.marked = [column.time for column in columns if column.time is not None]
+        if self.wants("profiles"):
+            shown = [frame for column in columns for frame in column.cells if frame]
+            graphs = all(frame.is_graph and frame.u_t is None for frame in shown)
+            yield (TubePanel if graphs else CurvePanel)(self.results, self.labels, columns)
+
+    def surfaces(self):
+        from cuts import CutPanel
+        from surfaces import SurfacePanel, choose_colours
+        from tubes import choose_columns
+
+        shown = [(r, label) for r, label in zip(self.results, self.labels) if r.surfaces]
+        if not shown:
+            return
+        results, labels = zip(*shown)
+        columns = choose_columns(results, self.options.times, attrgetter("surfaces"))
+        self.marked = self.marked or [column.time for column in columns if column.time is not None]
+        if self.wants("surface"):
+            yield SurfacePanel(results, labels, columns, choose_colours(results, self.options.colour))
+        if self.options.kind == "cuts" or (self.options.kind == "all" and all(r.moves for r in results)):
+            yield CutPanel(results, labels, columns, self.options.plane)
+
+    def series(self):
+        from balance import BalancePanel, has_balance
+        from energy import EnergyPanel
+
+        everything = self.options.kind == "all"
+        if self.wants("energy"):
+            # A surface that was only looked at has one row, which is no curve; so has a single stationary shape.
+            least = [2 if everything and (r.surfaces or r.is_equilibrium) else 1 for r in self.results]
+            shown = [i for i, r in enumerate(self.results) if r.has_energy(least[i])]
+            if shown:
+                yield EnergyPanel(*self._of(shown), self.marked, self.options.terms)
+        if self.wants("balance"):
+            shown = [i for i, r in enumerate(self.results) if has_balance(r) and (r.moves or not everything)]
+            if shown:
+                yield BalancePanel(*self._of(shown), self.marked)
+
+    def _of(self, shown):
+        return [self.results[i] for i in shown], [self.labels[i] for i in shown]
+
+    def panels(self):
+        return [*self.profiles(), *self.surfaces(), *self.series()]
+
+
+def draw(paths, outputs, options):
     """Reads all, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
     from matplotlib.figure import Figure
 
     import style
-    from curves import CurvePanel
-    from energy import EnergyPanel
     from labels import row_labels
     from results import BadInput, read_result
-    from surfaces import SurfacePanel
-    from tubes import TubePanel, choose_columns
 
     style.check_outputs(outputs)
     results = [read_result(path) for path in paths]
     names = [os.path.splitext(os.path.basename(path))[0] for path in paths]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
-
-    tubes = surfaces = energy = None
-    profile_columns = choose_columns(results, times) if any(r.frames for r in results) else []
-    if kind in ("profiles", "all") and profile_columns:
-        shown_frames = [frame for column in profile_columns for frame in column.cells if frame]
-        graphs = all(frame.is_graph and frame.u_t is None for frame in shown_frames)
-        tubes = (TubePanel if graphs else CurvePanel)(results, labels, profile_columns)
-    shown = [i for i, r in enumerate(results) if r.surfaces]
-    surface_columns = choose_columns([results[i] for i in shown], times, attrgetter("surfaces")) if shown else []
-    if kind in ("surface", "all") and surface_columns:
-        surfaces = SurfacePanel([results[i] for i in shown], [labels[i] for i in shown], surface_columns)
-    # A surface that was only looked at has one row, which is no curve; so has a single stationary shape.
-    least = [2 if (r.surfaces or r.is_equilibrium) and kind == "all" else 1 for r in results]
-    drawable = [i for i, r in enumerate(results) if r.has_energy(least[i])]
-    if kind in ("energy", "all") and drawable:
-        marked = [column.time for column in profile_columns or surface_columns if column.time is not None]
-        energy = EnergyPanel([results[i] for i in drawable], [labels[i] for i in drawable], marked, term_labels)
-    panels = [panel for panel in (tubes, surfaces, energy) if panel]
+    panels = Page(results, labels, options).panels()
     if not panels:
-        wanted = {
-            "profiles": "no profiles",
-            "surface": "no surfaces",
-            "energy": "no energy series",
-            "all": "neither frames nor an energy series",
-        }
-        raise BadInput(f"{', '.join(paths)}: {wanted[kind]} to draw")
+        raise BadInput(f"{', '.join(paths)}: {NOTHING[options.kind]} to draw")
 
     bars = 0.62
     title = 0.2 if len(results) == 1 else 0.0
-    coloured = [panel for panel in (tubes, surfaces) if panel]
+    coloured = [panel for panel in panels if hasattr(panel, "draw_colour_bars")]
     tall = title + sum(panel.height for panel in panels) + bars * len(coloured) + 0.1
     figure = Figure(figsize=(style.WIDTH, tall))
     top = figure.get_figheight() - 0.05
     if title:
         figure.text(0.5, top / figure.get_figheight(), ", ".join(labels[0]), ha="center", va="top", fontsize=9)
         top -= title
-    for letter, panel in zip("abc", panels):
+    for letter, panel in zip("abcde", panels):
         top -= panel.height
         panel.draw(figure, top)
         if len(panels) > 1:
@@ -83,14 +130,32 @@ def draw(paths, outputs, times, kind, term_labels):
     style.save(figure, outputs)
 
 
+def read_arguments(options):
+    """Puts values in place of texts; ValueError says what is wrong."""
+    try:
+        options.times = [float(time) for time in options.times.split(",") if time]
+    except ValueError:
+        raise ValueError(f"--times: '{options.times}' is not a list of numbers t1,t2,...") from None
+    options.colour = [name for name in options.colour.split(",") if name]
+    for name in options.colour:
+        if name not in COLOURS:
+            raise ValueError(f"--colour: '{name}' is none of {', '.join(COLOURS)}")
+    plane = re.fullmatch(r"([xyz])=([-+.\deE]+)", options.plane)
+    try:
+        options.plane = plane[1], float(plane[2])
+    except (TypeError, ValueError):
+        raise ValueError(f"--plane: '{options.plane}' is not x, y or z = number, such as z=0") from None
+    options.terms = dict(term.split("=", 1) for term in options.term)
+
+
 def main():
     options = arguments()
     base = os.path.splitext(options.results[0])[0]
     outputs = options.output or [base + ".png", base + ".svg"]
     try:
-        times = [float(time) for time in options.times.split(",") if time]
-    except ValueError:
-        print(f"tubule plot: --times: '{options.times}' is not a list of numbers t1,t2,...", file=sys.stderr)
+        read_arguments(options)
+    except ValueError as error:
+        print(f"tubule plot: {error}", file=sys.stderr)
         return EXIT_BAD_INPUT
     for module, package in DEBIAN_PACKAGES.items():
         try:
@@ -103,7 +168,7 @@ def main():
     from results import BadInput
 
     try:
-        draw(options.results, outputs, times, options.kind, dict(term.split("=", 1) for term in options.term))
+        draw(options.results, outputs, options)
     except BadInput as error:
         print(error, file=sys.stderr)
         return EXIT_BAD_INPUT

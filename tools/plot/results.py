@@ -57,6 +57,19 @@ class Surface:
     normal: np.ndarray
     H: np.ndarray
     K: np.ndarray
+    u: np.ndarray | None = None  # of a surface that moves: velocity, three components,
+    u_n: np.ndarray | None = None  # outward,
+    p: np.ndarray | None = None  # and pressure, where there is one
+
+    @property
+    def size(self):
+        """Diagonal of the box around it."""
+        return float(np.linalg.norm(np.ptp(self.points.reshape(-1, 3), axis=0)))
+
+    @property
+    def speed(self):
+        """The largest there is; 0 at rest."""
+        return 0.0 if self.u is None else float(np.linalg.norm(self.u, axis=-1).max())
 
 
 @dataclass
@@ -75,6 +88,11 @@ class Result:
     @property
     def H0(self):
         return float(flatten(self.case).get("energy.H0", 0.0))
+
+    @property
+    def moves(self):
+        """A moving surface."""
+        return any(surface.u is not None for surface in self.surfaces)
 
     @property
     def is_equilibrium(self):
@@ -193,8 +211,15 @@ def _surface(path, name, record, mesh):
     order = int(mesh.attrs["order"])
     cells = np.asarray(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     (points,) = _arrays(path, name, record, ("Points",))
-    H, K, normal = _arrays(path, name, record["PointData"], ("H", "K", "normal"))
-    if points.shape != normal.shape or any(values.shape != points.shape[:1] for values in (H, K)):
-        raise BadInput(f"{path}: frame {name}: Points, normal, H, K must have one row a point")
-    closed = mesh.attrs["period"] == 0
-    return Surface(float(record.attrs["time"]), order, closed, points[cells], normal[cells], H[cells], K[cells])
+    data = record["PointData"]
+    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p") if key in data)]
+    arrays = dict(zip(keys, _arrays(path, name, data, keys)))
+    vectors = [array for key, array in arrays.items() if key in ("normal", "u")]
+    numbers = [array for key, array in arrays.items() if key not in ("normal", "u")]
+    if any(a.shape != points.shape for a in vectors) or any(a.shape != points.shape[:1] for a in numbers):
+        names = ", ".join(["Points", "normal", "H", "K", *keys[3:]])
+        raise BadInput(f"{path}: frame {name}: {names} must have one row a point")
+    if ("u" in arrays) != ("u_n" in arrays):
+        raise BadInput(f"{path}: frame {name}: of u and u_n it has only one")
+    of_cells = {key: array[cells] for key, array in arrays.items()}
+    return Surface(float(record.attrs["time"]), order, mesh.attrs["period"] == 0, points[cells], **of_cells)

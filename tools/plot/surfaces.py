@@ -1,11 +1,16 @@
-"""Panel of curved surfaces: each shown twice, coloured by H and by K. Side by side where there is one time; else one
-column a time, H above K."""
+"""Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K or pressure.
+One quantity beside the other where there is one time; else one column a time, the quantities above each other."""
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
+import flow
 import raster
-from colours import curvature_colours, draw_bars
-from labels import number, wrapped
+from colours import Colours, colour_scale, curvature_colours, draw_bar
+from labels import number, power, wrapped
+from results import BadInput
 from style import DPI, WIDTH, time_name, time_text
 from tubes import caption
 
@@ -13,13 +18,87 @@ MAX_HEIGHT = 5.4  # inches of all rows together
 MAX_SIZE = 2.7  # inches of one surface
 GAP, HEADER, LABEL_WIDTH, RIM = 0.14, 0.24, 22, 0.02  # RIM: around each surface
 SCALE_BAR = 0.35  # inches right of the last column
+SLOTS = {1: ((0.29, 0.42),), 2: ((0.12, 0.34), (0.56, 0.34))}  # left end and width of colour bars, parts of the page
+
+
+def slots(count):
+    """Room for that many colour bars beside each other."""
+    return SLOTS.get(count) or tuple((0.05 + 0.95 * i / count, 0.95 / count - 0.06) for i in range(count))
 
 
 def _areas(surface):
-    """Area that belongs to each value, near enough for a colour scale."""
+    """Area that belongs to each value, near enough for a scale of colours."""
     a, b, c = (surface.points[:, corner] for corner in range(3))
     cell = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2 + 1e-300
     return np.broadcast_to(cell[:, None] / surface.H.shape[1], surface.H.shape)
+
+
+def choose_colours(results, wanted):
+    """Names of the quantities to colour by: the wanted ones, else what moves by its normal velocity, else H and K."""
+    if not wanted:
+        return ["u_n"] if all(result.moves for result in results) else ["H", "K"]
+    for name in wanted:
+        for result in results:
+            if any(getattr(surface, name) is None for surface in result.surfaces):
+                raise BadInput(f"{result.path}: not all of its frames hold {name} to colour by")
+    return list(dict.fromkeys(wanted))
+
+
+class Motion:
+    """How fast the surfaces of one result are, for what is drawn relative to the largest value on each shape."""
+
+    def __init__(self, result):
+        self.fastest = max(surface.speed for surface in result.surfaces)
+
+    def still(self, surface):
+        return surface.speed <= max(flow.STILL * self.fastest, flow.ROUNDING * surface.size)
+
+    def u_n(self, surface):
+        """Its largest value; 0 where nothing moves."""
+        return 0.0 if self.still(surface) else float(np.abs(surface.u_n).max())
+
+    def u_t(self, surface):
+        """Likewise, 0 also where all velocity is normal."""
+        if self.still(surface):
+            return 0.0
+        largest = float(np.linalg.norm(flow.tangential(surface.u, surface.normal), axis=-1).max())
+        return largest if largest > flow.NORMAL_ONLY * surface.speed else 0.0
+
+    def words(self, surface):
+        """For below the picture."""
+        found = {"u_n": self.u_n(surface), "u_t": self.u_t(surface)}
+        lines = [f"|{flow.SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value]
+        return "\n".join(lines) or "at rest"
+
+
+class Quantity:
+    """What a surface is coloured by: numbers at the nodes, and the colours of numbers in between."""
+
+    def __init__(self, name, symbol, colours):
+        self.name, self.symbol, self.colours = name, symbol, colours
+
+    def at_nodes(self, surface, motion):
+        values = getattr(surface, self.name)
+        if self.name != "u_n":
+            return values
+        return values / (motion.u_n(surface) or np.inf)  # at rest: white
+
+
+def quantities(names, results, surfaces):
+    """Scales of colours that all surfaces share; of the normal velocity relative to its largest value on each."""
+    areas = [_areas(surface).ravel() for surface in surfaces]
+    u_n = flow.SYMBOLS["u_n"]
+    label = f"normal velocity {u_n} / max |{u_n}| of the shape, > 0: outward"
+    found = {"u_n": Quantity("u_n", u_n, Colours(flow.VELOCITY, Normalize(-1, 1), "neither", label))}
+    for name, colours in zip("HK", curvature_colours(results, surfaces, areas)):
+        colours.label = colours.label.format("")
+        found[name] = Quantity(name, name, colours)
+    if "p" in names:
+        values = [surface.p.ravel() for surface in surfaces]
+        mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
+        label = f"pressure p, white: its mean {power(mean, 3)}"
+        found["p"] = Quantity("p", "p", Colours("PRGn", *colour_scale(values, areas, mean), label))
+    return [found[name] for name in names]
 
 
 class _Size:
@@ -33,7 +112,7 @@ class _Size:
 class SurfacePanel:
     """Sizes everything in inches first, so that the figure can be made to fit; then draws."""
 
-    def __init__(self, results, labels, columns):
+    def __init__(self, results, labels, columns, names):
         self.columns, self.view = columns, raster.View()
         lone = len(results) == 1  # its label is the title of the picture
         self.labels = [""] if lone else [wrapped(label, LABEL_WIDTH) for label in labels]
@@ -41,13 +120,17 @@ class SurfacePanel:
         left = 0.3 + 0.062 * max(map(len, lines))
         self.beside = len(columns) == 1  # H beside K, not above
         shown = [surface for column in columns for surface in column.cells if surface]
-        self.H, self.K = curvature_colours(results, shown, [_areas(surface).ravel() for surface in shown])
+        self.quantities = quantities(names, results, shown)
+        self.motions = [Motion(result) for result in results]
+        self.velocity = "u_n" in names
+        motions = [m for column in columns for m, surface in zip(self.motions, column.cells) if surface]
+        self.arrows = self.velocity and any(motion.u_t(surface) for motion, surface in zip(motions, shown))
         self.sizes = [[_Size(surface, self.view) for surface in column.cells] for column in columns]
 
-        widths = [max(size.width for size in column) for column in self.sizes] * (2 if self.beside else 1)
+        widths = [max(size.width for size in column) for column in self.sizes] * (len(names) if self.beside else 1)
         heights = [max(size.height for size in row) for row in zip(*self.sizes)]
-        pictures = 1 if self.beside else 2  # above each other, of every result
-        self.captions = [[caption(column, row) for column in columns] for row in range(len(results))]
+        pictures = 1 if self.beside else len(names)  # above each other, of every result
+        self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
         room_x = WIDTH - left - SCALE_BAR - GAP * len(widths)
         room_y = MAX_HEIGHT - sum(below) - pictures * GAP * len(results)
@@ -58,7 +141,7 @@ class SurfacePanel:
         slack = np.clip((room_x + GAP * len(widths) - sum(pitch)) / len(widths), 0, 0.6)
         self.centres = left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
         if lone and self.beside:  # above their colour bars
-            self.centres = np.array([0.29, 0.73]) * WIDTH
+            self.centres = WIDTH * np.array([left + width / 2 for left, width in slots(len(names))])
         elif lone:  # in the middle of the page
             ends = self.centres[0] - pitch[0] / 2, self.centres[-1] + pitch[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(ends)) / 2
@@ -77,6 +160,12 @@ class SurfacePanel:
             self.height += caption_room
         self.pictures, self.heights = pictures, heights
 
+    def _words(self, column, row):
+        """Below the pictures of that row and column."""
+        surface = column.cells[row]
+        moving = [self.motions[row].words(surface)] if self.velocity and surface else []
+        return "\n".join(words for words in (caption(column, row), *moving) if words)
+
     def draw(self, figure, bottom):
         """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
         width, height = figure.get_size_inches()
@@ -93,20 +182,23 @@ class SurfacePanel:
         for row, label in enumerate(self.labels):
             rows = self.middles[row * self.pictures : (row + 1) * self.pictures]
             axes.text(0.1, self.top - np.mean(rows), label, ha="left", va="center", linespacing=1.25)
-        if not self.beside:
-            for middle, letter in zip(self.middles, "HK" * len(self.labels)):
-                axes.text(self.left, self.top - middle, letter, ha="right", va="center", style="italic")
+        if not self.beside and len(self.quantities) > 1:
+            for middle, quantity in zip(self.middles, self.quantities * len(self.labels)):
+                axes.text(self.left, self.top - middle, quantity.symbol, ha="right", va="center", style="italic")
         self._draw_scale_bar(axes)
 
-    def _draw_surface(self, axes, surface, row, index):
-        size = self.sizes[index][row]
+    def _samples(self, surface, row, size):
+        """The surface as samples of a picture just large enough: the quantities, then the velocity in the view."""
         per_pixel = self.scale * DPI  # pixels a unit of length
         wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * DPI)) for extent in (size.width, size.height))
         rim = (np.array([wide, tall]) / per_pixel - (size.width, size.height)) / 2
-        samples = raster.sample(
+        fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]
+        if self.arrows:
+            fields.append(surface.u @ self.view.axes)
+        return raster.sample(
             surface.points,
             surface.normal,
-            np.stack([surface.H, surface.K], axis=-1),
+            np.concatenate(fields, axis=-1),
             surface.order,
             surface.closed,
             self.view,
@@ -115,11 +207,15 @@ class SurfacePanel:
             wide * raster.OVERSAMPLING,
             tall * raster.OVERSAMPLING,
         )
+
+    def _draw_surface(self, axes, surface, row, index):
+        samples = self._samples(surface, row, self.sizes[index][row])
         there = np.isfinite(samples.depth)
-        for picture, colours in enumerate((self.H, self.K)):
+        tall, wide = (extent // raster.OVERSAMPLING for extent in samples.shape)
+        for picture, quantity in enumerate(self.quantities):
             x = self.centres[picture if self.beside else index]
             y = self.top - self.middles[row * self.pictures + (0 if self.beside else picture)]
-            image = raster.shaded(samples, colours.rgb(samples.values[there, picture]))
+            image = raster.shaded(samples, quantity.colours.rgb(samples.values[there, picture]))
             # On whole pixels, so that nothing is drawn in between.
             left, low = round(x * DPI - wide / 2) / DPI, round(y * DPI - tall / 2) / DPI
             axes.imshow(
@@ -129,6 +225,10 @@ class SurfacePanel:
                 aspect="auto",
                 zorder=2,
             )
+            u_t = self.motions[row].u_t(surface) if quantity.name == "u_n" else 0
+            if u_t:
+                per_inch, velocity = DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
+                flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / DPI, per_inch)
         words = self.captions[row][index]
         if words:
             below = y - self.scale * self.heights[row] / 2 - 0.05
@@ -144,5 +244,12 @@ class SurfacePanel:
         axes.text(x + 0.05, y + self.scale * bar / 2, number(bar), ha="left", va="center", fontsize=7)
 
     def draw_colour_bars(self, figure, bottom):
-        """Two colour bars in the 0.5 inches above `bottom`."""
-        draw_bars(figure, bottom, self.H, self.K)
+        """A colour bar for each quantity, and what the arrows mean, in the 0.5 inches above `bottom`."""
+        room = slots(len(self.quantities) + self.arrows)
+        for (left, width), quantity in zip(room, self.quantities):
+            colours = quantity.colours
+            label = colours.label if len(room) < 3 or quantity.name == "p" else colours.label.split(" / ")[0]
+            draw_bar(figure, bottom, left, width, ScalarMappable(colours.norm, plt.get_cmap(colours.map)), label, colours.extend)
+        if self.arrows:
+            u_t = flow.SYMBOLS["u_t"]
+            flow.draw_arrow_key(figure, room[-1][0], bottom, f"{u_t} along the surface; this\nlong: max |{u_t}| of the shape")

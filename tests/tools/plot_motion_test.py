@@ -1,0 +1,260 @@
+#!/usr/bin/python3
+"""Pictures of moving surfaces: the numbers that are drawn, on shapes and flows known exactly, and whole pages.
+
+    plot_motion_test.py
+"""
+
+import shutil
+import unittest
+import unittest.mock
+
+import h5py
+import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
+from plot_surface_test import octasphere
+from plot_test import InFolder
+
+import balance  # found by way of plot_test
+import cuts
+import flow
+import raster
+import results
+import style
+import surfaces
+from tubes import Column
+
+OMEGA = np.array([0.0, 0.0, 3.0])
+
+
+def refined_sphere(order, halvings=2):
+    """Nodes [8 * 4^halvings cells, n, 3] on the unit sphere."""
+    flat = octasphere(1)
+    for _ in range(halvings):
+        a, b, c = (flat[:, i] for i in range(3))
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        flat = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    nodes = raster.lattice(order) / order @ flat
+    return nodes / np.linalg.norm(nodes, axis=-1, keepdims=True)
+
+
+def moving_sphere(time, radius=1.0):
+    """Turns about z and grows at the poles, twice as fast at time 2 as at 1: u = t (OMEGA x X/R + 2 z^2/R^2 n)."""
+    n = refined_sphere(4)
+    u_n = 2 * time * n[..., 2] ** 2
+    data = {"H": np.full(u_n.shape, -2 / radius), "K": np.full(u_n.shape, radius**-2.0), "u_n": u_n}
+    u = time * np.cross(OMEGA, n) + u_n[..., None] * n
+    return results.Surface(float(time), 4, True, radius * n, n, **data, u=u, p=5 + n[..., 0])
+
+
+def write(path, times=(0, 1, 2), pressure=True, sets=()):
+    """A result with moving_sphere() as its frames; energy 10 + exp(-t), dissipation exp(-t), defect 1e-3 t (t - 1)."""
+    with h5py.File(path, "w") as file:
+        text = h5py.string_dtype()
+        case = file.create_dataset("case", data='tier = "surface3d"\n[about]\ntitle = "A sphere"\n', dtype=text)
+        case.attrs.create("set", np.array(["model.kind=fluid", *sets], dtype=object), dtype=text)
+        file.create_group("about").attrs["stop"] = "finished"
+        t = np.concatenate([[0], np.geomspace(1e-3, times[-1], 50)])
+        rows = {"time": t, "energy": 10 + np.exp(-t), "energy_20": 10 + np.exp(-t), "dissipation": np.exp(-t)}
+        rows |= {"identity_defect": 1e-3 * t * (t - 1), "kinetic_energy": t**2, "energy_error": 0 * t}
+        for name, values in rows.items():
+            file[f"series/{name}"] = values
+        mesh = file.create_group("meshes/000000")
+        mesh.attrs["order"], mesh.attrs["period"] = 4, 0.0
+        for i, time in enumerate(times):
+            surface = moving_sphere(time)
+            frame = file.create_group(f"frames/{i:06d}")
+            frame.attrs["time"], frame.attrs["mesh"] = float(time), 0
+            frame["Points"] = surface.points.reshape(-1, 3)
+            frame["Connectivity"] = np.arange(surface.H.size)  # every cell has points of its own
+            for name in ("H", "K", "u_n", "normal", "u") + ("p",) * pressure:
+                values = getattr(surface, name)
+                frame[f"PointData/{name}"] = values.reshape(-1, 3) if values.ndim == 3 else values.ravel()
+    return path
+
+
+def length(segments):
+    return np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).sum()
+
+
+class Cuts(unittest.TestCase):
+    def test_of_a_sphere_is_a_circle(self):
+        for order, accuracy in ((2, 4e-3), (4, 4e-5)):  # of the elements themselves: measured
+            nodes = refined_sphere(order)
+            surface = results.Surface(0.0, order, True, nodes, nodes, nodes[..., 0], nodes[..., 0])
+            for axis, level in ((2, 0.0), (1, 0.0), (0, -0.6), (2, 0.37)):
+                found = cuts.cut(surface, axis, level)
+                np.testing.assert_allclose(found[..., axis], level, atol=1e-13)
+                self.assertLess(np.abs(np.linalg.norm(found, axis=-1) - 1).max(), accuracy)
+                # Chords between places at most 1/100 apart are shorter than arcs by less than 1e-5.
+                self.assertAlmostEqual(length(found) / (2 * np.pi * np.sqrt(1 - level**2)), 1, delta=accuracy + 1e-5)
+
+    def test_lies_on_the_curved_triangles(self):
+        # z = x^2 + y^2 over two flat triangles is a quadratic: its cut z = 1/4 a circle of radius 1/2, exactly.
+        flat = np.array([[(-1, -1, 0), (1, -1, 0), (1, 1, 0)], [(-1, -1, 0), (1, 1, 0), (-1, 1, 0)]], float)
+        for order in (2, 3, 4):
+            nodes = raster.lattice(order) / order @ flat
+            nodes[..., 2] = nodes[..., 0] ** 2 + nodes[..., 1] ** 2
+            found = cuts.cut(results.Surface(0.0, order, False, nodes, nodes, nodes, nodes), 2, 0.25)
+            np.testing.assert_allclose(np.hypot(found[..., 0], found[..., 1]), 0.5, atol=1e-12)
+            self.assertAlmostEqual(length(found), np.pi, delta=1e-3)
+
+    def test_that_misses_is_empty(self):
+        self.assertEqual(cuts.cut(moving_sphere(0), 2, 1.5).shape, (0, 2, 3))
+
+    def test_drawn_in_their_plane_to_scale(self):
+        shapes = [moving_sphere(0, 1.0), moving_sphere(1, 0.5)]
+        columns = [Column(s.time, [s], [None]) for s in shapes]
+        panel = cuts.CutPanel([None], [["a"]], columns, ("y", 0.0))
+        figure = Figure(figsize=(style.WIDTH, panel.height))
+        panel.draw(figure, 0.0)
+        (axes,) = figure.axes
+        self.assertEqual((axes.get_xlabel(), axes.get_ylabel()), ("x", "z"))
+        for lines, radius in zip(axes.collections, (1.0, 0.5)):
+            points = np.array(lines.get_segments())
+            self.assertAlmostEqual(length(points), 2 * np.pi * radius, delta=1e-3)
+        ends = axes.transData.transform([(0, 0), (1, 0), (0, 1)])
+        self.assertAlmostEqual(ends[1][0] - ends[0][0], ends[2][1] - ends[0][1], places=6)
+        self.assertNotEqual(*(to_hex(lines.get_colors()[0]) for lines in axes.collections))
+
+    def test_none_met_is_refused(self):
+        with self.assertRaisesRegex(results.BadInput, "z = 2 meets none"):
+            cuts.CutPanel([None], [["a"]], [Column(0.0, [moving_sphere(0)], [None])], ("z", 2.0))
+
+
+class Arrows(unittest.TestCase):
+    def setUp(self):
+        self.surface, self.view = moving_sphere(1), raster.View()
+        s = self.surface
+        fields = np.concatenate([s.u @ self.view.axes, s.points], axis=-1)
+        self.samples = raster.sample(s.points, s.normal, fields, 4, True, self.view, (-1.1, 1.1), 200, 440, 440)
+
+    def test_are_the_tangential_flow_where_they_stand(self):
+        places, along = flow.surface_arrows(self.samples, self.samples.values[:, :3], 40)
+        normal, x = self.samples.normal[places], self.samples.values[places, 3:]
+        np.testing.assert_allclose((along * normal).sum(axis=1), 0, atol=1e-13)
+        exact = np.cross(OMEGA, x) @ self.view.axes  # of u the rotation alone is tangential
+        # Linear between the corners of pieces 6 samples of 200 long: (6/200)^2 / 8 of |u|, at the rim 1/STEEPEST as far.
+        np.testing.assert_allclose(along, exact, atol=3 * 3e-3)
+        self.assertGreater(np.linalg.norm(along, axis=1).max(), 2)
+
+    def test_stand_evenly_on_what_faces_the_eye(self):
+        places, _ = flow.surface_arrows(self.samples, self.samples.values[:, :3], 40)
+        row, column = np.divmod(places, 440)
+        r = np.hypot(column - 219.5, row - 219.5) / 200
+        # The normal turns STEEPEST away from the eye at this distance from the middle of the disc.
+        self.assertLess(r.max(), np.sqrt(1 - flow.STEEPEST**2) + 0.02)
+        # One a cell of the hexagonal lattice: 40 x 40 sqrt(3/4), give or take the rim.
+        self.assertAlmostEqual(len(places), np.pi * (200**2 * (1 - flow.STEEPEST**2)) / (40 * 35), delta=12)
+        distance = np.hypot(row[:, None] - row, column[:, None] - column) + 1e9 * np.eye(len(row))
+        self.assertGreater(distance.min(), 39)
+
+    def test_lengths_are_relative_to_the_largest_of_the_shape(self):
+        motion = surfaces.Motion(unittest.mock.Mock(surfaces=[self.surface]))
+        self.assertAlmostEqual(motion.u_t(self.surface), 3)  # |OMEGA| at the equator, where there are nodes
+        self.assertAlmostEqual(motion.u_n(self.surface), 2)
+        figure = Figure(figsize=(2, 2))
+        axes = figure.add_axes([0, 0, 1, 1])
+        flow.draw_surface_arrows(axes, self.samples, self.samples.values[:, :3], 3.0, 0.0, 2.0, 220)
+        arrows = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
+        ends = np.array([arrow._posA_posB for arrow in arrows])
+        sizes = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.assertGreater(sizes.min(), flow.SHORTEST_ARROW - 1e-12)
+        self.assertAlmostEqual(sizes.max(), flow.LONGEST_ARROW, delta=0.01)  # at the equator in the middle
+        middle = ends.mean(axis=1)
+        self.assertLess(np.hypot(*(middle - 1).T).max(), 200 / 220)  # on the disc, which is 200 samples in radius
+        # Turns to the left seen from above: in front everything goes to the right.
+        self.assertTrue((ends[:, 1, 0] > ends[:, 0, 0])[middle[:, 1] < 1].all())
+
+
+class Colours(unittest.TestCase):
+    def test_normal_velocity_relative_to_its_largest(self):
+        shapes = [moving_sphere(t) for t in (0, 1, 2)]
+        result = results.Result("a.hdf", {}, {}, {}, [], shapes)
+        (quantity,) = surfaces.quantities(["u_n"], [result], shapes)
+        motion = surfaces.Motion(result)
+        for shape, largest in zip(shapes, (0, 1, 1)):
+            self.assertEqual(np.abs(quantity.at_nodes(shape, motion)).max(), largest)
+        red, blue, white = quantity.colours.rgb(np.array([1.0, -1.0, 0.0]))
+        self.assertGreater(red[0], 2 * red[2])  # outward is red, as in the paper
+        self.assertGreater(blue[2], 2 * blue[0])
+        self.assertGreater(white.min(), 0.95)
+
+    def test_pressure_is_white_at_its_mean(self):
+        shape = moving_sphere(1)  # p = 5 + x
+        (quantity,) = surfaces.quantities(["p"], [results.Result("a.hdf", {}, {}, {}, [], [shape])], [shape])
+        norm = quantity.colours.norm
+        self.assertAlmostEqual((norm.vmin + norm.vmax) / 2, 5, delta=1e-9)
+        self.assertTrue(0.9 < (norm.vmax - norm.vmin) / 2 < 1.3)  # |x| <= 1, times MARGIN at most
+
+    def test_a_normal_motion_has_no_arrows(self):
+        shape = moving_sphere(1)
+        shape.u = shape.u_n[..., None] * shape.normal + 1e-6
+        self.assertEqual(surfaces.Motion(results.Result("", {}, {}, {}, [], [shape])).u_t(shape), 0)
+
+
+class Pages(InFolder):
+    def test_all_of_a_moving_surface(self):
+        texts = "\n".join(self.drawn(write(self.folder / "a.hdf"))).split("\n")
+        for words in ("(d)", "at rest", "|u\u2099| \u2264 2", "|u\u209c| \u2264 3", "|u\u209c| \u2264 6", "cut z = 0",
+                      "t\u2082 = 2", "dissipation \u2212dE/dt", "|defect of the identity|", "kinetic energy E\u2096"):  # fmt: skip
+            self.assertIn(words, texts)
+        self.assertTrue([text for text in texts if text.startswith("normal velocity")])
+        self.assertNotIn("estimated error of E", texts)  # all of it zero
+        self.assertFalse([text for text in texts if "curvature" in text])
+
+    def test_colours_and_kinds(self):
+        file = write(self.folder / "a.hdf")
+        texts = self.drawn(file, "--kind", "surface", "--colour", "H,K,p", "--times", "0,2")
+        for words in ("mean curvature H", "Gaussian curvature K", "pressure p, white: its mean 5", "t\u2081 = 2"):
+            self.assertIn(words, texts)
+        self.assertFalse([text for text in texts if "velocity" in text or "|u" in text])
+        texts = self.drawn(file, "--kind", "surface", "--colour", "u_n", "--times", "1")
+        self.assertIn("t\u2080 = 1", texts)
+        self.assertIn("cut x = \u22120.25", self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25"))
+        texts = self.drawn(file, "--kind", "balance")
+        self.assertIn("dissipation \u2212dE/dt", texts)
+        self.assertNotIn("(a)", texts)
+
+    def test_several_results(self):
+        files = [write(self.folder / f"{k}.hdf", sets=[f"energy.k42={k}"]) for k in (0, 1)]
+        texts = self.drawn(*files)
+        self.assertGreaterEqual(texts.count("k\u2084\u2082 = 0"), 3)  # of the shapes, the cuts, the lines
+        self.assertIn("(d)", texts)
+
+    def test_refusals(self):
+        file = write(self.folder / "a.hdf", pressure=False)
+        self.refused("not all of its frames hold p to colour by", file, "--colour", "p")
+        self.refused("'T' is none of u_n, H, K, p", file, "--colour", "H,T")
+        self.refused("--plane: z = 2 meets none of the surfaces", file, "--plane", "z=2")
+        for plane in ("w=0", "z=", "z=e", "z=nan", "z"):
+            self.refused(f"'{plane}' is not x, y or z = number", file, "--plane", plane)
+        half = self.folder / "half.hdf"
+        shutil.copy(file, half)
+        with h5py.File(half, "a") as damaged:
+            del damaged["frames/000001/PointData/u"]
+        self.refused("frame 000001: of u and u_n it has only one", half)
+
+
+class Balance(InFolder):
+    def test_lines_are_sizes_at_positive_times(self):
+        result = results.read_result(str(write(self.folder / "a.hdf", times=(0, 1, 2))))
+        panel = balance.BalancePanel([result], [["a"]], [0, 1, 2])
+        figure = Figure(figsize=(style.WIDTH, panel.height))
+        panel.draw(figure, 0.0)
+        lines = {style: line for style, line in zip(panel.styles, figure.axes[0].lines)}
+        time, defect = lines["identity_defect"].get_data()
+        self.assertGreater(time.min(), 0)
+        np.testing.assert_allclose(defect, 1e-3 * time * np.abs(time - 1), rtol=1e-12)
+        np.testing.assert_allclose(lines["dissipation"].get_ydata(), np.exp(-time), rtol=1e-12)
+        self.assertEqual(figure.axes[0].get_xlim(), (1e-3, 2.0))
+
+    def test_zeros_are_gaps(self):
+        time, values = balance.line({"time": np.array([0, 1.0, 2, 3]), "x": np.array([1, -2.0, 0, 3])}, "x")
+        np.testing.assert_array_equal(values, [2, np.nan, 3])
+        np.testing.assert_array_equal(time, [1, 2, 3])
+
+
+if __name__ == "__main__":
+    unittest.main()

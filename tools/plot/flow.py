@@ -1,0 +1,64 @@
+"""Velocities on shapes: what their symbols, colours and arrows look like, and where arrows stand on a curved surface."""
+
+import numpy as np
+from matplotlib.patches import FancyArrowPatch
+
+LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
+STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
+ROUNDING = 1e-6  # of lengths per unit of time: the speed of a start at rest
+NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is none, but rounding of normals
+VELOCITY = "RdBu_r"
+SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
+SPACING = 0.15  # inches between arrows on a surface
+STEEPEST = 0.3  # cosine between the normal and the eye where the last arrows stand
+
+
+def arrow_style(length):
+    """Of an arrow that long in inches: short ones have small heads."""
+    head = 2.6 * min(1.0, 0.25 + length / LONGEST_ARROW)
+    style = f"-|>,head_length={head},head_width={head / 2}"
+    return dict(arrowstyle=style, mutation_scale=1, color="0.1", linewidth=0.8, shrinkA=0, shrinkB=0)
+
+
+def draw_arrow_key(figure, left, bottom, words):
+    """What the longest arrow means; `left` is a part of the page, `bottom` inches below its 0.5 inches."""
+    wide, tall = figure.get_size_inches()
+    x, y = left * wide, bottom + 0.42
+    ends = (x / wide, y / tall), ((x + LONGEST_ARROW) / wide, y / tall)
+    figure.add_artist(FancyArrowPatch(*ends, transform=figure.transFigure, **arrow_style(LONGEST_ARROW)))
+    figure.text((x + LONGEST_ARROW + 0.08) / wide, y / tall, words, va="center", fontsize=8, linespacing=1.3)
+
+
+def tangential(velocity, normal):
+    """The part of a velocity [..., 3] along the surface; `normal` of any length but zero."""
+    along = (velocity * normal).sum(axis=-1, keepdims=True) / (normal * normal).sum(axis=-1, keepdims=True)
+    return velocity - along * normal
+
+
+def surface_arrows(samples, velocity, spacing):
+    """Samples, even over the picture, where the outside is seen and not too steep, and the tangential velocity there.
+
+    `velocity` [samples, 3] and what comes back are in the coordinates of the view: right, up, towards the eye.
+    """
+    height, width = samples.shape
+    pitch = max(1, round(spacing))
+    rows = np.arange(pitch // 2, height, max(1, round(pitch * np.sqrt(0.75))))
+    places = [np.arange(pitch // 2 if i % 2 else 0, width, pitch) + row * width for i, row in enumerate(rows)]
+    places = np.concatenate(places) if places else np.zeros(0, int)
+    normal = samples.normal[places]
+    size = np.linalg.norm(normal, axis=1)
+    seen = np.isfinite(samples.depth[places]) & samples.outside[places] & (normal[:, 2] > STEEPEST * size) & (size > 0)
+    places = places[seen]
+    return places, tangential(velocity[places], samples.normal[places])
+
+
+def draw_surface_arrows(axes, samples, velocity, largest, left, top, per_inch):
+    """Arrows relative to the `largest` tangential speed; `left` and `top` in inches are where the picture begins."""
+    places, along = surface_arrows(samples, velocity, SPACING * per_inch)
+    arrows = LONGEST_ARROW * along[:, :2] / largest  # foreshortened, as the surface is
+    row, column = np.divmod(places, samples.shape[1])
+    middles = np.column_stack([left + (column + 0.5) / per_inch, top - (row + 0.5) / per_inch])
+    for middle, arrow in zip(middles, arrows):
+        length = np.hypot(*arrow)
+        if length >= SHORTEST_ARROW:
+            axes.add_patch(FancyArrowPatch(middle - arrow / 2, middle + arrow / 2, zorder=5, **arrow_style(length)))
