@@ -80,15 +80,15 @@ def length(segments):
 
 class Cuts(unittest.TestCase):
     def test_of_a_sphere_is_a_circle(self):
-        for order, accuracy in ((2, 4e-3), (4, 4e-5)):  # of the elements themselves: measured
+        # How far the elements are off the sphere: measured at the cuts 3.1e-3 and 5.8e-5; their lengths 1e-3, 1.3e-5.
+        for order, accuracy in ((2, 4e-3), (4, 1e-4)):
             nodes = refined_sphere(order)
             surface = results.Surface(0.0, order, True, nodes, nodes, nodes[..., 0], nodes[..., 0])
             for axis, level in ((2, 0.0), (1, 0.0), (0, -0.6), (2, 0.37)):
                 found = cuts.cut(surface, axis, level)
                 np.testing.assert_allclose(found[..., axis], level, atol=1e-13)
                 self.assertLess(np.abs(np.linalg.norm(found, axis=-1) - 1).max(), accuracy)
-                # Chords between places at most 1/100 apart are shorter than arcs by less than 1e-5.
-                self.assertAlmostEqual(length(found) / (2 * np.pi * np.sqrt(1 - level**2)), 1, delta=accuracy + 1e-5)
+                self.assertAlmostEqual(length(found) / (2 * np.pi * np.sqrt(1 - level**2)), 1, delta=accuracy / 3)
 
     def test_lies_on_the_curved_triangles(self):
         # z = x^2 + y^2 over two flat triangles is a quadratic: its cut z = 1/4 a circle of radius 1/2, exactly.

@@ -102,7 +102,8 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"u_n", "H", "K", "p"}));
     command->add_option("--plane", options->plane, "of the cuts through surfaces: x, y or z = number")
-        ->check([](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
+        ->check(
+            [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }

@@ -249,7 +249,9 @@ class SurfacePanel:
         for (left, width), quantity in zip(room, self.quantities):
             colours = quantity.colours
             label = colours.label if len(room) < 3 or quantity.name == "p" else colours.label.split(" / ")[0]
-            draw_bar(figure, bottom, left, width, ScalarMappable(colours.norm, plt.get_cmap(colours.map)), label, colours.extend)
+            mappable = ScalarMappable(colours.norm, plt.get_cmap(colours.map))
+            draw_bar(figure, bottom, left, width, mappable, label, colours.extend)
         if self.arrows:
             u_t = flow.SYMBOLS["u_t"]
-            flow.draw_arrow_key(figure, room[-1][0], bottom, f"{u_t} along the surface; this\nlong: max |{u_t}| of the shape")
+            words = f"{u_t} along the surface; this\nlong: max |{u_t}| of the shape"
+            flow.draw_arrow_key(figure, room[-1][0], bottom, words)
