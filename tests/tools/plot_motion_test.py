@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """Pictures of moving surfaces: the numbers that are drawn, on shapes and flows known exactly, and whole pages.
 
-    plot_motion_test.py
+    plot_motion_test.py TUBULE
 """
 
 import shutil
+import subprocess
+import sys
 import unittest
 import unittest.mock
 
@@ -14,7 +16,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 from plot_surface_test import octasphere
-from plot_test import InFolder
+from plot_test import PLOT, InFolder
 
 import balance  # found by way of plot_test
 import cuts
@@ -25,6 +27,7 @@ import style
 import surfaces
 from tubes import Column
 
+TUBULE = None
 OMEGA = np.array([0.0, 0.0, 3.0])
 
 
@@ -256,5 +259,49 @@ class Balance(InFolder):
         np.testing.assert_array_equal(time, [1, 2, 3])
 
 
+class Command(InFolder):
+    def test_options_come_through(self):
+        file = write(self.folder / "a.hdf", times=(0, 1))
+        texts = self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25", program=TUBULE)
+        self.assertIn("cut x = \u22120.25", texts)
+        texts = self.drawn(file, "--kind", "surface", "--colour", "p,H", "--times", "1", program=TUBULE)
+        self.assertIn("mean curvature H", texts)
+        self.assertIn("pressure p, white: its mean 5", texts)
+
+    def test_refusals(self):
+        file = write(self.folder / "a.hdf", times=(0, 1))
+        for words, option in (("is not x, y or z = number", "--plane=w=0"), ("--colour", "--colour=H,T")):
+            done = self.plot(file, option, program=TUBULE)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, done.stderr)
+
+
+class Render(InFolder):
+    """tools/render without ParaView, and what it would ask of one."""
+
+    def render(self, *arguments):
+        command = [sys.executable, "-B", PLOT.parent / "render", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, env={"PATH": str(self.folder)})
+
+    def test_says_that_there_is_none(self):
+        done = self.render(write(self.folder / "a.hdf", times=(0, 1)))
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("no pvpython on the PATH", done.stderr)
+        self.assertIn("no such file", self.render(self.folder / "b.hdf").stderr)
+
+    def test_gives_the_series_to_paraview_where_there_is_one(self):
+        file, fake = write(self.folder / "a.hdf", times=(0, 1)), self.folder / "pvpython"
+        (self.folder / "view").mkdir()
+        (self.folder / "view/a.hdf.series").touch()
+        fake.write_text(f'#!/bin/sh\necho "$@" > {self.folder}/said; : > {self.folder}/out/000000.png\n')
+        fake.chmod(0o755)
+        done = self.render(file, "-o", self.folder / "out", "--colour", "H")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("no ffmpeg", done.stderr)
+        said = (self.folder / "said").read_text().split()
+        self.assertEqual(said[-3:], [str((self.folder / path).resolve()) for path in ("view/a.hdf.series", "out")] + ["H"])
+
+
 if __name__ == "__main__":
+    TUBULE = sys.argv.pop(1)
     unittest.main()
