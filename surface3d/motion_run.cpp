@@ -408,6 +408,7 @@ std::optional<StopReport> MotionAttempt::step() {
     }
     const double t = state_.time;
     trace.add(t, now_.bending.energy);
+    error_now_ = memory_.reference_energy;  // nothing is known
     if (coarser_ && t <= coarser_->end()) {
         error_now_ = std::abs(now_.bending.energy - (*coarser_)(t)) / fall;
         memory_.error = std::max(memory_.error, error_now_);

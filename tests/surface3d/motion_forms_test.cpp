@@ -349,7 +349,7 @@ TEST(StepSolve, AgreesWithLu) {
             const Eigen::Index nv = law.components() * rest.mesh.size();
             // GMRES stops at a residual of 1e-11; what it leaves is larger by the condition of the matrix.
             EXPECT_LT((mine - exact).head(nv).norm(), 1e-6 * exact.head(nv).norm());
-            if (bordered) EXPECT_NEAR(mine.tail(1)[0], exact.tail(1)[0], 1e-6 * std::abs(exact.tail(1)[0]));
+            if (bordered) { EXPECT_NEAR(mine.tail(1)[0], exact.tail(1)[0], 1e-6 * std::abs(exact.tail(1)[0])); }
             EXPECT_EQ(solver.fallbacks(), 0);
         }
     }
