@@ -25,7 +25,9 @@ inline CurvedMesh tube_mesh(const Tube& tube, int n_z, int n_theta, int order) {
 // From rest, in steps of one size. Area and volume are held at those of the start, as in a run.
 struct Motion {
     Motion(const CurvedMesh& mesh, const Model& model, const Bending& bending, MotionControl control = {})
-        : bending(bending), stepper(mesh, motion_law(model), bending, held(mesh, control)), state(stepper.start(mesh)) {}
+        : bending(bending),
+          stepper(mesh, motion_law(model), bending, held(mesh, control)),
+          state(stepper.start(mesh)) {}
 
     static MotionControl held(const CurvedMesh& mesh, MotionControl control) {
         const Extent e = extent(SurfaceSpace(mesh), mesh);

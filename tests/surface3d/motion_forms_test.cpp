@@ -124,12 +124,10 @@ TEST(MotionForce, ApproachesTheRateOfTheDiscreteEnergy) {
             const double force = rest.assembled().force.head(3 * mesh.size()).dot(stacked(v));
             // What moves along the normal alone has the normal components of the same force.
             AtRest normal(mesh, gradient_flow, bending, 1);
-            const Eigen::VectorXd along =
-                v.cwiseProduct(rest.base.fields.normal).colwise().sum().transpose();
+            const Eigen::VectorXd along = v.cwiseProduct(rest.base.fields.normal).colwise().sum().transpose();
             EXPECT_NEAR(normal.assembled().force.head(mesh.size()).dot(along), force, 0.02 * std::abs(force));
             return std::abs(force + rate) / std::abs(rate);
         });
-        std::printf("force k = %g %g %g: rate %.2f, left %.3g\n", bending.k[0], bending.k[1], bending.k[2], fall.rate, fall.left);
         EXPECT_GT(fall.rate, 3);
         EXPECT_LT(fall.left, 1e-4);
     }
@@ -146,7 +144,6 @@ TEST(MotionForce, OtherOrders) {
             AtRest rest(mesh, fluid, energies.back(), 1);
             return std::abs(rest.assembled().force.head(3 * mesh.size()).dot(stacked(v)) + rate) / std::abs(rate);
         });
-        std::printf("order %d: rate %.2f, left %.3g\n", order, fall.rate, fall.left);
         EXPECT_GT(fall.rate, least) << order;
         EXPECT_LT(fall.left, most) << order;
     }
@@ -194,7 +191,6 @@ TEST(CurvatureEvolution, IsThatOfASurfaceThatMoves) {
             (K ? K_rate : H_rate) = fall.rate;
             (K ? of_K : of_H) = fall.left;
         }
-        std::printf("evolution H: %.2f %.3g; K: %.2f %.3g\n", H_rate, of_H, K_rate, of_K);
         EXPECT_GT(H_rate, 3);
         EXPECT_LT(of_H, 1e-4);
         EXPECT_GT(K_rate, 3);
@@ -284,8 +280,8 @@ TEST(StepMatrix, FluxAndPressureLoad) {
     const int n = rest.mesh.size();
     VectorField x(3, n);
     for (int i = 0; i < n; ++i) x.col(i) = rest.mesh.nodes[i];
-    const Observables o =
-        observe(rest.space, rest.mesh, {rest.base.fields.normal, {}, rest.base.fields.H, rest.base.fields.K}, energies[0]);
+    const Observables o = observe(rest.space, rest.mesh,
+                                  {rest.base.fields.normal, {}, rest.base.fields.H, rest.base.fields.K}, energies[0]);
     EXPECT_NEAR(rest.system.flux.head(3 * n).dot(stacked(x)) / (3 * o.volume), 1, 1e-5);
     const int p = rest.unknowns.size() - rest.unknowns.p;
     EXPECT_NEAR(rest.system.pressure_load.tail(p).sum() / o.area, 1, 1e-12);
@@ -332,7 +328,8 @@ void scale(AtRest& rest) {
 
 TEST(StepSolve, AgreesWithLu) {
     const Bending bending{.k = {1, 0, 0.5}, .H0 = -0.5};
-    for (const MotionLaw& law : {gradient_flow, motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}}), fluid}) {
+    for (const MotionLaw& law :
+         {gradient_flow, motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}}), fluid}) {
         AtRest rest(mesh_of(wavy, icosphere(2), 3), law, bending, 1e-3);
         rest.assembled();
         scale(rest);
@@ -389,7 +386,8 @@ TEST(StepSolve, FallsBackToLu) {
     Eigen::SparseMatrix<double> twisted = A;
     for (int j = 0; j < twisted.outerSize(); ++j)
         for (Eigen::SparseMatrix<double>::InnerIterator it(twisted, j); it; ++it)
-            it.valueRef() = it.row() == it.col() ? 1e-6 : (it.row() < j ? 1 : -1) * (1 + 0.3 * std::sin(it.row() + 2.0 * j));
+            it.valueRef() =
+                it.row() == it.col() ? 1e-6 : (it.row() < j ? 1 : -1) * (1 + 0.3 * std::sin(it.row() + 2.0 * j));
     BorderedSolver solver(rest.unknowns.pattern(), rest.unknowns.node_of_unknown());
     const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(A.rows(), -1, 1);
     const Eigen::MatrixXd C = rest.system.flux;
@@ -414,8 +412,9 @@ TEST(StepUnknowns, AreThoseOfTheModel) {
     EXPECT_EQ(MotionUnknowns(mesh, gradient_flow, {.k = {1, 0, 0}}).size(), 2 * n);
     EXPECT_EQ(MotionUnknowns(mesh, gradient_flow, {.k = {0, 0, 1}}).size(), 2 * n);
     EXPECT_EQ(MotionUnknowns(mesh, gradient_flow, {.k = {0, 1, 1}}).size(), 3 * n);
-    EXPECT_EQ(MotionUnknowns(mesh, motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}}), {.k = {1, 0, 0}}).size(),
-              3 * n);
+    EXPECT_EQ(
+        MotionUnknowns(mesh, motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}}), {.k = {1, 0, 0}}).size(),
+        3 * n);
     EXPECT_EQ(MotionUnknowns(mesh, fluid, {.k = {1, 0, 1}}).size(), 5 * n + 42);  // 10 (k-1)^2 + 2
 }
 

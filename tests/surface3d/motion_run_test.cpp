@@ -105,9 +105,10 @@ TEST(MotionRun, AnInextensibleSphereIsRigid) {
     // maths 6: area and volume leave it nothing to do. There lambda and the pressure are the same condition.
     for (const std::string kind : {"overdamped", "stokes", "fluid"}) {
         SCOPED_TRACE(kind);
-        const Outcome o = run_case("[energy]\nk20 = 1\nk42 = 0.3\nH0 = -1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
-                                   "[discretisation]\nelements = 80\norder = 4\n",
-                                   {"model.kind=" + kind});
+        const Outcome o = run_case(
+            "[energy]\nk20 = 1\nk42 = 0.3\nH0 = -1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
+            "[discretisation]\nelements = 80\norder = 4\n",
+            {"model.kind=" + kind});
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         EXPECT_NEAR(o.last("r_min"), 1, 1e-3);
         EXPECT_NEAR(o.last("r_max"), 1, 1e-3);
@@ -117,8 +118,9 @@ TEST(MotionRun, AnInextensibleSphereIsRigid) {
 
 TEST(MotionGuards, IllPosed) {
     // maths 2: f_HH + f_KK x^2 = 2 k20 + 2 k42 x^2 with x = -1 on the unit sphere: negative for k42 < -k20.
-    const std::string sphere = "[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
-                               "[discretisation]\nelements = 80\norder = 3\nstep = 0.05\n";
+    const std::string sphere =
+        "[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
+        "[discretisation]\nelements = 80\norder = 3\nstep = 0.05\n";
     const Outcome lost = run_case(sphere, {"energy.k42=-1.05"});
     EXPECT_EQ(lost.summary.stop.reason, Stop::ill_posed) << lost.summary.stop.message;
     EXPECT_EQ(lost.summary.stop.time, 0);
@@ -148,11 +150,13 @@ TEST(MotionGuards, StepsThatAreTooLarge) {
 TEST(MotionGuards, StartsThatCannotMove) {
     // cases/surface_folded.toml, and an ellipsoid whose ends turn by far more than a mesh of so few triangles follows.
     const std::string moves = "[energy]\nk20 = 1\n[time]\nend = 1\n[discretisation]\nelements = 80\n[shape]\n";
-    const Outcome folded = run_case(moves + "kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 1.0, l = 12, m = 7}]\n");
+    const Outcome folded =
+        run_case(moves + "kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 1.0, l = 12, m = 7}]\n");
     EXPECT_EQ(folded.summary.stop.reason, Stop::mesh_lost) << folded.summary.stop.message;
     const Outcome sharp = run_case(moves + "kind = \"ellipsoid\"\na = 0.3\nb = 0.3\nc = 3\n");
     EXPECT_EQ(sharp.summary.stop.reason, Stop::resolution_lost) << sharp.summary.stop.message;
-    EXPECT_NE(sharp.summary.stop.message.find("the surface is too sharp"), std::string::npos) << sharp.summary.stop.message;
+    EXPECT_NE(sharp.summary.stop.message.find("the surface is too sharp"), std::string::npos)
+        << sharp.summary.stop.message;
 }
 
 TEST(MotionGuards, TimeLimit) {

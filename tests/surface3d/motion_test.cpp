@@ -47,7 +47,6 @@ TEST(SphereFlow, RadiusFollowsItsEquation) {
             motion.until(end, 10 << i);
             error[i] = std::abs(radius(motion.mesh()) - exact);
         }
-        std::printf("sphere R = %.6g: errors %.3g %.3g\n", exact, error[0], error[1]);
         EXPECT_GT(error[0] / error[1], least) << second_order;
         EXPECT_LT(error[1], most) << second_order;
     }
@@ -61,11 +60,10 @@ TEST(SphereFlow, VelocityConvergesWithTheMesh) {
             Motion motion(mesh_of(Sphere{.radius = 1.5, .modes = {}}, icosphere(2 << i), order), {}, all_terms);
             motion.steps(1e-8, 1);
             const CurvedMesh mesh = motion.mesh();
-            const double rate = motion.stepper.flux(motion.state.u, mesh, motion.stepper.fields(mesh)).sum() /
-                                (4 * pi * 1.5 * 1.5);
+            const double rate =
+                motion.stepper.flux(motion.state.u, mesh, motion.stepper.fields(mesh)).sum() / (4 * pi * 1.5 * 1.5);
             error[i] = std::abs(rate / exact - 1);
         }
-        std::printf("order %d: errors %.3g %.3g, rate %.2f\n", order, error[0], error[1], std::log2(error[0] / error[1]));
         EXPECT_GT(std::log2(error[0] / error[1]), least) << order;
         EXPECT_LT(error[1], most) << order;
     }
@@ -88,7 +86,8 @@ struct Phased {
     double phase = 0;
 };
 
-// Largest difference of the amplitudes at the end from those of the linear theory, relative to the largest at the start.
+// Largest difference of the amplitudes at the end from those of the linear theory, relative to the largest at the
+// start.
 double error_of_waves(const Bending& energy, const Model& model, const std::vector<Phased>& phased, double length,
                       double end, int steps) {
     Tube tube{.radius = 1, .length = length, .modes = {}};
@@ -105,7 +104,6 @@ double error_of_waves(const Bending& energy, const Model& model, const std::vect
     const CurvedMesh mesh = motion.mesh();
     for (std::size_t i = 0; i < waves.size(); ++i) {
         const double a = tube_wave(mesh, waves[i].n, waves[i].m, phased[i].phase);
-        std::printf("  %d %d: %.6g %.6g\n", waves[i].n, waves[i].m, a, exact.amplitudes[i]);
         error = std::max(error, std::abs(a - exact.amplitudes[i]) / largest);
     }
     return error;
@@ -133,7 +131,6 @@ TEST(TubeWaves, FollowTheAmplitudeEquations) {
         const Model model{.kind = kind, .Re = 2, .gamma = kind == ModelKind::overdamped ? 0 : 0.3, .keeps_volume = {}};
         double error[2];
         for (int i : {0, 1}) error[i] = error_of_waves(energy, model, waves, 5, end, 10 << i);
-        std::printf("model %d: %.3g %.3g\n", static_cast<int>(kind), error[0], error[1]);
         EXPECT_LT(error[1], 0.02) << static_cast<int>(kind);
     }
 }
@@ -163,8 +160,6 @@ TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
         };
         const double exact = tested(overdamped.measures().velocity);
         gap[i] = std::abs(tested(fluid.measures().velocity / tau) / exact - 1);
-        std::printf("acceleration: %.6g, gap %.3g, lambda %.6g %.6g\n", exact, gap[i], fluid.state.lambda,
-                    overdamped.state.lambda);
         EXPECT_NEAR(fluid.state.lambda, overdamped.state.lambda, 0.1 * std::abs(overdamped.state.lambda));
     }
     EXPECT_GT(std::log2(gap[0] / gap[1]), 1);
@@ -192,7 +187,6 @@ TEST(Models, MomentumDecaysByFriction) {
         const double factor = std::exp(-gamma * end);
         left[i] << (now.momentum - factor * start.momentum) / start.momentum.norm(),
             (now.angular_momentum - factor * start.angular_momentum) / start.angular_momentum.norm();
-        std::printf("momentum: %.3g %.3g\n", left[i].head<3>().norm(), left[i].tail<3>().norm());
     }
     EXPECT_GT((left[0] - left[1]).norm() / (left[1] - left[2]).norm(), 1.8);
     EXPECT_LT(left[2].norm(), 1e-3);
@@ -214,8 +208,6 @@ TEST(Models, RotatingTubeStaysStraight) {
     motion.until(0.5, 40);
     const MotionMeasures m = motion.measures();
     const double b0 = theory::radius_rate(theory::UniformTube{energy, R, 0});
-    std::printf("rotating: p %.8g..%.8g, exact %.8g, r %.3g %.3g, spin %.3g\n", motion.state.p.minCoeff(), motion.state.p.maxCoeff(),
-                -(b0 + omega * omega * R) * R, m.r_min - R, m.r_max - R, m.angular_momentum.z() / (omega * 2 * pi * R * R * R * 2) - 1);
     EXPECT_NEAR(m.r_min, R, 5e-5);
     EXPECT_NEAR(m.r_max, R, 5e-5);
     EXPECT_NEAR(m.angular_momentum.z(), omega * 2 * pi * R * R * R * 2, 1e-3);
@@ -233,7 +225,6 @@ TEST(Models, StokesFlowWithoutFrictionDoesNotDrift) {
         // Against the integrals of |u| and |x| |u|, both about speed times area. The step holds them on the surface it
         // expects.
         const double size = m.speed * m.bending.area;
-        std::printf("stokes: %.3g %.3g speed %.3g\n", m.momentum.norm() / size, m.angular_momentum.norm() / size, m.speed);
         EXPECT_LT(m.momentum.norm(), 1e-3 * size);
         EXPECT_LT(m.angular_momentum.norm(), 1e-3 * size);
         EXPECT_GT(m.speed, 0);
