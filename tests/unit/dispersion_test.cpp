@@ -295,7 +295,12 @@ TEST(Thresholds, bucklingAndRings) {
                     EXPECT_EQ(growing_bands(near, m).empty(), by > 0) << m << " " << c << " " << kappa;
                 }
         }
-    // A helix of q > 0 before the ring: the threshold found by bisection on the growing bands.
+    // For c < -5/2 a wave of q > 0 comes before the ring. By maths 5, with k42 = 0 and y = q^2 R^2 + 3, it grows below
+    // P = -y - 2 (1 + c) + 6 (1 + c)/y, which is largest at y^2 = -6 (1 + c), here 12.
+    const auto wavy = stable_tensions(tube_of(0, -3, 0), 2);
+    EXPECT_NEAR(wavy->lowest, tension_of(4 - 4 * std::sqrt(3.0), -3), 1e-12);
+    EXPECT_NEAR(wavy->q_lowest * 1.3, std::sqrt(std::sqrt(12.0) - 3), 1e-7);
+    // The same with k42: growing bands begin there.
     const UniformTube tube = tube_of(0, -4, 0.1);
     const auto stable = stable_tensions(tube, 2);
     EXPECT_GT(stable->lowest, tension_of(-3, -4) + 0.1);
