@@ -339,8 +339,10 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const M
     system.pressure_load.setZero(unknowns.size());
     system.force.setZero(unknowns.size());
     const Assembler assembler(space, unknowns, law, bending, base);
-    static thread_local CellWork work;
-    space.for_each_cell([&](int cell) { assembler.add_cell(cell, work, system); });
+    space.for_each_cell([&](int cell) {
+        static thread_local CellWork work;
+        assembler.add_cell(cell, work, system);
+    });
 }
 
 }  // namespace tubule::surface3d

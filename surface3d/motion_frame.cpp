@@ -12,6 +12,7 @@ void for_each_number(Memory& m, Visit&& visit) {
     visit("restart_next_step", m.next_step), visit("restart_relaxation", m.relaxation);
     visit("restart_tolerance", m.tolerance);
     visit("restart_area", m.area), visit("restart_volume", m.volume);
+    visit("restart_least_variation", m.least_variation), visit("restart_lowest_total", m.lowest_total);
     visit("restart_total_start", m.total_start), visit("restart_dissipated", m.dissipated);
     visit("restart_corrected", m.corrected), visit("restart_error", m.error);
     visit("restart_reference_energy", m.reference_energy);
@@ -61,8 +62,7 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     out.numbers = {{"energy", m.bending.energy},
                    {"restart_lambda", s.lambda},
                    {"restart_step", s.step},
-                   {"restart_elements", static_cast<double>(memory.elements)},
-                   {"restart_keeps_volume", memory.keeps_volume ? 1.0 : 0.0}};
+                   {"restart_elements", static_cast<double>(memory.elements)}};
     for_each_number(memory, [&](const char* name, double value) { out.numbers.emplace_back(name, value); });
     Eigen::VectorXd density_at(s.X.cols());
     for (int i = 0; i < density_at.size(); ++i) density_at[i] = density(bending, m.fields.H[i], m.fields.K[i]).f;
@@ -89,7 +89,6 @@ MotionRestart motion_restart(const Record& record) {
     if (std::any_of(record.arrays.begin(), record.arrays.end(), [](const Array& a) { return a.name == "restart_p"; }))
         s.p = vector_of(record, "restart_p");
     for_each_number(out.memory, [&](const char* name, double& value) { value = number_of(record, name); });
-    out.memory.keeps_volume = number_of(record, "restart_keeps_volume") != 0;
     out.memory.elements = static_cast<int>(number_of(record, "restart_elements"));
     return out;
 }

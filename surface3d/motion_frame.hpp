@@ -9,11 +9,11 @@ namespace tubule::surface3d {
 // Beside the state of the surface, what a run has to remember.
 struct MotionMemory {
     double next_step = 0, relaxation = 0;
-    bool keeps_volume = true;  // and can, for H varies
-    int elements = 0;          // asked for
+    double least_variation = 0;  // of H, see MotionControl
+    int elements = 0;            // asked for
     double tolerance = 0;
-    double area = 0, volume = 0;  // at the start
-    double total_start = 0;       // energy with kinetic energy, then
+    double area = 0, volume = 0;               // at the start
+    double total_start = 0, lowest_total = 0;  // energy with kinetic energy, then and since
     double dissipated = 0, corrected = 0, error = 0, reference_energy = 0;
 };
 

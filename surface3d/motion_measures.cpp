@@ -112,13 +112,22 @@ MotionMeasures measure(MotionStepper& stepper, const MotionState& s, const Bendi
     return m;
 }
 
-double variation_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields) {
-    const CurvatureField field{fields.normal, {}, fields.H, fields.K};
-    Bending squares, shifted;  // INT H^2 and INT (H - 1)^2, which tell INT H
-    squares.k[0] = shifted.k[0] = 1, shifted.H0 = 1;
-    const Observables a = observe(space, mesh, field, squares), b = observe(space, mesh, field, shifted);
-    const double sum = (a.energy - b.energy + a.area) / 2;
-    return 1 - sum * sum / (a.area * a.integral_H2);
+double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields) {
+    const Tabulation& table = space.tabulation();
+    Eigen::Matrix2Xd of_cell(2, space.cells());
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), normals = space.gather(fields.normal, cell);
+        const auto nodal = space.gather(fields.H, cell);
+        Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const double H = nodal.dot(table.value.col(q));
+            const double other = shape_operator(p, gradients(p, table, q), normals).trace();
+            sum += table.weight[q] * p.area * Eigen::Vector2d((H - other) * (H - other), H * H);
+        }
+        of_cell.col(cell) = sum;
+    });
+    return of_cell.row(0).sum() / of_cell.row(1).sum();
 }
 
 }  // namespace tubule::surface3d

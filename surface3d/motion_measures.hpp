@@ -22,8 +22,8 @@ struct MotionMeasures {
     double turn = 0;               // largest angle by which the normal turns between neighbouring nodes
     Eigen::Vector3d sharpest;      // where that is
     bool neck = false;             // and whether the surface is a saddle there
-    double neck_radius = 0;       // of the narrowest place where the surface is a saddle; infinity if there is none
-    Eigen::Vector3d narrowest;    // where that is
+    double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
+    Eigen::Vector3d narrowest;     // where that is
     double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
     Eigen::Vector3d least_symbol;  // where it is
 };
@@ -31,7 +31,7 @@ struct MotionMeasures {
 // `stepper` made the state; its projection is brought to the surface of the state.
 MotionMeasures measure(MotionStepper& stepper, const MotionState& state, const Bending& bending);
 
-// 1 - (INT H)^2/(A INT H^2), zero where H is the same everywhere: then area and volume are the same condition.
-double variation_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);
+// INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.
+double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);
 
 }  // namespace tubule::surface3d

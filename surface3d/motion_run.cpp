@@ -30,6 +30,7 @@ constexpr double loosest_tolerance = 1e-4;      // beyond it steps are too long 
 constexpr double first_step = 1e-4;             // of the time in which the mesh relaxes
 constexpr double growth = 1.6, safety = 0.85;   // of steps
 constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
+constexpr double creep = 10;                    // increase since its lowest, of the asked accuracy
 constexpr double climb = 0.25;                  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
 // A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
@@ -38,7 +39,8 @@ constexpr int steps_between_meshes = 20;
 constexpr int steps_between_looks = 10, most_crawling = 100;
 constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere
 constexpr double seconds_between_checkpoints = 20;
-constexpr double same_everywhere = 1e-8;  // variation_of_H
+// Variations of H that are no more than this, or than so many times what two ways to find it differ, are none.
+constexpr double same_everywhere = 1e-9, times_noise = 4;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -195,7 +197,6 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
 
 void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     MotionLaw law = motion_law(case_.model);
-    law.keeps_volume = memory_.keeps_volume;
     if (case_.surface.scheme == Scheme::paper) {
         law.flows = true;  // it has all components of u in all models
         paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);
@@ -203,6 +204,7 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     const MotionControl control{.area = memory_.area,
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
+                                .least_variation = memory_.least_variation,
                                 .second_order = case_.surface.scheme == Scheme::bdf2};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
     if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
@@ -223,9 +225,7 @@ void MotionAttempt::begin() {
     memory_.area = o.area, memory_.volume = o.volume;
     memory_.reference_energy = std::max(std::abs(o.energy), o.magnitude);
     memory_.relaxation = case_.surface.relaxation.value_or(relaxes_in * time_to_change(law, o, start.mesh.period == 0));
-    // Where H is the same everywhere, area and volume are the same condition: the pressure stands for lambda.
-    const bool same = law.inextensible && variation_of_H(space, start.mesh, fields) < same_everywhere;
-    memory_.keeps_volume = law.keeps_volume && !same;
+    memory_.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
     memory_.next_step = case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end));
     make_stepper(start.mesh);
     state_ = stepper_->start(start.mesh);
@@ -237,7 +237,7 @@ void MotionAttempt::begin() {
         }
     state_.u_past = state_.u;
     look();
-    memory_.total_start = total();
+    memory_.total_start = memory_.lowest_total = total();
     trace.add(0, now_.bending.energy);
     write_row();
     write_frame();
@@ -307,6 +307,7 @@ void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.corrected += std::abs(next.correction);
     state_ = next.state;
     now_ = m;
+    memory_.lowest_total = std::min(memory_.lowest_total, total());
     ++steps_;
 }
 
@@ -331,6 +332,11 @@ std::optional<StopReport> MotionAttempt::check_shape() const {
         return StopReport{Stop::pinch_off, t,
                           fmt::format("the neck radius fell to {:.4g} at {}", now_.neck_radius, where(now_.narrowest)),
                           "lower accuracy.r_min to follow the neck further"};
+    if (total() - memory_.lowest_total > creep * case_.accuracy.energy * memory_.reference_energy)
+        return StopReport{Stop::resolution_lost, t,
+                          fmt::format("the energy has risen by {:.3g} of E_ref, little by little, which it cannot",
+                                      (total() - memory_.lowest_total) / memory_.reference_energy),
+                          "use more elements"};
     if (now_.turn > sharpest_turn)
         return StopReport{
             now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
@@ -393,6 +399,7 @@ void MotionAttempt::make_new_mesh() {
     state_.u_past = state_.u;
     look();
     memory_.error += std::abs(now_.bending.energy - energy);
+    memory_.lowest_total += std::max(now_.bending.energy - energy, 0.0);
     if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.relaxation);
 }
 
@@ -602,9 +609,9 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         if (fine->summary.as_accurate_as_asked || given || pair == most_pairs ||
             settings.elements * 1.6 > most_triangles || ended_early(reason)) {
             if (!known)
-                fine->summary.warnings.push_back(fmt::format(
-                    "the coarser run of the pair came to t = {:.6g} only: the error is not known ({})", compared_until,
-                    coarse_stop.message));
+                fine->summary.warnings.push_back(
+                    fmt::format("the coarser run of the pair came to t = {:.6g} only: the error is not known ({})",
+                                compared_until, coarse_stop.message));
             accept(fine->summary, c, given);
             return fine->summary;
         }

@@ -139,22 +139,29 @@ void MotionStepper::make_symmetric(const StepBase& base) {
     system_.b.array() *= scale.array();
 }
 
-Eigen::VectorXd MotionStepper::solve(const StepBase& base, double& lambda) {
+bool MotionStepper::area_is_volume(const StepBase& base) const {
+    if (!law_.inextensible) return false;
+    const Extent rate = extent_rate(space_, *base.mesh, base.fields.normal);  // -INT H, A
+    const Extent by_H = extent_rate(space_, *base.mesh, base.fields.normal * base.fields.H.asDiagonal());
+    return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
+}
+
+Eigen::VectorXd MotionStepper::solve(const StepBase& base, bool with_lambda, double& lambda) {
     assemble(space_, unknowns_, law_, bending_, base, system_);
     const Extent now = extent(space_, *base.mesh), back = extent_rate(space_, *base.mesh, base.displacement);
     if (law_.inextensible && control_.area)
         system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
     make_symmetric(base);
     const Eigen::MatrixXd rigid = rigid_motions(base);
-    Eigen::MatrixXd border(unknowns_.size(), rigid.cols() + law_.keeps_volume);
+    Eigen::MatrixXd border(unknowns_.size(), rigid.cols() + with_lambda);
     border.leftCols(rigid.cols()) = rigid;
     Eigen::VectorXd rate = Eigen::VectorXd::Zero(border.cols());
-    if (law_.keeps_volume) {
+    if (with_lambda) {
         border.rightCols<1>() = system_.flux;
         if (control_.volume) rate.tail<1>()[0] = (*control_.volume - now.volume + back.volume) / base.te;
     }
     const auto [x, y] = solver_.solve(system_.A, system_.b, border, rate);
-    lambda = law_.keeps_volume ? y.tail<1>()[0] : 0;
+    lambda = with_lambda ? y.tail<1>()[0] : 0;
     return x;
 }
 
@@ -201,8 +208,8 @@ Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const
 }
 
 // Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
-VectorField MotionStepper::correction(const VectorField& X, const MotionFields& f) const {
-    const bool area = law_.inextensible && control_.area, volume = law_.keeps_volume && control_.volume;
+VectorField MotionStepper::correction(const VectorField& X, const MotionFields& f, bool with_volume) const {
+    const bool area = law_.inextensible && control_.area, volume = with_volume && control_.volume;
     VectorField sum = VectorField::Zero(3, X.cols());
     if (!area && !volume) return sum;
     const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
@@ -247,7 +254,8 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         te};
     MotionStep out;
     MotionState& to = out.state;
-    const Eigen::VectorXd x = solve(base, to.lambda);
+    const bool keeps_volume = law_.keeps_volume && !area_is_volume(base);
+    const Eigen::VectorXd x = solve(base, keeps_volume, to.lambda);
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
@@ -265,7 +273,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
             (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum();
         out.error = along.cwiseAbs().maxCoeff() / 2;
     }
-    const VectorField kept_extent = correction(to.X, base.fields);
+    const VectorField kept_extent = correction(to.X, base.fields, keeps_volume);
     out.correction = work(kept_extent, base.fields);
     to.X += kept_extent;
     to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;

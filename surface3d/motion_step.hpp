@@ -28,7 +28,10 @@ struct MotionState {
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
     double relaxation = 0.1;             // time in which the mesh becomes even
-    bool second_order = true;            // else Euler steps on the surface of their beginning
+    // Where H varies less, relative to INT H^2 (variation_of_H), area and volume are one condition: lambda is left out,
+    // as the pressure stands for it, and the area alone is kept to rounding.
+    double least_variation = 1e-8;
+    bool second_order = true;  // else Euler steps on the surface of their beginning
 };
 
 struct MotionStep {
@@ -61,10 +64,11 @@ public:
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
 
 private:
-    Eigen::VectorXd solve(const StepBase& base, double& lambda);
+    bool area_is_volume(const StepBase& base) const;
+    Eigen::VectorXd solve(const StepBase& base, bool with_lambda, double& lambda);
     void make_symmetric(const StepBase& base);
     Eigen::MatrixXd rigid_motions(const StepBase& base) const;
-    VectorField correction(const VectorField& X, const MotionFields& fields) const;
+    VectorField correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;
 
     CurvedMesh mesh_;

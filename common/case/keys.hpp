@@ -200,8 +200,6 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
         k.number("relaxation", d.relaxation, {.above = 0});
         return;
     }
-    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation"})
-        k.absent(key, "must be absent: it belongs to a motion, which has a table [time]");
     k.choice("recovery", d.recovery,
              {{"elementwise", Recovery::elementwise},
               {"normal", Recovery::normal},
@@ -211,6 +209,8 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
               {"patch", Recovery::patch},
               {"exact", Recovery::exact}});
     k.number("smoothing", d.smoothing, {.from = 0});
+    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation"})
+        k.absent(key, "must be absent: it belongs to a motion, which has a table [time]");
 }
 
 template <class Keys>
@@ -347,13 +347,10 @@ template <class Keys>
 void motion_keys(Keys& k, Case& c) {
     k.table("model", [&](auto& k) { keys(k, c.model); });
     k.optional_table("equilibrium", c.equilibrium, [](auto& k, EquilibriumChoices& e) { keys(k, e); });
-    if (c.equilibrium) {
-        for (const char* key : {"velocity", "time"})
-            k.absent(key, "must be absent: nothing moves in a case with [equilibrium]");
-        return;
-    }
-    k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
-    k.table("time", [&](auto& k) { keys(k, c.time); });
+    if (c.equilibrium)
+        k.absent("velocity", "must be absent: nothing moves in a case with [equilibrium]");
+    else
+        k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
 }
 
 // Tier surface3d moves a surface if there is a time to do so.
@@ -395,6 +392,10 @@ void keys(Keys& k, Case& c) {
         else
             keys(k, c.discretisation);
     });
+    if (c.equilibrium)
+        k.absent("time", "must be absent: nothing moves in a case with [equilibrium]");
+    else if (c.tier == Tier::axisym)
+        k.table("time", [&](auto& k) { keys(k, c.time); });
     // The shapes of a branch are numbered as if that were their time.
     const double end = c.equilibrium ? std::numeric_limits<int>::max() : c.time.end;
     k.table("expect", [&](auto& k) { keys(k, c.expect, end); });

@@ -47,7 +47,8 @@ BorderedSolver::Answer BorderedSolver::iterate(const Eigen::SparseMatrix<double>
         x.tail(m) = schur.solve(C.transpose() * part - r.tail(m));
         x.head(n).noalias() -= W * x.tail(m);
     };
-    if (!gmres_) gmres_.emplace(n + m);
+    if (!gmres_ || border_ != m) gmres_.emplace(n + m);
+    border_ = m;
     Eigen::VectorXd rhs(n + m), x = Eigen::VectorXd::Zero(n + m);
     rhs.head(n) = b;
     if (m > 0) rhs.tail(m) = d;

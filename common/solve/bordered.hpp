@@ -38,7 +38,7 @@ private:
     SparseLdlt<float> factors_;
     std::optional<SparseLuLarge> lu_;
     std::optional<Gmres> gmres_;
-    int iterations_ = 0, fallbacks_ = 0;
+    int border_ = 0, iterations_ = 0, fallbacks_ = 0;
 };
 
 }  // namespace tubule

@@ -260,16 +260,41 @@ class Balance(InFolder):
 
 
 class Command(InFolder):
+    CASE = """tier = "surface3d"
+[energy]
+k20 = 1.0
+[model]
+kind = "stokes"
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 1.1
+c = 0.9
+[accuracy]
+energy = 0.1
+[discretisation]
+elements = 80
+order = 3
+[time]
+end = 0.01
+"""
+
+    def ran(self):
+        case, file = self.folder / "moving.toml", self.folder / "moving.hdf"
+        case.write_text(self.CASE)
+        subprocess.run([TUBULE, "run", case, "--quiet", "-o", file], check=True)
+        return file
+
     def test_options_come_through(self):
-        file = write(self.folder / "a.hdf", times=(0, 1))
+        file = self.ran()
         texts = self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25", program=TUBULE)
         self.assertIn("cut x = \u22120.25", texts)
-        texts = self.drawn(file, "--kind", "surface", "--colour", "p,H", "--times", "1", program=TUBULE)
+        texts = self.drawn(file, "--kind", "surface", "--colour", "p,H", "--times", "0.01", program=TUBULE)
         self.assertIn("mean curvature H", texts)
-        self.assertIn("pressure p, white: its mean 5", texts)
+        self.assertTrue(any(text.startswith("pressure p, white: its mean") for text in texts))
 
     def test_refusals(self):
-        file = write(self.folder / "a.hdf", times=(0, 1))
+        file = self.ran()
         for words, option in (("is not x, y or z = number", "--plane=w=0"), ("--colour", "--colour=H,T")):
             done = self.plot(file, option, program=TUBULE)
             self.assertEqual(done.returncode, 2)

@@ -85,7 +85,7 @@ TEST(ShapeKeys, ChoicesOfTheSurface) {
               "case.toml:7:9: discretisation.order must be one of 2, 3, 4, not 5");
     EXPECT_EQ(refusal(surface + shape("kind = \"dumbbell\"\n") + "[discretisation]\nsymmetry = true\n"),
               "case.toml:7:1: unknown key discretisation.symmetry. Allowed here: elements, order, mesh, recovery, "
-              "smoothing");
+              "smoothing, scheme, step, time_tolerance, relaxation");
 }
 
 TEST(ShapeKeys, ImpossibleShapes) {
@@ -114,7 +114,15 @@ TEST(ShapeKeys, WhatEachTierTakes) {
     EXPECT_EQ(refused("kind = \"file\"\npath = \"scan.obj\"\n"),
               "case.toml:5:8: shape.kind must not be \"file\": meshes need tier = \"surface3d\"");
     const auto still = [](const std::string& more) { return refusal(surface + shape("kind = \"dumbbell\"\n") + more); };
-    EXPECT_EQ(still(time_span), "case.toml:6:1: time must be absent: tier \"surface3d\" does not move surfaces yet");
+    EXPECT_EQ(still(time_span), "accepted");
+    EXPECT_EQ(still("[model]\nkind = \"fluid\"\n"),
+              "case.toml:6:1: model must be absent: without a table [time] nothing moves");
+    EXPECT_EQ(still("[discretisation]\nstep = 0.1\n"),
+              "case.toml:7:8: discretisation.step must be absent: it belongs to a motion, which has a table [time]");
+    EXPECT_EQ(still(time_span + "[discretisation]\nrecovery = \"patch\"\n"),
+              "case.toml:9:12: discretisation.recovery must be absent: a surface that moves has its own curvatures");
+    EXPECT_EQ(still(time_span + "[discretisation]\nscheme = \"paper\"\n"),
+              "case.toml:9:10: discretisation.scheme \"paper\" needs discretisation.step: it does not control it");
     EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
               "case.toml:7:9: accuracy.r_min must be absent: without a table [time] nothing moves");
 }
