@@ -20,6 +20,7 @@ void add_check(CLI::App& app, int& exit_status);
 void add_show(CLI::App& app, int& exit_status);
 void add_plot(CLI::App& app, int& exit_status);
 void add_compare(CLI::App& app, int& exit_status);
+void add_chart(CLI::App& app, int& exit_status);
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
 struct RunOptions {

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
     tubule::add_show(app, status);
     tubule::add_plot(app, status);
     tubule::add_compare(app, status);
+    tubule::add_chart(app, status);
     try {
         app.parse(argc, argv);
         if (version)

@@ -1,14 +1,10 @@
 // tubule plot RESULT... : draws results by the Python scripts of tools/plot.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -51,7 +47,6 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     return arguments;
 }
 
-// Python takes this process' place, so that its exit status is ours. Returns only when that is impossible.
 int plot(const PlotOptions& options) {
     try {
         for (const std::string& result : options.results) repair_result(result);
@@ -66,13 +61,7 @@ int plot(const PlotOptions& options) {
         fmt::print(stderr, "{}\n", error.what());
         return 4;
     }
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    std::fflush(nullptr);
-    execv(argv[0], argv.data());
-    fmt::print(stderr, "tubule plot: cannot start {}: {}\n", arguments[0], std::strerror(errno));
-    return 4;
+    return become("plot", arguments);
 }
 
 }  // namespace

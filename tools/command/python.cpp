@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -72,6 +73,16 @@ int draw_by_script(const std::string& subcommand, const std::string& script, con
     return wait_for(subcommand, std::move(command), file.get());
 } catch (const std::runtime_error& error) {
     fmt::print(stderr, "{}\n", error.what());
+    return no_picture;
+}
+
+int become(const std::string& subcommand, std::vector<std::string> command) {
+    std::vector<char*> argv;
+    for (std::string& argument : command) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    std::fflush(nullptr);
+    execv(argv[0], argv.data());
+    fmt::print(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
     return no_picture;
 }
 

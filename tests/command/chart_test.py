@@ -1,0 +1,229 @@
+#!/usr/bin/python3
+"""`tubule chart`: the front, failures, resuming, references, maps, refusals.
+
+chart_test.py TUBULE PLOT: the program, the folder of its scripts.
+"""
+import csv
+import stat
+import sys
+import textwrap
+import unittest
+
+from program import QUICK, ProgramTest
+
+sys.path.insert(0, sys.argv[2])
+import chart  # noqa: E402
+import chart_file  # noqa: E402
+import chart_runs  # noqa: E402
+
+# Stands for the program: what a run does depends on its elements alone, and costs nothing. E_ref is 2, the energy at the
+# end 1 + 1/elements^2; from 64 elements on it crashes, with 32 it hangs, with 4 it stops early. Every run leaves a line.
+STAND_IN = """#!/usr/bin/python3
+import json, os, signal, sys, time
+from pathlib import Path
+command, arguments = sys.argv[1], sys.argv[2:]
+if command == "check":
+    print("[time]\\nend = 1.0\\noutput = [0.5]")
+elif command == "run":
+    sets = dict(a.split("=", 1) for a in arguments if "=" in a)
+    n = int(sets["discretisation.elements"])
+    with open(Path(__file__).with_name("ran"), "a") as log:
+        log.write(f"{n}\\n")
+    if n == 32:
+        time.sleep(100)
+    if n >= 64:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    step = float(sets.get("discretisation.step", 0))
+    Path(arguments[arguments.index("-o") + 1]).write_text(json.dumps([n, step]))
+else:
+    n, step = json.loads(Path(arguments[0]).read_text())
+    stop, end = ("pinch-off", 0.5) if n == 4 else ("finished", 1.0)
+    if arguments[1] == "--json":
+        about = {"stop": stop, "E_ref": 2.0, "estimated_error": 1 / n**2, "elements": n, "steps": 7}
+        print(json.dumps({"about": about}))
+    else:
+        growth = 1 + step * n  # unstable where step * n exceeds 0.1
+        print(f"time,energy\\n0,2\\n0.5,{2 * growth}\\n" + (f"1,{1 + 1 / n**2}" if end == 1 else ""))
+"""
+
+
+class Charts(ProgramTest):
+    def rows(self, name="case.csv"):
+        with open(self.folder / name, newline="") as file:
+            return list(csv.DictReader(file))
+
+    def refused(self, *arguments):
+        before = self.files()
+        out, err = self.tubule("chart", *arguments, status=2)
+        self.assertEqual(out, "")
+        self.assertEqual(self.files(), before)
+        return err
+
+
+class RealRuns(Charts):
+    def test_a_chart_of_accuracies(self):
+        """Of three accuracies the smallest is the reference; the others keep theirs, as runs promise. Again: no run."""
+        command = ("chart", self.case, "--vary", "accuracy.energy=1e-2,1e-4,1e-7")
+        out, err = self.tubule(*command)
+        self.assertEqual(err.count("finished"), 3)
+        rows = self.rows()
+        self.assertEqual([row["outcome"] for row in rows], ["finished"] * 3)
+        self.assertEqual(rows[2]["front"], "reference")
+        for row, asked in zip(rows[:2], (1e-2, 1e-4)):
+            self.assertLess(float(row["error"]), asked)
+            self.assertGreater(float(row["error"]), 1e-9)  # two runs are not the same
+        self.assertIn("for 1e-04: as the case says: energy=0.0001", out)
+        self.assertIn("for 1e-06: none reaches it", out)
+        self.assertTrue((self.folder / "case.svg").read_text().startswith("<?xml"))
+        again, err = self.tubule(*command)
+        self.assertEqual((again, err), (out, ""))
+        self.assertEqual(self.rows(), rows)
+
+    def test_a_result_as_reference_in_a_chart_file(self):
+        self.tubule("run", self.case, "--quiet", "--set", "accuracy.energy=1e-8", "-o", "fine.hdf")
+        chart_text = """
+            case = "case.toml"
+            times = [0.01, 0.05, 0.2]
+            [reference]
+            result = "fine.hdf"
+            [[series]]
+            name = "asked"
+            vary = { accuracy.energy = [1e-3, 1e-5] }
+            [[series]]
+            study = true
+            vary = { accuracy.energy = [1e-9] }
+        """
+        self.write("wp.toml", textwrap.dedent(chart_text))
+        out, _ = self.tubule("chart", "wp.toml", "-o", "wp.svg", "--quiet")
+        rows = self.rows("wp.csv")
+        self.assertEqual([row["series"] for row in rows], ["asked", "asked"])  # the study was not asked for
+        for row, asked in zip(rows, (1e-3, 1e-5)):
+            self.assertLess(float(row["error"]), asked)
+        self.assertIn("reference: fine.hdf", out)
+
+
+class Refusals(Charts):
+    def test_each_says_what_is_wrong(self):
+        vary = ("--vary", "accuracy.energy=1e-2,1e-3")
+        self.write("c.toml", 'case = "case.toml"\n[[series]]\nvari = { accuracy.energy = [1] }')
+        self.write("none.toml", 'case = "no.toml"\n[[series]]\nvary = { accuracy.energy = [1] }')
+        self.write("two.toml", 'case = "case.toml"\n[reference]\nresult = "x"\nvalues = [1]\n[[series]]')
+        self.write("values.toml", 'case = "case.toml"\n[reference]\nvalues = [1]\nE_ref = 1\n[[series]]')
+        self.write("study.toml", 'case = "case.toml"\n[[series]]\nstudy = true')
+        self.write("list.toml", 'case = "case.toml"\n[[series]]\nvary = { accuracy.energy = 1 }')
+        self.write("other.csv", "a,b\n1,2\n")
+        for arguments, words in (
+            (["case.toml"], "say what to vary"),
+            (["missing.toml", *vary], "cannot be read"),
+            (["c.toml"], "series.0.vari: unknown key; allowed: name, set, vary, study; did you mean 'vary'?"),
+            (["none.toml"], "no such file"),
+            (["two.toml"], "reference: needs one of result, set, values, not result and values"),
+            (["values.toml"], "reference.values: needs times, one for each of its 1 values"),
+            (["study.toml"], "every series is a study"),
+            (["list.toml"], "series.0.vary.accuracy.energy: must be a list of values, not 1"),
+            (["study.toml", *vary], "says itself what --vary would say"),
+            (["case.toml", "--vary", "accuracy.energy"], "must be key=value"),
+            (["case.toml", "--vary", "accuracy.energy=1e-2,,1"], "a value is empty"),
+            (["case.toml", "--vary", "accuracy.enrgy=1e-2"], "did you mean"),
+            (["case.toml", "--vary", "accuracy.energy=7"], "in series"),
+            (["case.toml", *vary, "--map", "discretisation.step=3"], "must be key=from:to"),
+            (["case.toml", *vary, "--map", "discretisation.step=3:1"], "from = 3 must be below to = 1"),
+            (["case.toml", *vary, "--reference", "none.hdf"], "none.hdf: no such file"),
+            (["case.toml", *vary, "-o", "x.gif"], "a picture is written as one of"),
+            (["case.toml", *vary, "-o", "no/x.svg"], "the folder no does not exist"),
+            (["case.toml", *vary, "-o", "other.svg"], "is no table of a chart"),
+            (["case.toml", *vary, "--jobs", "0"], "must be 1 or more"),
+            (["case.toml", *vary, "--times", "0.2,0.1"], "must be growing numbers above 0"),
+        ):
+            with self.subTest(arguments=arguments):
+                self.assertIn(words, self.refused(*arguments))
+
+
+class Outcomes(Charts):
+    """By a program that stands in for ours, whose errors and failures are known."""
+
+    def setUp(self):
+        super().setUp()
+        self.program = self.write("stand_in", STAND_IN)
+        self.program.chmod(self.program.stat().st_mode | stat.S_IXUSR)
+
+    def ran(self):
+        return (self.folder / "ran").read_text().split()
+
+    def runner(self, jobs, limit=15.0, at_once=2):
+        program = chart_runs.Program(self.program, self.folder, limit, "energy")
+        table = chart_runs.Table(self.folder / "t.csv", "energy", [0.5, 1.0])
+        return chart_runs.Runner(program, table, jobs, at_once, say=lambda words: None)
+
+    def jobs(self, *elements):
+        return chart_file.chart_of_case(self.case, [f"discretisation.elements={','.join(map(str, elements))}"], []).jobs()
+
+    def test_crash_hang_and_stop_are_outcomes_and_nothing_is_repeated(self):
+        jobs = self.jobs(4, 8, 32, 64)
+        self.runner(jobs).run(jobs)
+        again = self.runner(jobs)  # reads the table
+        again.run(jobs)
+        self.assertEqual(sorted(self.ran(), key=int), ["4", "8", "32", "64"])  # each once
+        runs = [again.table.runs[job.key] for job in jobs]
+        self.assertEqual([run.outcome for run in runs], ["pinch-off", "finished", "too slow", "crashed"])
+        self.assertEqual(runs[0].stop_time, 0.5)
+        self.assertEqual(runs[1].values, {0.5: 2.0, 1.0: 1 + 1 / 64})
+        self.assertIn("SIGSEGV", runs[3].message)
+
+    def test_a_table_cut_short_goes_on(self):
+        jobs = self.jobs(4, 8, 16)
+        self.runner(jobs).run(jobs[:2])
+        self.runner(jobs).run(jobs)
+        self.assertEqual(sorted(self.ran(), key=int), ["4", "8", "16"])
+
+    def test_another_case_is_another_run(self):
+        jobs = self.jobs(8)
+        self.runner(jobs).run(jobs)
+        self.case.write_text(QUICK.replace("k42 = 0.1", "k42 = 0.2"))
+        self.runner(jobs).run(jobs)
+        self.assertEqual(self.ran(), ["8", "8"])
+
+    def test_the_largest_stable_step_is_bisected(self):
+        """Growth 1 + step n above 1.1: with 10 elements stable up to 0.01, with 5 to 0.02."""
+        one = chart_file.chart_of_case(self.case, ["discretisation.elements=10,5"], [])
+        one.map = chart_file.map_option("discretisation.step=1e-3:1e-1:4")
+        program = chart_runs.Program(self.program, self.folder, 20, "energy")
+        options = type("Options", (), {"jobs": 2, "again": False, "draw": False})
+        real, chart.checked = chart.checked, lambda program, jobs: {}
+        self.addCleanup(setattr, chart, "checked", real)
+        self.assertEqual(chart.stability_map(one, options, [self.folder / "m.svg"], program, lambda words: None), 0)
+        found = {}
+        for row in self.rows("m.csv"):
+            step = float(row["settings"].split("step=")[1])
+            found.setdefault((row["elements"], float(row["growth"]) <= 1.1), []).append(step)
+        # Grid: 10^(-3 + i/4) to three digits.
+        self.assertAlmostEqual(max(found["10", True]), 0.00562)
+        self.assertAlmostEqual(min(found["10", False]), 0.01)  # 1 + 0.01 * 10 is 1.1 and a rounding above
+        self.assertAlmostEqual(max(found["5", True]), 0.0178)
+        self.assertAlmostEqual(min(found["5", False]), 0.0316)
+        self.assertLess(len(self.rows("m.csv")), 2 * 9)  # fewer than all: 9 values each
+
+
+class Front(unittest.TestCase):
+    def run_of(self, key, cpu_s, error, outcome="finished"):
+        return chart_runs.Run(key, outcome, cpu_s=cpu_s, values={1.0: 1 + 2 * error}, scale=2.0)
+
+    def test_front_and_choices(self):
+        """Errors relative to E_ref = 2 against 1. c is beaten by b, e failed, and below 1e-5 nothing is known."""
+        runs = [self.run_of("a", 1, 1e-2), self.run_of("b", 2, 5e-4), self.run_of("c", 3, 6e-4),
+                self.run_of("d", 4, 1e-9), self.run_of("e", 1, 1e-9, "pinch-off"), self.run_of("f", 9, 0)]  # fmt: skip
+        judged, front, chosen = chart.judge([], runs, chart.Truth({1.0: 1.0}, 2.0, 1e-5, "made up"))
+        self.assertEqual([run.key for run in front], ["a", "b", "d"])
+        self.assertEqual([judged[key]["front"] for key in "abcdef"], [1, 2, "", 3, "", ""])
+        self.assertEqual({target: run and run.key for target, run in chosen.items()}, {1e-3: "b", 1e-4: "d", 1e-6: None})
+        self.assertEqual(judged["b"]["chosen_for"], "1e-03")
+        self.assertEqual(judged["c"]["error"], "6.0000e-04")
+
+    def test_options_make_lines(self):
+        one = chart_file.chart_of_case("c.toml", ["a.order=2,3", "a.elements=8,16"], ["a.scheme=euler,b.x=[1,2]"])
+        self.assertEqual([series.name for series in one.series], ["order = 2", "order = 3", "scheme = euler, x = [1,2]"])
+        self.assertEqual([series.vary for series in one.series], [{"a.elements": [8, 16]}] * 3)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,153 @@
+"""The pictures of `tubule chart`."""
+
+import textwrap
+
+import style
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+FLOOR = 1e-16  # an error of zero is drawn here
+SMALL = 6.5
+SIDE = 2.6  # inches beside the axes, for words
+CHARACTERS = 60  # of a line there
+FAILED = {"marker": "x", "ls": "", "markersize": 5, "mew": 1.1}
+
+
+def series_styles(chart):
+    names = list(dict.fromkeys(series.name for series in chart.series))
+    colours = style.line_colours(len(names))
+    return {
+        name: {"color": colour, "marker": style.MARKERS[i % len(style.MARKERS)]}
+        for i, (name, colour) in enumerate(zip(names, colours))
+    }
+
+
+def label_axes(axes):
+    axes.tick_params(which="both", top=True, right=True)
+    low, high = axes.get_xlim()
+    if high < 100 * low:  # powers of ten alone would say too little
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def words_beside(figure, left, lines, height):
+    wrapped = [part for line in lines for part in textwrap.wrap(line, CHARACTERS, subsequent_indent="      ")]
+    figure.text(left, 1 - 0.12 / height, "\n".join(wrapped), va="top", fontsize=5.8, linespacing=1.25)
+
+
+def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
+    """All runs, faint, and a line through the best of each series; crosses on the upper edge for those that failed,
+    numbers on the front of all, named beside."""
+    styles = series_styles(chart)
+    height = 3.9
+    figure = Figure(figsize=(style.WIDTH, height))
+    width = style.WIDTH - SIDE - 0.6
+    axes = figure.add_axes([0.6 / style.WIDTH, 0.42 / height, width / style.WIDTH, 1 - 0.72 / height])
+    by_series = {name: {} for name in styles}
+    failed = {}
+    for job in jobs:
+        run = runs[job.key]
+        if run.key == truth.key or job.series not in by_series:
+            continue
+        if run.finished and all(time in run.values for time in truth.values):
+            by_series[job.series][run.key] = run
+        else:
+            failed[run.key] = (job, run)
+    for name, of in by_series.items():
+        points = sorted((run.cpu_s, max(error_of(run, truth), FLOOR)) for run in of.values())
+        best = [p for i, p in enumerate(points) if all(p[1] < q[1] for q in points[:i])]
+        axes.loglog(*columns(points), ls="", alpha=0.45, markersize=2.5, zorder=2, **styles[name])
+        axes.loglog(*columns(best), ls="-", zorder=3, **styles[name])
+    axes.loglog(*columns([(run.cpu_s, max(error_of(run, truth), FLOOR)) for run in front]),
+                color="0.75", lw=4, zorder=1, solid_capstyle="round")  # fmt: skip
+    for number, run in enumerate(front, 1):
+        axes.annotate(str(number), (run.cpu_s, max(error_of(run, truth), FLOOR)), (-4, -8), textcoords="offset points",
+                      fontsize=SMALL, zorder=5, ha="right")  # fmt: skip
+    for job, run in failed.values():
+        axes.plot(max(run.cpu_s, 1e-3), 0.985, transform=axes.get_xaxis_transform(), color=styles[job.series]["color"],
+                  clip_on=False, zorder=6, **FAILED)  # fmt: skip
+    if truth.known_to > 0:
+        axes.set_ylim(bottom=min(axes.get_ylim()[0], truth.known_to / 2))
+        bottom = axes.get_ylim()[0]
+        axes.axhspan(bottom, truth.known_to, color="0.93", zorder=0)
+        axes.annotate("the reference is no better known", (1, truth.known_to), (-3, 2), ha="right", va="bottom",
+                      xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=SMALL,
+                      color="0.35")  # fmt: skip
+        axes.set_ylim(bottom=bottom)
+    axes.set_ylim(top=axes.get_ylim()[1] * 4)
+    axes.set_xlabel("CPU time of a whole run (s)")
+    relative = "E_ref" if "energy" in chart.quantity else "its largest value"
+    at = ", ".join(f"{time:g}" for time in truth.values)
+    axes.set_ylabel(f"largest error of {chart.quantity}, relative to {relative}")
+    axes.set_title(f"{chart.title or chart.case.stem}; t = {at}", loc="left", fontsize=7)
+    label_axes(axes)
+    handles = [Line2D([], [], label=name, **styles[name]) for name in styles]
+    if failed:
+        handles.append(Line2D([], [], color="0.3", label="stopped early", **FAILED))
+    axes.legend(handles=handles, loc="best", fontsize=SMALL)
+    lines = ["The front, cheapest first:"] + [f"{n}  {named[run.key]}" for n, run in enumerate(front, 1)]
+    if failed:
+        lines += ["", "Stopped early:"]
+        stops = {}
+        for job, run in failed.values():
+            stops.setdefault((job.series, run.outcome), []).append((job, run))
+        for (series, outcome), of in stops.items():
+            which = "; ".join(f"{' '.join(job.told)} (t = {run.stop_time:.3g})" for job, run in of)
+            lines.append(f"{series}: {outcome}: {which}")
+    words_beside(figure, 1 - (SIDE - 0.08) / style.WIDTH, lines, height)
+    style.save(figure, list(map(str, outputs)))
+
+
+def columns(points):
+    return [p[0] for p in points], [p[1] for p in points]
+
+
+def stability_map(chart, lines, jobs, runs, outputs):
+    """Every run as a mark, filled where stable, with the line between for each series."""
+    styles = series_styles(chart)
+    height = 3.4
+    figure = Figure(figsize=(style.WIDTH * 0.75, height))
+    axes = figure.add_axes([0.13, 0.125, 0.52, 0.8])
+    widths = {line.against: 0.0 for line in lines}
+    for line in lines:
+        for i in range(len(line.values)):
+            run = runs.get(line.job(i).key)
+            if run and chart.against == "discretisation.elements":
+                widths[line.against] = max(widths[line.against], run.width)
+    by_width = all(widths.values())
+    shift = 1.0
+    for name in styles:
+        border = []
+        for line in (line for line in lines if line.series.name == name):
+            x = (widths[line.against] if by_width else line.against) * shift
+            for i, value in enumerate(line.values):
+                run = runs.get(line.job(i).key)
+                if run:
+                    marks(axes, x, value, run, styles[name])
+            low, high = line.limits
+            border.append((x, (low * high) ** 0.5 if low and high else high or low))
+        axes.loglog(*columns(sorted(border)), color=styles[name]["color"], zorder=2)
+        shift *= 1.03  # so that marks of several series at one place can be told apart
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("mesh width h (edge of a triangle of the mean area)" if by_width else chart.against)
+    axes.set_ylabel(chart.map.key.rpartition(".")[2])
+    axes.set_title(chart.title or chart.case.stem, loc="left", fontsize=7)
+    label_axes(axes)
+    handles = [Line2D([], [], ls="-", label=name, **styles[name]) for name in styles]
+    handles.append(Line2D([], [], color="0.3", ls="", marker="o", label="stable"))
+    handles.append(Line2D([], [], color="0.3", label="run stopped", **FAILED))
+    handles.append(Line2D([], [], color="0.3", ls="", marker="o", mfc="white", label="energy grew by 10 %"))
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0)
+    style.save(figure, list(map(str, outputs)))
+
+
+def marks(axes, x, y, run, look):
+    if run.stable:
+        axes.plot(x, y, ls="", zorder=3, **look)
+    elif run.finished:
+        axes.plot(x, y, ls="", zorder=3, mfc="white", **look)
+    else:
+        axes.plot(x, y, zorder=3, color=look["color"], **FAILED)

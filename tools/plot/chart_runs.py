@@ -1,0 +1,281 @@
+"""What a chart runs, each run a process of its own, and the table that remembers them (CSV). Standard library only.
+
+A run that crashes or hangs is an outcome like others. The table is written anew after every run, so a chart that was
+stopped goes on where it was.
+"""
+
+import csv
+import ctypes
+import hashlib
+import io
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+LARGEST_GROWTH = 1.1  # of the total energy over that of the start: more is called unstable
+STATUS = {2: "refused", 130: "interrupted"}
+PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to run. `sets` are all overrides, in order; `told` those that tell it from others of its series."""
+
+    series: str
+    case: Path
+    sets: tuple  # of "key=value"
+    told: tuple = ()
+
+    @property
+    def key(self):
+        """The same for the same computation: the text of the case and what is set."""
+        text = self.case.read_text() + "\n".join(self.sets)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@dataclass
+class Run:
+    """What came of it. `values` at the times of the chart, as far as it got."""
+
+    key: str
+    outcome: str  # a stop reason; crashed, too slow, refused
+    message: str = ""
+    stop_time: float = 0.0
+    cpu_s: float = 0.0
+    values: dict = field(default_factory=dict)  # time -> value
+    scale: float = 0.0  # E_ref
+    stated_error: float = 0.0
+    elements: int = 0
+    steps: int = 0
+    width: float = 0.0  # edge of an equilateral triangle of the mean area; 0: of a profile
+    growth: float = 0.0  # largest total energy over that of the start
+
+    @property
+    def finished(self):
+        return self.outcome in ("finished", "stationary")
+
+    @property
+    def stable(self):
+        return self.finished and self.growth <= LARGEST_GROWTH
+
+
+def value_text(value):
+    """As --set and a case file want it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list):
+        return "[" + ",".join(value_text(entry) for entry in value) + "]"
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+class Program:
+    """`tubule` as it is called for charts."""
+
+    def __init__(self, path, folder, limit, quantity):
+        self.path, self.folder, self.limit, self.quantity = path, folder, limit, quantity
+        # One thread: then CPU time is what a run needs, not what idle threads spend waiting.
+        self.environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+
+    def check(self, job):
+        """The case with all overrides as text of TOML, or what is wrong with it."""
+        done = subprocess.run([self.path, "check", job.case, *set_options(job)], capture_output=True, text=True)
+        return (done.stdout, None) if done.returncode == 0 else (None, done.stderr.strip())
+
+    def start(self, job, number):
+        result = self.folder / f"run_{number}.hdf"
+        command = [self.path, "run", "--quiet", job.case, *set_options(job), "-o", result]
+        log = open(result.with_suffix(".log"), "w")
+        process = subprocess.Popen(
+            list(map(str, command)),
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=self.environment,
+            preexec_fn=die_with_parent,
+        )
+        log.close()
+        return Going(job, process, result, time.monotonic() + self.limit)
+
+    def look(self, going):
+        """The Run if it has ended, else None. Kills what is over its limit."""
+        pid, status, usage = os.wait4(going.process.pid, os.WNOHANG)
+        if pid == 0 and time.monotonic() < going.deadline:
+            return None
+        late = pid == 0
+        if late:
+            going.process.kill()
+            _, status, usage = os.wait4(going.process.pid, 0)
+        going.process.returncode = os.waitstatus_to_exitcode(status)
+        run = Run(going.job.key, "", cpu_s=round(usage.ru_utime + usage.ru_stime, 3))
+        self.read(going, run)
+        if late:
+            run.outcome, run.message = "too slow", f"not done after {self.limit:g} s"
+        elif going.process.returncode < 0:
+            name = signal.Signals(-going.process.returncode).name
+            run.outcome, run.message = "crashed", f"ended by {name}"
+        elif not run.outcome:
+            words = going.result.with_suffix(".log").read_text().strip().splitlines()
+            run.outcome = STATUS.get(going.process.returncode, "crashed")
+            run.message = words[-1] if words else f"exit status {going.process.returncode}"
+        for path in self.folder.glob(going.result.stem + ".*"):
+            path.unlink()
+        return run
+
+    def read(self, going, run):
+        """What the result says, journal included; nothing if there is none."""
+        shown = [
+            subprocess.run([self.path, "show", going.result, form], capture_output=True, text=True)
+            for form in ("--json", "--csv")
+        ]
+        if not going.result.exists() or any(done.returncode != 0 for done in shown):
+            return
+        about = json.loads(shown[0].stdout)["about"]
+        rows = [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(io.StringIO(shown[1].stdout))]
+        run.outcome, run.message = about.get("stop", ""), about.get("stop_message", "")
+        run.scale, run.stated_error = about.get("E_ref", 0.0), rounded(about.get("estimated_error", 0.0))
+        run.elements, run.steps = about.get("elements", 0), about.get("steps", 0)
+        if not rows:
+            return
+        run.stop_time = rows[-1]["time"]
+        run.values = {row["time"]: row[self.quantity] for row in rows if self.quantity in row}
+        totals = [row["energy"] + row.get("kinetic_energy", 0.0) for row in rows]
+        run.growth = rounded(max(totals) / totals[0]) if totals[0] > 0 else 1.0
+        if "integral_K" in rows[0] and run.elements:
+            run.width = rounded(math.sqrt(4 / math.sqrt(3) * rows[0]["area"] / run.elements))
+
+
+def rounded(value):
+    """As the table keeps it, so that a chart drawn from the table is the same."""
+    return float(f"{value:.5g}")
+
+
+@dataclass
+class Going:
+    job: Job
+    process: subprocess.Popen
+    result: Path
+    deadline: float
+
+
+def die_with_parent():
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def set_options(job):
+    return [part for override in job.sets for part in ("--set", override)]
+
+
+class Table:
+    """Runs that are done, by key, in a file."""
+
+    COLUMNS = ("series", "settings", "outcome", "stop_time", "error", "front", "chosen_for", "cpu_s", "stated_error",
+               "elements", "steps", "width", "growth", "E_ref")  # fmt: skip
+
+    def __init__(self, path, quantity, times, again=False):
+        self.path, self.quantity, self.times = path, quantity, times
+        self.runs = {}
+        if not again and path.exists():
+            self.runs = self._read()
+
+    def _value_columns(self):
+        return [f"{self.quantity}@{time:g}" for time in self.times]
+
+    def _read(self):
+        """Runs of an earlier call. ValueError if the file is something else."""
+        runs = {}
+        with open(self.path, newline="") as file:
+            for row in csv.DictReader(file):
+                try:
+                    values = {}
+                    for name, text in row.items():
+                        if name.startswith(self.quantity + "@") and text:
+                            values[float(name.partition("@")[2])] = float(text)
+                    runs[row["key"]] = Run(
+                        row["key"], row["outcome"], row["message"], float(row["stop_time"]), float(row["cpu_s"]), values,
+                        float(row["E_ref"]), float(row["stated_error"]), int(row["elements"]), int(row["steps"]),
+                        float(row["width"]), float(row["growth"]))  # fmt: skip
+                except (KeyError, TypeError, ValueError, AttributeError) as error:
+                    complaint = f"{self.path}: is no table of a chart ({error}); move it or choose another -o"
+                    raise ValueError(complaint) from error
+        return runs
+
+    def write(self, jobs, judged=None):
+        """Rows in the order of the jobs; `judged` gives error, front and chosen_for of a key. Runs that no job asks
+        for any more are kept at the end."""
+        judged = judged or {}
+        rows, seen = [], set()
+        for job in jobs:
+            run = self.runs.get(job.key)
+            if run and job.key not in seen:
+                seen.add(job.key)
+                rows.append(self._row(job.series, " ".join(job.told), run, judged.get(job.key, {})))
+        rows += [self._row("", "", run, {}) for key, run in self.runs.items() if key not in seen]
+        aside = self.path.with_name(self.path.name + ".part")
+        with open(aside, "w", newline="") as file:
+            columns = [*self.COLUMNS, *self._value_columns(), "message", "key"]
+            writer = csv.DictWriter(file, columns, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+        os.replace(aside, self.path)
+
+    def _row(self, series, settings, run, judged):
+        row = {
+            "series": series,
+            "settings": settings,
+            "outcome": run.outcome,
+            "stop_time": run.stop_time,
+            "cpu_s": run.cpu_s,
+            "stated_error": run.stated_error,
+            "elements": run.elements,
+            "steps": run.steps,
+            "width": run.width,
+            "growth": run.growth,
+            "E_ref": run.scale,
+            "message": run.message,
+            "key": run.key,
+            **judged,
+        }
+        for at, column in zip(self.times, self._value_columns()):
+            if at in run.values:
+                row[column] = run.values[at]
+        return row
+
+
+class Runner:
+    """Runs jobs, some at a time, and keeps the table."""
+
+    def __init__(self, program, table, jobs, at_once, repeats=1, say=print):
+        self.program, self.table, self.jobs = program, table, jobs
+        self.at_once, self.repeats, self.say, self.number = at_once, repeats, say, 0
+
+    def run(self, jobs):
+        """Those that are not in the table yet."""
+        done = self.table.runs
+        left = list({job.key: job for job in jobs if job.key not in done}.values())
+        if len(jobs) > len(left) and left:
+            self.say(f"{len(jobs) - len(left)} runs are in {self.table.path} already")
+        left = [job for job in left for _ in range(self.repeats)]
+        total, going = len(left), []
+        while left or going:
+            while left and len(going) < self.at_once:
+                self.number += 1
+                going.append(self.program.start(left.pop(0), self.number))
+            time.sleep(0.005)
+            for one in list(going):
+                run = self.program.look(one)
+                if run is None:
+                    continue
+                going.remove(one)
+                run.values = {at: run.values[at] for at in self.table.times if at in run.values}
+                earlier = done.get(run.key)
+                if earlier is None or run.cpu_s < earlier.cpu_s:  # of repeats, the least disturbed
+                    done[run.key] = run
+                self.table.write(self.jobs)
+                ended = total - len(left) - len(going)
+                words = run.outcome if run.finished else f"{run.outcome} at t = {run.stop_time:.4g}"
+                self.say(f"[{ended}/{total}] {one.job.series}: {' '.join(one.job.told)}: {words}, {run.cpu_s:.3g} s")
