@@ -178,7 +178,7 @@ class Table:
 
     def __init__(self, path, quantity, times, again=False):
         self.path, self.quantity, self.times = path, quantity, times
-        self.runs = {}
+        self.runs, self.names = {}, {}  # by key; names: series and settings of an earlier call
         if not again and path.exists():
             self.runs = self._read()
 
@@ -195,6 +195,7 @@ class Table:
                     for name, text in row.items():
                         if name.startswith(self.quantity + "@") and text:
                             values[float(name.partition("@")[2])] = float(text)
+                    self.names[row["key"]] = row["series"], row["settings"]
                     runs[row["key"]] = Run(
                         row["key"], row["outcome"], row["message"], float(row["stop_time"]), float(row["cpu_s"]), values,
                         float(row["E_ref"]), float(row["stated_error"]), int(row["elements"]), int(row["steps"]),
@@ -214,7 +215,7 @@ class Table:
             if run and job.key not in seen:
                 seen.add(job.key)
                 rows.append(self._row(job.series, " ".join(job.told), run, judged.get(job.key, {})))
-        rows += [self._row("", "", run, {}) for key, run in self.runs.items() if key not in seen]
+        rows += [self._row(*self.names.get(key, ("", "")), run, {}) for key, run in self.runs.items() if key not in seen]
         aside = self.path.with_name(self.path.name + ".part")
         with open(aside, "w", newline="") as file:
             columns = [*self.COLUMNS, *self._value_columns(), "message", "key"]
