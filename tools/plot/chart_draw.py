@@ -127,7 +127,8 @@ def stability_map(chart, lines, jobs, runs, outputs):
                 if run:
                     marks(axes, x, value, run, styles[name])
             low, high = line.limits
-            border.append((x, (low * high) ** 0.5 if low and high else high or low))
+            if low:
+                border.append((x, (low * high) ** 0.5 if high else low))
         axes.loglog(*columns(sorted(border)), color=styles[name]["color"], zorder=2)
         shift *= 1.03  # so that marks of several series at one place can be told apart
     axes.set_xscale("log")
