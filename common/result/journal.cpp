@@ -179,6 +179,8 @@ void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
         case Entry::mesh:
             contents.meshes.push_back(get_mesh(payload));
             return;
+        case Entry::point:
+            break;  // belongs to a scan
     }
     throw std::runtime_error(fmt::format("a journal record is of the unknown kind {}", static_cast<unsigned>(kind)));
 }
@@ -303,6 +305,12 @@ void Journal::mesh(std::uint64_t sequence, const SurfaceCells& mesh) {
     commit(sequence);
 }
 
+void Journal::bytes(Entry kind, std::uint64_t sequence, std::span<const std::byte> payload) {
+    begin(kind);
+    put(buffer_, payload);
+    commit(sequence);
+}
+
 std::vector<std::byte> read_journal(const std::filesystem::path& result) {
     const auto path = journal_path(result);
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -334,10 +342,16 @@ std::vector<std::byte> read_journal(const std::filesystem::path& result) {
 }
 
 void replay(std::span<const std::byte> journal, Contents& contents) {
+    replay(journal, contents.id, contents.sequence,
+           [&](Entry kind, std::span<const std::byte> payload) { apply(kind, payload, contents); });
+}
+
+void replay(std::span<const std::byte> journal, std::uint64_t expected_id, std::uint64_t& sequence,
+            const std::function<void(Entry, std::span<const std::byte>)>& apply) {
     std::uint64_t id = 0;
     if (journal.size() < header_size || std::memcmp(journal.data(), magic.data(), magic.size()) != 0) return;
     std::memcpy(&id, journal.data() + magic.size(), sizeof(id));
-    if (id != contents.id) return;
+    if (id != expected_id) return;
 
     const std::uint32_t seed = seed_of(id);
     auto rest = journal.subspan(header_size);
@@ -347,14 +361,14 @@ void replay(std::span<const std::byte> journal, Contents& contents) {
         if (head.length > rest.size() - sizeof(Head)) break;
         const auto record = rest.first(sizeof(Head) + head.length);
         if (record_crc(seed, record) != head.crc) break;
-        if (head.sequence > contents.sequence + 1)
+        if (head.sequence > sequence + 1)
             throw std::runtime_error(
                 fmt::format("its journal begins with record {}, but the file ends with record {}: "
                             "is it an old copy?",
-                            head.sequence, contents.sequence));
-        if (head.sequence == contents.sequence + 1) {
-            apply(static_cast<Entry>(head.kind), record.subspan(sizeof(Head)), contents);
-            contents.sequence = head.sequence;
+                            head.sequence, sequence));
+        if (head.sequence == sequence + 1) {
+            apply(static_cast<Entry>(head.kind), record.subspan(sizeof(Head)));
+            sequence = head.sequence;
         }
         rest = rest.subspan(record.size());
     }

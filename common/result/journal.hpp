@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -20,7 +21,7 @@ namespace tubule {
 // The journal may grow by this many bytes beyond the size of the file before it is merged; the tests lower it.
 inline std::size_t journal_slack = std::size_t{4} << 20;
 
-enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh };
+enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh, point /* of a scan */ };
 
 // Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
 std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
@@ -44,6 +45,7 @@ public:
     void record(Entry kind, std::uint64_t sequence, const Record& record);
     void discard(std::uint64_t sequence);
     void mesh(std::uint64_t sequence, const SurfaceCells& mesh);
+    void bytes(Entry kind, std::uint64_t sequence, std::span<const std::byte> payload);
 
     std::size_t size() const { return size_; }  // bytes
 
@@ -65,5 +67,9 @@ std::vector<std::byte> read_journal(const std::filesystem::path& result);
 // another result. While a run goes on, read the journal first and the contents then: there is never a gap in this
 // order. Throws std::runtime_error on a gap.
 void replay(std::span<const std::byte> journal, Contents& contents);
+
+// The same for other contents: `apply` takes the records that follow on `sequence`, which goes with them.
+void replay(std::span<const std::byte> journal, std::uint64_t id, std::uint64_t& sequence,
+            const std::function<void(Entry, std::span<const std::byte>)>& apply);
 
 }  // namespace tubule
