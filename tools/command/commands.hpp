@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/result/result.hpp"
 
 namespace CLI {
 class App;
@@ -21,6 +22,10 @@ void add_show(CLI::App& app, int& exit_status);
 void add_plot(CLI::App& app, int& exit_status);
 void add_compare(CLI::App& app, int& exit_status);
 void add_chart(CLI::App& app, int& exit_status);
+void add_scan(CLI::App& app, int& exit_status);
+
+// What a result says of its making when it begins: the build, the machine, when.
+About about_start();
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
 struct RunOptions {

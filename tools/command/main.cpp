@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     tubule::add_run(app, status);
     tubule::add_equilibrium(app, status);
     tubule::add_stability(app, status);
+    tubule::add_scan(app, status);
     tubule::add_check(app, status);
     tubule::add_show(app, status);
     tubule::add_plot(app, status);

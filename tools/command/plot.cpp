@@ -14,6 +14,7 @@
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/python.hpp"
+#include "tools/scan/scan_file.hpp"
 
 namespace tubule {
 
@@ -49,7 +50,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
 
 int plot(const PlotOptions& options) {
     try {
-        for (const std::string& result : options.results) repair_result(result);
+        for (const std::string& result : options.results) is_scan(result) ? repair_scan(result) : repair_result(result);
     } catch (const std::runtime_error& error) {
         fmt::print(stderr, "{}\n", error.what());
         return 2;

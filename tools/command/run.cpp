@@ -1,5 +1,5 @@
 // tubule run CASE... : runs cases, each into a result file.
-#include "axisym/run.hpp"
+#include "surface3d/run.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -22,15 +22,27 @@
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/progress.hpp"
-#include "surface3d/run.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/scan/tiers.hpp"
 
 namespace tubule {
 
 std::filesystem::path result_path(const RunOptions& options, const Case& c) {
     if (!options.output.empty()) return options.output;
     return std::filesystem::path(c.path).filename().replace_extension(".hdf");
+}
+
+About about_start() {
+    About about;
+    for (const auto& [name, value] : build_info()) about.emplace_back(name, value);
+    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    std::tm utc{};
+    gmtime_r(&now, &utc);
+    char text[32];
+    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    about.emplace_back("started", std::string(text));
+    return about;
 }
 
 namespace {
@@ -53,18 +65,6 @@ private:
     Progress progress_;
 };
 
-About about_start() {
-    About about;
-    for (const auto& [name, value] : build_info()) about.emplace_back(name, value);
-    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-    std::tm utc{};
-    gmtime_r(&now, &utc);
-    char text[32];
-    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-    about.emplace_back("started", std::string(text));
-    return about;
-}
-
 About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
     About about{{"stop", std::string(name(s.stop.reason))},
                 {"stop_time", s.stop.time},
@@ -77,18 +77,6 @@ About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
     about.insert(about.end(), s.details.begin(), s.details.end());
     about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
     return about;
-}
-
-// Both tiers, by the case.
-std::vector<std::string> series_names(const Case& c) {
-    if (c.equilibrium) return axisym::equilibrium_series_names(c);
-    return c.tier == Tier::axisym ? axisym::series_names(c) : surface3d::series_names(c);
-}
-RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart) {
-    if (c.equilibrium) return axisym::run_equilibrium(c, observer);
-    if (c.tier == Tier::axisym) return axisym::run(c, observer, restart ? &restart->record : nullptr);
-    if (restart && !c.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
-    return surface3d::run(c, observer, restart);
 }
 
 // Why a result's run ended; nothing if it is unfinished.

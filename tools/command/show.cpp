@@ -19,6 +19,8 @@
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/show_scan.hpp"
+#include "tools/scan/scan_file.hpp"
 
 namespace tubule {
 
@@ -230,8 +232,19 @@ std::size_t frame_index(const Result& result, long asked) {
     return static_cast<std::size_t>(asked < 0 ? count + asked : asked);
 }
 
+Text shown_scan(const ShowOptions& options) {
+    if (options.frame) throw std::runtime_error("a scan has no frames: --frame must be absent");
+    Text out;
+    add(out, "{}",
+        options.json  ? scan_json(options.file)
+        : options.csv ? scan_csv(options.file)
+                      : scan_summary(options.file));
+    return out;
+}
+
 Text shown(const ShowOptions& options) {
     if (options.frame && !options.csv && !options.json) throw std::runtime_error("--frame goes with --csv or --json");
+    if (is_scan(options.file)) return shown_scan(options);
     const Result result = read_result(options.file);
     std::optional<std::size_t> frame;
     if (options.frame) frame = frame_index(result, *options.frame);
@@ -265,7 +278,8 @@ void add_show(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("show", "Print a result: a summary, or its numbers as CSV or JSON");
     const auto options = std::make_shared<ShowOptions>();
     command->add_option("FILE", options->file, "result file NAME.hdf")->required();
-    CLI::Option* csv = command->add_flag("--csv", options->csv, "the series, in full precision");
+    CLI::Option* csv =
+        command->add_flag("--csv", options->csv, "the series, or the points of a scan, in full precision");
     command->add_flag("--json", options->json, "everything but the numbers of the frames' arrays")->excludes(csv);
     command->add_option("--frame", options->frame,
                         "with --csv: points and what is known there, of this frame, instead; with --json: its arrays "

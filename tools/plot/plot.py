@@ -165,10 +165,16 @@ def main():
             return EXIT_UNAVAILABLE
     # A result file never changes in place, so there is nothing to lock against; on some disks locks fail.
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    import scan
     from results import BadInput
 
     try:
-        draw(options.results, outputs, options)
+        if any(scan.is_scan(path) for path in options.results):
+            if len(options.results) > 1 or options.times or options.colour or options.kind != "all":
+                raise BadInput(f"{options.results[0]}: a scan is drawn by itself, without --times, --colour and --kind")
+            scan.draw(options.results[0], outputs)
+        else:
+            draw(options.results, outputs, options)
     except BadInput as error:
         print(error, file=sys.stderr)
         return EXIT_BAD_INPUT

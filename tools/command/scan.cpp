@@ -1,0 +1,143 @@
+// tubule scan FILE : what becomes of a case over lists, ranges and grids of its keys.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "common/case/read.hpp"
+#include "common/solve/interrupt.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/scan/dispatcher.hpp"
+#include "tools/scan/ranks.hpp"
+
+namespace tubule {
+
+namespace {
+
+struct ScanOptions {
+    ScanChoices choices;
+    std::string output;
+    std::optional<int> jobs;
+    bool resume = false, quiet = false;
+};
+
+// That of a case gets another name than its run.
+std::filesystem::path scan_path(const ScanOptions& options, const Scan& scan) {
+    if (!options.output.empty()) return options.output;
+    const std::filesystem::path stem = std::filesystem::path(scan.path).stem();
+    return stem.string() + (scan.text.empty() ? "_scan.hdf" : ".hdf");
+}
+
+// A result that cannot be written or resumed is found before anything is computed: bad input.
+ScanWriter open_result(const Scan& scan, const std::filesystem::path& file, bool resuming) {
+    try {
+        if (resuming && std::filesystem::exists(file)) return ScanWriter::resume(file, scan);
+        return ScanWriter::create(file, scan, about_start());
+    } catch (const std::runtime_error& error) {
+        throw CaseError(error.what());
+    }
+}
+
+void report(const ScanResult& result, const std::filesystem::path& file, bool interrupted, const ScanEffort& effort,
+            double seconds) {
+    std::array<std::size_t, n_outcomes> counts{};
+    for (const PointResult& p : result.points) ++counts[static_cast<std::size_t>(p.outcome)];
+    std::vector<std::string> words;
+    for (int i = 1; i < n_outcomes; ++i)
+        if (const std::size_t n = counts[static_cast<std::size_t>(i)]; n > 0)
+            words.push_back(fmt::format("{} {}", n, name(static_cast<Outcome>(i))));
+    fmt::print("{}: {}{} of {} points: {}\n", result.scan.path, interrupted ? "interrupted; " : "",
+               result.points.size() - counts[0], result.points.size(), fmt::join(words, ", "));
+    fmt::print("    {} run now, {:.3g} s of CPU time, {:.3g} s; {}\n", effort.points, effort.cpu_seconds, seconds,
+               file.string());
+    if (interrupted) fmt::print("    go on with --resume\n");
+}
+
+int scan_by(const ScanOptions& options, Ranks* ranks) {
+    const auto started = std::chrono::steady_clock::now();
+    const Scan scan = read_scan(options.choices);
+    const auto file = scan_path(options, scan);
+    if (ranks && options.jobs)
+        throw CaseError("--jobs must be absent under mpirun: each rank runs one point at a time");
+    const int jobs = options.jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+    if (jobs < 1) throw CaseError(fmt::format("--jobs must be 1 or more, not {}", jobs));
+    ScanWriter writer = open_result(scan, file, options.resume);
+    if (writer.complete()) {
+        if (ranks) ranks->dismiss();
+        if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", scan.path, file.string());
+        return 0;
+    }
+    bool was_interrupted = false;
+    ScanEffort effort;
+    {
+        Dispatcher dispatcher(writer, options.quiet);
+        was_interrupted = ranks ? ranks->run_scan(dispatcher, scan) : run_scan(dispatcher, scan, jobs);
+        effort = dispatcher.effort();
+    }
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    const Stop stop = was_interrupted ? Stop::interrupted : Stop::finished;
+    writer.finish({{"stop", std::string(name(stop))},
+                   {"wall_seconds", seconds},
+                   {"cpu_seconds", effort.cpu_seconds},
+                   {"points_run", static_cast<std::int64_t>(effort.points)},
+                   {"workers", std::int64_t{ranks ? ranks->count() : jobs}}});
+    if (!options.quiet) report(writer.result(), file, was_interrupted, effort, seconds);
+    if (was_interrupted && ranks) {
+        std::fflush(nullptr);
+        ranks->abort(exit_code(stop));
+    }
+    return exit_code(stop);
+}
+
+int scan(const ScanOptions& options) {
+    catch_interrupts();
+    std::optional<Ranks> ranks = Ranks::join();
+    if (!ranks) return scan_by(options, nullptr);
+    if (ranks->rank() > 0) {
+        ranks->serve();
+        return 0;
+    }
+    try {
+        return scan_by(options, &*ranks);
+    } catch (const CaseError&) {
+        ranks->dismiss();  // thrown before any work was handed out
+        throw;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "tubule: {}\n", error.what());
+        std::fflush(nullptr);
+        ranks->abort(exit_code(Stop::solver_failed));
+    }
+}
+
+}  // namespace
+
+void add_scan(CLI::App& app, int& exit_status) {
+    CLI::App* command =
+        app.add_subcommand("scan", "Find what becomes of a case over lists, ranges and grids of its keys");
+    const auto o = std::make_shared<ScanOptions>();
+    command->add_option("FILE", o->choices.file, "a scan file, or a case file with --over or --points")->required();
+    command
+        ->add_option("--over", o->choices.over,
+                     "a key and its values: energy.k42=0,0.1,0.2 or lo:hi:n or lo:hi:n:log; several make a grid")
+        ->allow_extra_args(false);
+    command->add_option("--points", o->choices.points, "a CSV table: a line of keys, then one line a point");
+    command->add_option("--set", o->choices.sets, "override a key for all points")->allow_extra_args(false);
+    command->add_option("--boundary", o->choices.boundary,
+                        "only the line between outcomes is wanted: 'outcome', or the name of the one it surrounds");
+    command->add_option("--seeds", o->choices.seeds, "intervals of the lattice on which lines are looked for (8)");
+    command->add_flag("--to-the-end", o->choices.to_the_end,
+                      "run each point to time.end even where its outcome is known before");
+    command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");
+    command->add_flag("--resume", o->resume, "go on with a scan that was interrupted or killed");
+    command->add_option("--jobs", o->jobs, "threads (default: one a processor)");
+    command->add_flag("--quiet", o->quiet, "no progress, no words");
+    command->callback([o, &exit_status] { exit_status = scan(*o); });
+}
+
+}  // namespace tubule

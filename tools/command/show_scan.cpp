@@ -1,0 +1,143 @@
+#include "tools/command/show_scan.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <string_view>
+#include <vector>
+
+#include "tools/command/json.hpp"
+#include "tools/scan/plan.hpp"
+#include "tools/scan/scan_file.hpp"
+
+namespace tubule {
+
+namespace {
+
+template <class... Args>
+void add(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+// One letter an outcome, for maps in a terminal.
+constexpr std::string_view letters = " UWSCPOIXF?";
+static_assert(letters.size() == n_outcomes);
+
+std::string words(const Value& value) {
+    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+std::string ends_of(const Axis& axis) {
+    return fmt::format("{} to {}, {} values{}", fmt::join(axis.values.front(), ", "),
+                       fmt::join(axis.values.back(), ", "), axis.size(), axis.logarithmic ? ", logarithmic" : "");
+}
+
+// The first axis to the right, the second upwards.
+void add_map(std::string& out, const ScanResult& result) {
+    const auto& axes = result.scan.axes;
+    add(out, "\nright: {}; up: {}\n", axes[0].keys.front(), axes[1].keys.front());
+    for (std::size_t j = axes[1].size(); j-- > 0;) {
+        add(out, "    ");
+        for (std::size_t i = 0; i < axes[0].size(); ++i)
+            out += letters[static_cast<std::size_t>(result.points[i * axes[1].size() + j].outcome)];
+        add(out, "\n");
+    }
+}
+
+// ---- CSV and JSON
+
+std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+    return out + '"';
+}
+
+std::string stop_of(const PointResult& p) {
+    return p.outcome == Outcome::not_run ? "" : stop_words()[static_cast<std::size_t>(p.stop)];
+}
+
+// The keys of a point and their values, in the order of the axes.
+std::vector<std::pair<std::string, std::string>> keys_of(const Scan& scan, std::size_t point) {
+    std::vector<std::pair<std::string, std::string>> keys;
+    const auto at = scan.place(point);
+    for (std::size_t a = 0; a < scan.axes.size(); ++a)
+        for (std::size_t k = 0; k < scan.axes[a].keys.size(); ++k)
+            keys.emplace_back(scan.axes[a].keys[k], scan.axes[a].values[at[a]][k]);
+    return keys;
+}
+
+}  // namespace
+
+std::string scan_summary(const std::filesystem::path& file) {
+    const ScanResult result = read_scan_result(file);
+    const Scan& scan = result.scan;
+    std::string out;
+    const auto line = [&](std::string_view name, const std::string& value) { add(out, "{:<18} {}\n", name, value); };
+    line("file", file.string());
+    if (!scan.title.empty()) line("title", scan.title);
+    line("case", scan.case_path);
+    if (!scan.sets.empty()) line("set", fmt::format("{}", fmt::join(scan.sets, "  ")));
+    for (const Axis& axis : scan.axes) line(fmt::format("{}", fmt::join(axis.keys, ", ")), ends_of(axis));
+    if (scan.boundary) line("boundary", scan.boundary->around ? std::string(name(*scan.boundary->around)) : "outcome");
+    bool stopped = false;
+    for (const auto& [key, value] : result.about) {
+        line(key, words(value));
+        stopped = stopped || key == "stop";
+    }
+    if (!stopped) line("stop", "none yet: the scan is going on, or was killed");
+    std::array<std::size_t, n_outcomes> counts{};
+    for (const PointResult& p : result.points) ++counts[static_cast<std::size_t>(p.outcome)];
+    add(out, "\n{:>10}     outcome\n", "points");
+    for (std::size_t i = 0; i < counts.size(); ++i)
+        if (counts[i] > 0) add(out, "{:>10}  {}  {}\n", counts[i], letters[i], name(static_cast<Outcome>(i)));
+    if (scan.axes.size() == 2 && scan.axes[0].size() <= 160) add_map(out, result);
+    return out;
+}
+
+std::string scan_csv(const std::filesystem::path& file) {
+    const ScanResult result = read_scan_result(file);
+    std::string out = "point";
+    for (const auto& [key, value] : keys_of(result.scan, 0)) add(out, ",{}", key);
+    add(out, ",outcome,stop,{},message\n", fmt::join(measure_names, ","));
+    for (const PointResult& p : result.points) {
+        if (p.outcome == Outcome::not_run) continue;
+        add(out, "{}", p.point);
+        for (const auto& [key, value] : keys_of(result.scan, p.point))
+            add(out, ",{}", value.find_first_of(",\"") == std::string::npos ? value : quoted(value));
+        add(out, ",{},{}", name(p.outcome), stop_of(p));
+        for (const double value : p.measures) add(out, ",{}", value);
+        add(out, ",{}\n", quoted(p.message));
+    }
+    return out;
+}
+
+std::string scan_json(const std::filesystem::path& file) {
+    const ScanResult result = read_scan_result(file);
+    const Scan& scan = result.scan;
+    std::string out = fmt::format("{{\n\"case\": {{\"path\": {}, \"text\": {}, \"set\": {}}},\n", json(scan.case_path),
+                                  json(scan.case_text), json(scan.sets));
+    add(out, "\"scan\": {{\"path\": {}, \"title\": {}, \"text\": {}}},\n\"about\": {{", json(scan.path),
+        json(scan.title), json(scan.text));
+    for (std::size_t i = 0; i < result.about.size(); ++i)
+        add(out, "{}{}: {}", i > 0 ? ", " : "", json(result.about[i].first), json(result.about[i].second));
+    add(out, "}},\n\"points\": [");
+    bool first = true;
+    for (const PointResult& p : result.points) {
+        if (p.outcome == Outcome::not_run) continue;
+        add(out, "{}\n{{\"point\": {}, \"set\": {{", first ? "" : ",", p.point);
+        first = false;
+        std::string sets;
+        for (const auto& [key, value] : keys_of(scan, p.point))
+            add(sets, "{}{}: {}", sets.empty() ? "" : ", ", json(key), json(value));
+        add(out, "{}}}, \"outcome\": {}, \"stop\": {}", sets, json(std::string(name(p.outcome))), json(stop_of(p)));
+        for (std::size_t m = 0; m < n_measures; ++m) add(out, ", \"{}\": {}", measure_names[m], json(p.measures[m]));
+        add(out, ", \"message\": {}}}", json(p.message));
+    }
+    add(out, "\n]\n}}\n");
+    return out;
+}
+
+}  // namespace tubule

@@ -1,0 +1,156 @@
+"""Maps of scans: what became of each point, the lines between, closed forms over them."""
+
+import h5py
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+import style
+from labels import formula
+from results import BadInput
+
+HEIGHT = 4.2  # inches
+# By name of the outcome; those at rest are light, those that end badly dark.
+COLOURS = {
+    "uniform-tube": "#d6e4f0",
+    "unduloid": "#f6c667",
+    "sphere": "#cfe8cf",
+    "closed": "#8fc18f",
+    "pinched": "#8a1538",
+    "overhang": "#5e4fa2",
+    "ill-posed": "#1a1a1a",
+    "self-intersection": "#b5651d",
+    "failed": "#ff00ff",
+    "undecided": "#9aa5ad",
+}
+THRESHOLD_DASHES = ("--", ":", "-.")
+NAMES = {
+    "energy.H0": "spontaneous curvature " + formula("H_0"),
+    "shape.length": "length L",
+    "shape.radius": "radius",
+    "shape.mode.0.amplitude": "amplitude A",
+}
+
+
+class Axis:
+    def __init__(self, group):
+        self.key = ", ".join(group.attrs["keys"])
+        self.logarithmic = bool(group.attrs["logarithmic"])
+        values = group["values"][()]
+        self.texts = [", ".join(text.decode() for text in row) for row in group["texts"][()]]
+        self.is_numeric = values.shape[1] == 1 and np.isfinite(values).all() and (np.diff(values[:, 0]) > 0).all()
+        self.values = values[:, 0] if self.is_numeric else np.arange(len(values), dtype=float)
+
+    @property
+    def label(self):
+        word = self.key.removeprefix("energy.")
+        return NAMES.get(self.key, formula(f"{word[0]}_{{{word[1:]}}}") if word in ("k20", "k40", "k42") else self.key)
+
+    def borders(self):
+        """Between the values, and as far beyond the first and last."""
+        v = np.log(self.values) if self.logarithmic else self.values
+        if v.size == 1:
+            borders = np.array([v[0] - 0.5, v[0] + 0.5])
+        else:
+            middle = (v[1:] + v[:-1]) / 2
+            borders = np.concatenate([[2 * v[0] - middle[0]], middle, [2 * v[-1] - middle[-1]]])
+        return np.exp(borders) if self.logarithmic else borders
+
+    def mark(self, axis):
+        if not self.is_numeric:
+            axis.set_ticks(self.values, self.texts)
+
+
+def is_scan(path):
+    try:
+        with h5py.File(path) as file:
+            return "scan" in file and "points" in file
+    except OSError:
+        return False  # said where it is read
+
+
+def read(path):
+    with h5py.File(path) as file:
+        axes = [Axis(file["axes"][name]) for name in sorted(file["axes"], key=int)]
+        points = {name: data[()] for name, data in file["points"].items()}
+        names = list(file["points/outcome"].attrs["names"])
+        title = file["scan"].attrs["title"]
+        boundary = file["boundary"][()]
+        thresholds = [
+            (line.attrs["label"], line["first"][()], line["second"][()], line["values"][()])
+            for line in file["thresholds"].values()
+        ]
+    return axes, points, names, title, boundary, thresholds
+
+
+def border_lines(axes, boundary, shape):
+    """The sides that the cells of neighbouring points share, for each pair that differs."""
+    x, y = axes[0].borders(), axes[1].borders()
+    lines = []
+    for a, b in boundary:
+        (i, j), (k, _) = np.unravel_index(a, shape), np.unravel_index(b, shape)
+        if k > i:
+            lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])])
+        else:
+            lines.append([(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
+    return lines
+
+
+def draw_map(axes, points, names, boundary, thresholds, panel):
+    outcomes = points["outcome"].astype(float)
+    shown = np.ma.masked_equal(outcomes, 0)
+    colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in names])
+    norm = BoundaryNorm(np.arange(-0.5, len(names)), len(names))
+    panel.pcolormesh(axes[0].borders(), axes[1].borders(), shown.T, cmap=colours, norm=norm, rasterized=True)
+    panel.add_collection(LineCollection(border_lines(axes, boundary, outcomes.shape), colors="black", linewidths=0.8))
+    handles = []
+    for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, thresholds):
+        panel.contour(axes[0].values[first], axes[1].values[second], values.T, [0], colors="#c0392b",
+                      linestyles=[dashes], linewidths=1.2)
+        handles.append(Line2D([], [], color="#c0392b", linestyle=dashes, label=label))
+    panel.set(xlabel=axes[0].label, ylabel=axes[1].label)
+    if axes[1].logarithmic:
+        panel.set_yscale("log")
+    axes[1].mark(panel.yaxis)
+    return handles
+
+
+def draw_line(axes, points, names, panel):
+    for k, name in enumerate(names):
+        here = points["outcome"] == k
+        if k > 0 and here.any():
+            panel.plot(axes[0].values[here], points["energy"][here], "o", color=COLOURS.get(name), markeredgecolor="0.3",
+                       markeredgewidth=0.4)
+    panel.set(xlabel=axes[0].label, ylabel="energy where the run stopped")
+    return []
+
+
+def draw(path, outputs):
+    style.check_outputs(outputs)
+    axes, points, names, title, boundary, thresholds = read(path)
+    if len(axes) > 2:
+        raise BadInput(f"{path}: a picture has one or two axes, this scan {len(axes)}: {', '.join(a.key for a in axes)}")
+    if not points["outcome"].any():
+        raise BadInput(f"{path}: no point is finished yet")
+    figure = Figure(figsize=(style.WIDTH, HEIGHT))
+    panel = figure.add_axes([0.09, 0.11, 0.62, 0.8])
+    if len(axes) == 2:
+        handles = draw_map(axes, points, names, boundary, thresholds, panel)
+    else:
+        handles = draw_line(axes, points, names, panel)
+    if axes[0].logarithmic:
+        panel.set_xscale("log")
+    axes[0].mark(panel.xaxis)
+    panel.set_title(title)
+    patches = [
+        Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
+        for k, name in enumerate(names)
+        if k > 0 and (count := int((points["outcome"] == k).sum()))
+    ]
+    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(0.72, 0.92))
+    style.save(figure, outputs)
+    plt.close("all")

@@ -1,0 +1,332 @@
+#include "tools/scan/description.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "common/case/read.hpp"
+#include "common/case/text.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr std::size_t most_points = 1'000'000;  // all are kept in memory
+
+std::string read_text(const std::filesystem::path& path) {
+    std::error_code none;
+    if (std::filesystem::is_directory(path, none)) throw CaseError(path.string() + ": is a directory");
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw CaseError(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string trimmed(const std::string& text) {
+    const auto first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+    return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
+// At commas outside of quotes and brackets.
+std::vector<std::string> split_list(const std::string& text) {
+    std::vector<std::string> parts(1);
+    int depth = 0;
+    char quote = 0;
+    for (const char c : text) {
+        if (quote)
+            quote = c == quote ? 0 : quote;
+        else if (c == '"' || c == '\'')
+            quote = c;
+        depth += !quote && (c == '[' || c == '{') ? 1 : !quote && (c == ']' || c == '}') ? -1 : 0;
+        if (c == ',' && depth == 0 && !quote)
+            parts.emplace_back();
+        else
+            parts.back() += c;
+    }
+    for (std::string& part : parts) part = trimmed(part);
+    return parts;
+}
+
+std::optional<double> number_of(const std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+// lo:hi:n or lo:hi:n:log as values; nothing if it has not that form.
+std::optional<Axis> parse_range(const std::string& text, const std::string& source) {
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() < 2 || text.find_first_of("\"'[{") != std::string::npos) return std::nullopt;
+    const auto refuse = [&](const std::string& why) {
+        throw CaseError(
+            fmt::format("{}: {}; a range is lo:hi:n, or lo:hi:n:log, n >= 2 values from lo to hi", source, why));
+    };
+    if (parts.size() < 3 || parts.size() > 4) refuse("not a range");
+    const auto lo = number_of(parts[0]), hi = number_of(parts[1]), count = number_of(parts[2]);
+    if (!lo || !hi || !count) refuse("not a number");
+    if (*count != std::floor(*count) || *count < 2) refuse(fmt::format("{} values", parts[2]));
+    if (*count > static_cast<double>(most_points)) refuse(fmt::format("more than {} values", most_points));
+    if (!(*hi > *lo)) refuse(fmt::format("the range is empty: {} is not above {}", parts[1], parts[0]));
+    Axis axis;
+    axis.logarithmic = parts.size() == 4;
+    if (axis.logarithmic && parts[3] != "log") refuse(fmt::format("'{}' is not 'log'", parts[3]));
+    if (axis.logarithmic && !(*lo > 0)) refuse("a logarithmic range must begin above 0");
+    const auto n = static_cast<std::size_t>(*count);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double part = static_cast<double>(i) / static_cast<double>(n - 1);
+        double value = axis.logarithmic ? *lo * std::pow(*hi / *lo, part) : *lo + (*hi - *lo) * part;
+        if (i + 1 == n) value = *hi;
+        axis.values.push_back({fmt::format("{}", value)});
+    }
+    return axis;
+}
+
+// ---- scan files
+
+const std::vector<std::string> file_keys{"title", "case", "set", "over", "points", "boundary", "seeds", "until"};
+
+[[noreturn]] void refuse(const std::string& path, const toml::source_region& where, const std::string& complaint) {
+    throw CaseError(fmt::format("{}:{}:{}: {}", path, where.begin.line, where.begin.column, complaint));
+}
+
+std::string text_in(const toml::table& root, const std::string& path, const char* key) {
+    const toml::node* node = root.get(key);
+    if (!node) return "";
+    if (!node->is_string()) refuse(path, node->source(), fmt::format("{} must be a string", key));
+    return node->as_string()->get();
+}
+
+std::vector<std::string> texts_in(const toml::table& root, const std::string& path, const char* key) {
+    const toml::node* node = root.get(key);
+    if (!node) return {};
+    if (!node->is_array()) refuse(path, node->source(), fmt::format("{} must be a list of strings", key));
+    std::vector<std::string> texts;
+    for (const toml::node& entry : *node->as_array()) {
+        if (!entry.is_string()) refuse(path, entry.source(), fmt::format("{} must be a list of strings", key));
+        texts.push_back(entry.as_string()->get());
+    }
+    return texts;
+}
+
+struct ScanFile {
+    std::string title, case_path, points, boundary;
+    std::vector<std::string> sets, over;
+    std::optional<int> seeds;
+    bool to_the_end = false;
+};
+
+ScanFile read_scan_file(const toml::table& root, const std::string& path) {
+    for (const auto& [key, node] : root) {
+        if (std::find(file_keys.begin(), file_keys.end(), key.str()) != file_keys.end()) continue;
+        const auto meant = near_miss(key.str(), file_keys);
+        refuse(path, key.source(),
+               fmt::format("unknown key {}{} Allowed here: {}", std::string(key.str()),
+                           meant ? fmt::format("; did you mean '{}'?", *meant) : ";", fmt::join(file_keys, ", ")));
+    }
+    ScanFile file;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    file.title = text_in(root, path, "title");
+    file.case_path = (folder / text_in(root, path, "case")).string();
+    file.sets = texts_in(root, path, "set");
+    file.over = texts_in(root, path, "over");
+    file.boundary = text_in(root, path, "boundary");
+    if (const std::string points = text_in(root, path, "points"); !points.empty())
+        file.points = (folder / points).string();
+    if (const toml::node* node = root.get("seeds")) {
+        const auto seeds = node->value_exact<std::int64_t>();
+        if (!seeds) refuse(path, node->source(), "seeds must be an integer");
+        file.seeds = static_cast<int>(std::clamp<std::int64_t>(*seeds, -1, 1'000'000));
+    }
+    const std::string until = text_in(root, path, "until");
+    if (!until.empty() && until != "decided" && until != "end")
+        refuse(path, root.get("until")->source(),
+               fmt::format("until must be \"decided\" or \"end\", not \"{}\"", until));
+    file.to_the_end = until == "end";
+    return file;
+}
+
+// ---- putting it together
+
+BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, const std::string& path) {
+    BoundaryChoice choice;
+    if (name != "outcome") {
+        choice.around = outcome_from_name(name);
+        if (!choice.around || choice.around == Outcome::not_run) {
+            std::vector<std::string> names = outcome_names();
+            names.front() = "outcome";
+            throw CaseError(
+                fmt::format("{}: boundary must be one of {}, not '{}'", path, fmt::join(names, ", "), name));
+        }
+    }
+    choice.seeds = seeds.value_or(choice.seeds);
+    if (choice.seeds < 1) throw CaseError(fmt::format("{}: seeds must be an integer >= 1", path));
+    return choice;
+}
+
+void refuse_doubled_keys(const Scan& scan) {
+    std::set<std::string> keys;
+    for (const Axis& axis : scan.axes)
+        for (const std::string& key : axis.keys)
+            if (!keys.insert(key).second) throw CaseError(fmt::format("{}: {} varies twice", scan.path, key));
+    for (const std::string& set : scan.sets)
+        if (const std::string key = set.substr(0, set.find('=')); keys.contains(key))
+            throw CaseError(fmt::format("{}: --set {}: the scan varies {}", scan.path, set, key));
+}
+
+// Every value of every axis on its own, the other axes at their first.
+void check_points(const Scan& scan) {
+    std::size_t stride = scan.size();
+    for (const Axis& axis : scan.axes) {
+        stride /= axis.size();
+        for (std::size_t i = 0; i < axis.size(); ++i) {
+            const Case c = scan.case_of(i * stride);
+            if (c.equilibrium)
+                throw CaseError(
+                    fmt::format("{}: a scan runs motions; follow equilibria by equilibrium.branch", scan.path));
+        }
+    }
+}
+
+}  // namespace
+
+std::size_t Scan::size() const {
+    std::size_t n = 1;
+    for (const Axis& axis : axes) n *= axis.size();
+    return n;
+}
+
+std::vector<std::size_t> Scan::place(std::size_t point) const {
+    std::vector<std::size_t> at(axes.size());
+    for (std::size_t a = axes.size(); a-- > 0; point /= axes[a].size()) at[a] = point % axes[a].size();
+    return at;
+}
+
+std::vector<std::string> Scan::sets_of(std::size_t point) const {
+    std::vector<std::string> all = sets;
+    const auto at = place(point);
+    for (std::size_t a = 0; a < axes.size(); ++a)
+        for (std::size_t k = 0; k < axes[a].keys.size(); ++k)
+            all.push_back(axes[a].keys[k] + "=" + axes[a].values[at[a]][k]);
+    return all;
+}
+
+Case Scan::case_of(std::size_t point) const {
+    return parse_case(case_text, sets_of(point), case_path);
+}
+
+Axis parse_axis(const std::string& over) {
+    const std::string source = "--over " + over;
+    const std::size_t equals = over.find('=');
+    const std::string key = trimmed(over.substr(0, equals));
+    if (equals == std::string::npos || key.empty())
+        throw CaseError(source + ": must have the form key=values, such as --over energy.k42=0:0.2:5");
+    const std::string text = trimmed(over.substr(equals + 1));
+    if (text.empty()) throw CaseError(source + ": no values; give some, such as 0,0.1,0.2 or 0:0.2:5");
+    Axis axis;
+    if (auto range = parse_range(text, source)) {
+        axis = *range;
+    } else {
+        for (const std::string& value : split_list(text)) {
+            if (value.empty()) throw CaseError(source + ": a value is missing between two commas");
+            axis.values.push_back({value});
+        }
+    }
+    axis.keys = {key};
+    return axis;
+}
+
+Axis parse_table(const std::string& text, const std::string& path) {
+    Axis axis;
+    int number = 0;
+    for (const std::string& line : split(text, '\n')) {
+        ++number;
+        if (trimmed(line).empty() || trimmed(line).front() == '#') continue;
+        const std::vector<std::string> cells = split_list(line);
+        if (std::find(cells.begin(), cells.end(), "") != cells.end())
+            throw CaseError(fmt::format("{}:{}: an empty cell", path, number));
+        if (axis.keys.empty()) {
+            axis.keys = cells;
+        } else if (cells.size() != axis.keys.size()) {
+            throw CaseError(fmt::format("{}:{}: {} values for {} keys", path, number, cells.size(), axis.keys.size()));
+        } else {
+            axis.values.push_back(cells);
+        }
+    }
+    if (axis.values.empty()) throw CaseError(fmt::format("{}: no points: a line of keys, then one line a point", path));
+    return axis;
+}
+
+Scan read_scan(const ScanChoices& choices) {
+    Scan scan;
+    scan.path = choices.file;
+    const std::string text = read_text(choices.file);
+    toml::table root;
+    try {
+        root = toml::parse(text, std::string_view(choices.file));
+    } catch (const toml::parse_error& error) {
+        throw CaseError(fmt::format("{}:{}:{}: not valid TOML: {}", choices.file, error.source().begin.line,
+                                    error.source().begin.column, error.description()));
+    }
+    ScanFile file;
+    if (root.contains("case")) {
+        file = read_scan_file(root, choices.file);
+        scan.text = text;
+        scan.case_path = file.case_path;
+        scan.case_text = read_text(file.case_path);
+    } else if (root.contains("over") || root.contains("points")) {
+        throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
+    } else {
+        scan.case_path = choices.file;
+        scan.case_text = text;
+    }
+    scan.title = file.title;
+    scan.sets = file.sets;
+    scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
+
+    // The command's values replace those of the file for the same key, and are another axis else.
+    for (const std::string& over : file.over) scan.axes.push_back(parse_axis(over));
+    for (const std::string& over : choices.over) {
+        Axis axis = parse_axis(over);
+        const auto same =
+            std::find_if(scan.axes.begin(), scan.axes.end(), [&](const Axis& a) { return a.keys == axis.keys; });
+        const bool given =
+            same != scan.axes.end() && same - scan.axes.begin() < static_cast<std::ptrdiff_t>(file.over.size());
+        if (given)
+            *same = std::move(axis);
+        else
+            scan.axes.push_back(std::move(axis));
+    }
+    const std::string points = choices.points.empty() ? file.points : choices.points;
+    if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_text(points), points));
+    if (scan.axes.empty())
+        throw CaseError(fmt::format("{}: nothing varies: give --over key=values, or a table by --points", scan.path));
+    double size = 1;
+    for (const Axis& axis : scan.axes) size *= static_cast<double>(axis.size());
+    if (size > static_cast<double>(most_points))
+        throw CaseError(fmt::format("{}: {:.3g} points are too many; at most {}", scan.path, size, most_points));
+
+    const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;
+    const auto seeds = choices.seeds ? choices.seeds : file.seeds;
+    if (!boundary.empty()) {
+        if (!points.empty())
+            throw CaseError(scan.path +
+                            ": boundary and points exclude each other: the rows of a table have no neighbours");
+        scan.boundary = boundary_of(boundary, seeds, scan.path);
+    } else if (seeds) {
+        throw CaseError(scan.path + ": seeds must be absent: it belongs to boundary");
+    }
+    scan.to_the_end = choices.to_the_end || file.to_the_end;
+    refuse_doubled_keys(scan);
+    check_points(scan);
+    return scan;
+}
+
+}  // namespace tubule

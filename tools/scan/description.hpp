@@ -1,0 +1,65 @@
+// What a scan is asked to do, as plain, validated data: docs/scans.md.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "tools/scan/outcome.hpp"
+
+namespace tubule {
+
+// One direction of the grid: n settings, each of one key or, from a table, of several at once.
+struct Axis {
+    std::vector<std::string> keys;                 // as in --set, such as "shape.mode.0.amplitude"
+    std::vector<std::vector<std::string>> values;  // [n][keys], TOML as it stands behind "key="
+    bool logarithmic = false;                      // spaced so
+
+    std::size_t size() const { return values.size(); }
+};
+
+// Where only the lines between outcomes are wanted: all of them, or those around one outcome.
+struct BoundaryChoice {
+    std::optional<Outcome> around;
+    int seeds = 8;  // intervals of the coarse lattice, along each axis, on whose lines crossings are looked for
+};
+
+struct Scan {
+    std::string path, text;  // the scan file, verbatim; of a scan without one: the case's path, empty text
+    std::string title;
+    std::string case_path, case_text;  // verbatim
+    std::vector<std::string> sets;     // of all points
+    std::vector<Axis> axes;            // points are numbered row by row, the last axis fastest
+    std::optional<BoundaryChoice> boundary;
+    bool to_the_end = false;  // run every point to its own end, even where its outcome is known before
+
+    std::size_t size() const;
+    std::vector<std::size_t> place(std::size_t point) const;  // on each axis
+    std::vector<std::string> sets_of(std::size_t point) const;
+    Case case_of(std::size_t point) const;  // throws CaseError
+};
+
+// What the command line adds; it wins over the file.
+struct ScanChoices {
+    std::string file;               // a scan or a case
+    std::vector<std::string> sets;  // key=value
+    std::vector<std::string> over;  // key=a,b,c   key=lo:hi:n   key=lo:hi:n:log
+    std::string points;             // a table
+    std::string boundary;           // "outcome", or the name of one
+    std::optional<int> seeds;
+    bool to_the_end = false;
+};
+
+// Reads and checks it all, every value of every axis on its own included. Throws CaseError.
+Scan read_scan(const ScanChoices& choices);
+
+// "energy.k42=0:0.2:5" and so on as an axis. Throws CaseError.
+Axis parse_axis(const std::string& over);
+
+// A table of comma-separated values with a header of keys. Throws CaseError.
+Axis parse_table(const std::string& text, const std::string& path);
+
+}  // namespace tubule

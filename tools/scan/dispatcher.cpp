@@ -1,0 +1,102 @@
+#include "tools/scan/dispatcher.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include "common/case/read.hpp"
+#include "common/solve/interrupt.hpp"
+
+namespace tubule {
+namespace {
+
+Plan plan_of(const ScanResult& result) {
+    const auto& boundary = result.scan.boundary;
+    return boundary ? Plan(result.shape(), boundary->seeds, boundary->around) : Plan(result.shape());
+}
+
+}  // namespace
+
+Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
+    : writer_(writer), plan_(plan_of(writer.result())), progress_({.quiet = quiet}) {
+    for (const PointResult& p : writer.result().points)
+        if (p.outcome != Outcome::not_run) plan_.done(p.point, p.outcome);
+    progress_.begin(plan_.known());
+}
+
+Dispatcher::Answer Dispatcher::take(std::size_t& point, bool may_wait) {
+    std::unique_lock lock(mutex_);
+    while (true) {
+        if (error_ || interrupted()) return Answer::over;
+        if (const auto next = plan_.next()) {
+            point = *next;
+            ++running_;
+            return Answer::point;
+        }
+        if (running_ == 0) return Answer::over;
+        if (!may_wait) return Answer::wait;
+        changed_.wait_for(lock, std::chrono::milliseconds(100));  // a signal wakes nobody
+    }
+}
+
+void Dispatcher::give(const PointResult& result) {
+    const std::lock_guard lock(mutex_);
+    --running_;
+    changed_.notify_all();
+    if (result.stop == stop_word(Stop::interrupted)) return;  // not finished: to be run again
+    try {
+        writer_.point(result);
+    } catch (...) {
+        error_ = std::current_exception();
+        return;
+    }
+    plan_.done(result.point, result.outcome);
+    ++effort_.points;
+    if (result[Measure::cpu_seconds] > 0) effort_.cpu_seconds += result[Measure::cpu_seconds];
+    progress_(plan_.known(), plan_.wanted(), plan_.follows());
+}
+
+void Dispatcher::fail(std::exception_ptr error) {
+    const std::lock_guard lock(mutex_);
+    if (!error_) error_ = std::move(error);
+    changed_.notify_all();
+}
+
+bool Dispatcher::was_interrupted() const {
+    if (error_) std::rethrow_exception(error_);
+    return interrupted();
+}
+
+PointResult run_one(const Scan& scan, std::size_t point) {
+    PointResult result;
+    try {
+        result = run_point(scan.case_of(point), scan.to_the_end, [] { return interrupted(); });
+    } catch (const CaseError& error) {
+        result = refused_point(error.what());
+    }
+    result.point = point;
+    return result;
+}
+
+bool run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
+    const int processors = omp_get_max_threads();
+    const auto work = [&] {
+        omp_set_num_threads(std::max(1, processors / jobs));  // of this thread: points share the processors
+        try {
+            for (std::size_t point = 0; dispatcher.take(point, true) == Dispatcher::Answer::point;)
+                dispatcher.give(run_one(scan, point));
+        } catch (...) {
+            dispatcher.fail(std::current_exception());
+        }
+    };
+    std::vector<std::thread> crew;
+    for (int i = 1; i < jobs; ++i) crew.emplace_back(work);
+    work();
+    for (std::thread& thread : crew) thread.join();
+    return dispatcher.was_interrupted();
+}
+
+}  // namespace tubule

@@ -1,0 +1,55 @@
+// Hands out the points of a scan and takes in their results, from any thread: the work queue.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <optional>
+
+#include "tools/scan/plan.hpp"
+#include "tools/scan/scan_file.hpp"
+#include "tools/scan/scan_progress.hpp"
+
+namespace tubule {
+
+// How much work a scan was, of the points run by this process and those it handed them to.
+struct ScanEffort {
+    std::size_t points = 0;
+    double cpu_seconds = 0;
+};
+
+class Dispatcher {
+public:
+    // Points that `writer` has already are not run again.
+    Dispatcher(ScanWriter& writer, bool quiet);
+
+    enum class Answer { point, wait, over };
+    // A point to run; `wait` while it depends on others that are being run; `over` when there is nothing left to do, an
+    // interrupt came, or something failed. With `may_wait`, waits instead of saying so.
+    Answer take(std::size_t& point, bool may_wait);
+    void give(const PointResult& result);  // saves it; a failure to do so ends the scan
+    void fail(std::exception_ptr error);
+
+    // When all is over: whether by an interrupt. Throws what failed.
+    bool was_interrupted() const;
+    ScanEffort effort() const { return effort_; }
+
+private:
+    ScanWriter& writer_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    Plan plan_;
+    std::size_t running_ = 0;
+    ScanEffort effort_;
+    std::exception_ptr error_;
+    ScanProgress progress_;
+};
+
+// Runs the scan on `jobs` threads of this process. True if an interrupt ended it. Throws what failed.
+bool run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs);
+
+// One point, from its keys to its result.
+PointResult run_one(const Scan& scan, std::size_t point);
+
+}  // namespace tubule

@@ -1,0 +1,62 @@
+#include "tools/scan/outcome.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace tubule {
+namespace {
+
+constexpr std::array<std::string_view, n_outcomes> names{
+    "not-run",  "uniform-tube", "unduloid",          "sphere", "closed",   "pinched",
+    "overhang", "ill-posed",    "self-intersection", "failed", "undecided"};
+
+Outcome at_rest(const EndShape& end) {
+    if (end.periodic)
+        return end.r_max - end.r_min < waves_of_uniform_tube * (end.r_max + end.r_min) ? Outcome::uniform_tube
+                                                                                       : Outcome::unduloid;
+    const double reduced_volume = 6 * std::sqrt(std::numbers::pi) * end.volume / std::pow(end.area, 1.5);
+    return reduced_volume > 1 - volume_off_sphere ? Outcome::sphere : Outcome::closed;
+}
+
+}  // namespace
+
+std::string_view name(Outcome outcome) {
+    return names[static_cast<std::size_t>(outcome)];
+}
+
+std::optional<Outcome> outcome_from_name(std::string_view name) {
+    for (std::size_t i = 0; i < names.size(); ++i)
+        if (names[i] == name) return static_cast<Outcome>(i);
+    return std::nullopt;
+}
+
+std::vector<std::string> outcome_names() {
+    return {names.begin(), names.end()};
+}
+
+Outcome outcome_of(Stop reason, const EndShape& end) {
+    switch (reason) {
+        case Stop::stationary:
+            return at_rest(end);
+        case Stop::pinch_off:
+            return Outcome::pinched;
+        case Stop::overhang:
+            return Outcome::overhang;
+        case Stop::ill_posed:
+            return Outcome::ill_posed;
+        case Stop::self_intersection:
+            return Outcome::self_intersection;
+        case Stop::resolution_lost:
+        case Stop::mesh_lost:
+        case Stop::solver_failed:
+            return Outcome::failed;
+        case Stop::finished:
+        case Stop::time_limit:
+        case Stop::interrupted:
+            break;
+    }
+    return Outcome::undecided;
+}
+
+}  // namespace tubule

@@ -1,0 +1,45 @@
+// What became of a point of a scan. One list serves results, tables and pictures.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/solve/stop.hpp"
+
+namespace tubule {
+
+enum class Outcome {
+    not_run,            // not asked for, or not yet
+    uniform_tube,       // at rest as a straight tube, or on its way to one without any wave that grows
+    unduloid,           // a tube at rest with waves
+    sphere,             // at rest as a sphere
+    closed,             // a cell or torus at rest, no sphere
+    pinched,            // a neck closed
+    overhang,           // a graph r(z) turned vertical
+    ill_posed,          // the flow is none any more
+    self_intersection,  // the surface meets itself
+    failed,             // the numerics gave up, or the point is no case
+    undecided           // still moving at time.end, or out of time
+};
+inline constexpr int n_outcomes = static_cast<int>(Outcome::undecided) + 1;
+
+// "uniform-tube" for Outcome::uniform_tube, and so on.
+std::string_view name(Outcome outcome);
+std::optional<Outcome> outcome_from_name(std::string_view name);
+std::vector<std::string> outcome_names();  // all, in order
+
+// The last state of a run, as far as outcomes ask for it.
+struct EndShape {
+    bool periodic = true;  // a tube, else closed
+    double r_min = 0, r_max = 0, area = 0, volume = 0;
+};
+
+// A tube counts as uniform if its radii differ by less than this part of their sum; a cell as a sphere if its reduced
+// volume is within this of 1.
+inline constexpr double waves_of_uniform_tube = 0.01, volume_off_sphere = 1e-3;
+
+Outcome outcome_of(Stop reason, const EndShape& end);
+
+}  // namespace tubule

@@ -1,0 +1,58 @@
+// Which points a scan runs, and in what order: all of them, or those along the lines between outcomes.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tools/scan/outcome.hpp"
+
+namespace tubule {
+
+// Points that are neighbours on the grid, but not in outcome.
+using Edge = std::pair<std::size_t, std::size_t>;
+
+// Following the lines: first the nodes of a coarse lattice; where two neighbours of it differ, the point halfway
+// between them, and so on down to neighbours on the grid; from each such crossing edge, all corners of the cells beside
+// it. What this comes to in the end does not depend on the order in which points are finished.
+class Plan {
+public:
+    // All points of a grid of this shape, row by row.
+    explicit Plan(std::vector<std::size_t> shape);
+    // Along the lines between all outcomes, or between one outcome and the others.
+    Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around);
+
+    std::optional<std::size_t> next();              // a point to run, if there is one by now
+    void done(std::size_t point, Outcome outcome);  // also of points that were run before a resume
+
+    std::size_t known() const { return outcomes_known_; }  // points done
+    std::size_t wanted() const { return wanted_count_; }   // points asked for by now
+    bool follows() const { return follows_; }
+
+private:
+    void want(std::size_t point);
+    void bisect(std::size_t a, std::size_t b);
+    void try_bisect(std::size_t interval);
+    void look_around(std::size_t point);
+    void want_cells_beside(std::size_t a, std::size_t b);
+    bool differ(std::size_t a, std::size_t b) const;
+    std::vector<std::size_t> place(std::size_t point) const;
+
+    std::vector<std::size_t> shape_, stride_;
+    bool follows_ = false;
+    std::optional<Outcome> around_;
+    std::vector<Outcome> outcomes_;
+    std::vector<char> wanted_;
+    std::deque<std::size_t> queue_;
+    std::size_t outcomes_known_ = 0, wanted_count_ = 0;
+    std::vector<Edge> intervals_;                    // of seed lines, to be bisected when both ends are known
+    std::vector<std::vector<std::size_t>> waiting_;  // intervals that wait for a point
+};
+
+// All edges of a grid whose ends differ, both known.
+std::vector<Edge> boundary_edges(const std::vector<std::size_t>& shape, const std::vector<Outcome>& outcomes,
+                                 std::optional<Outcome> around = std::nullopt);
+
+}  // namespace tubule

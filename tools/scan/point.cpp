@@ -1,0 +1,198 @@
+#include "tools/scan/point.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "axisym/forms.hpp"
+#include "axisym/frame.hpp"
+#include "tools/scan/tiers.hpp"
+#include "tools/scan/uniform_fate.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+// A rate counts as none below this part of the fastest one: a tube may be shifted along itself at no cost.
+constexpr double translation = 1e-12;
+constexpr double near_rest = 0.1;           // distance to the shape at rest / amplitude
+constexpr double next_stationarity = 1e-2;  // what a run that was not at rest is asked for next
+
+double cpu_seconds() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+int column(const std::vector<std::string>& series, const char* name) {
+    const auto found = std::find(series.begin(), series.end(), name);
+    return found == series.end() ? -1 : static_cast<int>(found - series.begin());
+}
+
+// Keeps the last row and the last frame, and ends the run when its fate is known.
+class Watch : public RunObserver {
+public:
+    Watch(const Case& c, bool to_the_end, const std::function<bool()>& interrupted) : interrupted_(interrupted) {
+        const auto series = series_names(c);
+        for (const char* name : {"energy", "volume", "r_min", "r_max", "area"})
+            columns_.push_back(column(series, name));
+        if (!to_the_end) fate_ = UniformFate::of(c);
+        keeps_frame_ = c.time.stationary.has_value();
+    }
+
+    void row(std::span<const double> values) override {
+        row_.assign(values.begin(), values.end());
+        decided = fate_ && fate_->decided({last(0), last(1), last(2), last(3)});
+    }
+    void frame(const std::function<Record()>& make) override {
+        if (keeps_frame_) last_frame = make();
+    }
+    void discard() override {
+        row_.clear();
+        last_frame.reset();
+        decided = false;
+    }
+    bool interrupted() override { return decided || interrupted_(); }
+
+    double energy() const { return last(0); }
+    EndShape end(bool periodic) const { return {periodic, last(2), last(3), last(4), last(1)}; }
+
+    bool decided = false;
+    std::optional<Record> last_frame;
+
+private:
+    double last(std::size_t which) const {
+        const int at = columns_[which];
+        return at < 0 || at >= static_cast<int>(row_.size()) ? unknown : row_[static_cast<std::size_t>(at)];
+    }
+
+    const std::function<bool()>& interrupted_;
+    std::optional<UniformFate> fate_;
+    bool keeps_frame_;
+    std::vector<int> columns_;
+    std::vector<double> row_;
+};
+
+enum class Rest { here, on_its_way, on_a_saddle };
+
+// Whether a graph r(z) that hardly moves is at rest: the energy falls in no direction, and Newton's method sees the
+// stationary shape next to it so near that it is of the same kind. A wave that decays slowly fails the latter, for
+// Newton's step takes it away as a whole (or, where its rate vanishes, a third of it). What is no graph is believed.
+Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
+    const bool graph = std::any_of(frame.arrays.begin(), frame.arrays.end(),
+                                   [](const Array& a) { return a.name == "restart_numbers"; });
+    if (!graph) return Rest::here;
+    const axisym::RestartState state = axisym::restart_state(frame);
+    const int order = c.discretisation.order;
+    const axisym::ProfileSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
+    const axisym::Forms forms(space, c.energy);
+    const Eigen::MatrixXd hessian = forms.hessian(state.coefficients), mass = forms.mass(state.coefficients);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(hessian, mass);
+    const Eigen::VectorXd& rate = modes.eigenvalues();
+    const double none = translation * rate.cwiseAbs().maxCoeff();
+    if (rate.minCoeff() < -none) return Rest::on_a_saddle;
+    const Eigen::VectorXd force = modes.eigenvectors().transpose() * forms.gradient(state.coefficients);
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(force.size());
+    for (Eigen::Index i = 0; i < force.size(); ++i)
+        if (rate[i] > none) step += force[i] / rate[i] * modes.eigenvectors().col(i);
+    const double waves = std::max(r_max - r_min, waves_of_uniform_tube * (r_max + r_min)) / 2;
+    return step.cwiseAbs().maxCoeff() < near_rest * waves ? Rest::here : Rest::on_its_way;
+}
+
+double detail(const RunSummary& summary, std::string_view name) {
+    for (const auto& [key, value] : summary.details)
+        if (const auto* number = std::get_if<std::int64_t>(&value); number && key == name)
+            return static_cast<double>(*number);
+    return unknown;
+}
+
+PointResult summed_up(const Case& c, const RunSummary& s, const Watch& watch) {
+    PointResult p;
+    const EndShape end = watch.end(std::holds_alternative<Tube>(c.shape));
+    const bool decided = watch.decided && s.stop.reason == Stop::interrupted;
+    p.outcome = decided ? Outcome::uniform_tube : outcome_of(s.stop.reason, end);
+    p.stop = decided ? stop_word(Stop::interrupted) + 1 : stop_word(s.stop.reason);
+    p.message = decided ? "all waves decay from here on" : s.stop.message;
+    p[Measure::energy] = s.energy;
+    p[Measure::time] = s.stop.time;
+    p[Measure::energy_error] = s.estimated_error;
+    p[Measure::E_ref] = s.reference_energy;
+    p[Measure::r_min] = end.r_min;
+    p[Measure::r_max] = end.r_max;
+    p[Measure::area] = end.area;
+    p[Measure::volume] = end.volume;
+    p[Measure::steps] = detail(s, "steps");
+    p[Measure::elements] = s.elements;
+    return p;
+}
+
+// A run that ends as stationary without being at rest goes on from there, to where it really goes.
+PointResult computed(Case c, bool to_the_end, const std::function<bool()>& interrupted) {
+    c.time.output.clear();
+    double steps = 0;
+    for (std::optional<surface3d::Restart> from;;) {
+        Watch watch(c, to_the_end, interrupted);
+        const RunSummary summary = run_tier(c, watch, from ? &*from : nullptr);
+        PointResult p = summed_up(c, summary, watch);
+        p[Measure::steps] = steps += p[Measure::steps];
+        if (summary.stop.reason != Stop::stationary || !watch.last_frame) return p;
+        const double r_min = p[Measure::r_min], r_max = p[Measure::r_max];
+        if (r_max - r_min < 1e-12 * r_max) return p;  // a straight tube stays one
+        const Rest rest = rest_of(c, *watch.last_frame, r_min, r_max);
+        if (rest == Rest::here) return p;
+        if (rest == Rest::on_a_saddle)
+            c.time.stationary.reset();
+        else
+            *c.time.stationary *= next_stationarity;
+        from = surface3d::Restart{std::move(*watch.last_frame), {}};
+    }
+}
+
+}  // namespace
+
+const std::vector<std::string>& stop_words() {
+    static const std::vector<std::string> words = [] {
+        std::vector<std::string> all;
+        for (int i = 0; i <= static_cast<int>(Stop::interrupted); ++i) all.emplace_back(name(static_cast<Stop>(i)));
+        all.insert(all.end(), {"decided", "refused"});
+        return all;
+    }();
+    return words;
+}
+
+int stop_word(Stop reason) {
+    return static_cast<int>(reason);
+}
+
+PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted) {
+    const auto started = std::chrono::steady_clock::now();
+    const double cpu = cpu_seconds();
+    PointResult p;
+    try {
+        p = computed(c, to_the_end, interrupted);
+    } catch (const std::exception& error) {
+        p = refused_point(error.what());
+        p.stop = stop_word(Stop::solver_failed);
+    }
+    p[Measure::wall_seconds] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    p[Measure::cpu_seconds] = cpu_seconds() - cpu;
+    return p;
+}
+
+PointResult refused_point(const std::string& message) {
+    PointResult p;
+    p.outcome = Outcome::failed;
+    p.stop = stop_word(Stop::interrupted) + 2;
+    p.measures.fill(unknown);
+    p.message = message;
+    return p;
+}
+
+}  // namespace tubule

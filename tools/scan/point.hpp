@@ -1,0 +1,58 @@
+// One point of a scan: a run in memory, and what is kept of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "tools/scan/outcome.hpp"
+
+namespace tubule {
+
+// Of the last state, but for energy_error, which is that of the whole run. What a run does not tell is not a number.
+enum class Measure {
+    energy,
+    time,
+    energy_error,
+    E_ref,
+    r_min,
+    r_max,
+    area,
+    volume,
+    steps,
+    elements,
+    wall_seconds,
+    cpu_seconds
+};
+inline constexpr std::array measure_names{"energy", "time",     "energy_error", "E_ref",
+                                          "r_min",  "r_max",    "area",         "volume",
+                                          "steps",  "elements", "wall_seconds", "cpu_seconds"};
+inline constexpr std::size_t n_measures = measure_names.size();
+
+struct PointResult {
+    std::size_t point = 0;
+    Outcome outcome = Outcome::not_run;
+    int stop = 0;  // of stop_words()
+    std::array<double, n_measures> measures{};
+    std::string message;
+
+    double& operator[](Measure m) { return measures[static_cast<std::size_t>(m)]; }
+    double operator[](Measure m) const { return measures[static_cast<std::size_t>(m)]; }
+};
+
+// Names of the stop reasons; then "decided", for runs that were ended as soon as their outcome was known; then
+// "refused", for points that are no case.
+const std::vector<std::string>& stop_words();
+int stop_word(Stop reason);
+
+// Runs a case. `to_the_end`: even where the outcome is known before. A run that `interrupted` ends has
+// Stop::interrupted and says nothing; what else goes wrong is an outcome, never thrown.
+PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted);
+
+// The result of a point whose keys make no case.
+PointResult refused_point(const std::string& message);
+
+}  // namespace tubule

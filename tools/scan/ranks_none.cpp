@@ -1,0 +1,23 @@
+// Ranks of a build without MPI: there are never any.
+#include <cstdlib>
+#include <utility>
+
+#include "tools/scan/ranks.hpp"
+
+namespace tubule {
+
+std::optional<Ranks> Ranks::join() {
+    return std::nullopt;
+}
+Ranks::Ranks(Ranks&&) noexcept = default;
+Ranks::~Ranks() = default;
+bool Ranks::run_scan(Dispatcher&, const Scan&) {
+    return false;
+}
+void Ranks::dismiss() {}
+void Ranks::serve() {}
+void Ranks::abort(int status) {
+    std::exit(status);
+}
+
+}  // namespace tubule

@@ -1,0 +1,444 @@
+#include "tools/scan/scan_file.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <span>
+
+#include "common/case/read.hpp"
+#include "common/result/durable_io.hpp"
+#include "common/result/hdf5_objects.hpp"
+#include "common/result/journal.hpp"
+#include "tools/scan/plan.hpp"
+#include "tools/scan/theory.hpp"
+
+namespace tubule {
+
+using namespace h5;
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// A scan and where in the stream of its journal it stands.
+struct Stored {
+    std::uint64_t id = 0, sequence = 0;
+    ScanResult result;
+    std::vector<ThresholdMap> thresholds;  // told at the end
+};
+
+// ---- a point as a record of the journal
+
+template <class T>
+void put(std::vector<std::byte>& out, const T& value) {
+    const auto bytes = std::as_bytes(std::span(&value, 1));
+    out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+std::vector<std::byte> to_bytes(const PointResult& p) {
+    std::vector<std::byte> out;
+    put(out, std::uint64_t{p.point});
+    put(out, static_cast<std::int32_t>(p.outcome));
+    put(out, static_cast<std::int32_t>(p.stop));
+    put(out, p.measures);
+    const auto text = std::as_bytes(std::span(p.message));
+    out.insert(out.end(), text.begin(), text.end());
+    return out;
+}
+
+template <class T>
+T take(std::span<const std::byte>& in) {
+    if (in.size() < sizeof(T)) throw std::runtime_error("a journal record is shorter than a point");
+    T value;
+    std::memcpy(&value, in.data(), sizeof(T));
+    in = in.subspan(sizeof(T));
+    return value;
+}
+
+PointResult from_bytes(std::span<const std::byte> in) {
+    PointResult p;
+    p.point = take<std::uint64_t>(in);
+    p.outcome = static_cast<Outcome>(take<std::int32_t>(in));
+    p.stop = take<std::int32_t>(in);
+    p.measures = take<decltype(p.measures)>(in);
+    p.message.assign(reinterpret_cast<const char*>(in.data()), in.size());
+    return p;
+}
+
+// ---- writing HDF5
+
+void put_text(hid_t parent, const std::string& name, const std::string& text) {
+    const char* data = text.c_str();
+    put_dataset(parent, name, text_type(), scalar(), &data);
+}
+
+void put_texts(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
+               const std::vector<std::string>& texts) {
+    std::vector<const char*> data;
+    for (const std::string& text : texts) data.push_back(text.c_str());
+    put_dataset(parent, name, text_type(), space(shape), data.data());
+}
+
+double number_or_nan(const std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size() ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
+void put_axis(hid_t parent, const std::string& name, const Axis& axis) {
+    const auto group = make_group(parent, name);
+    put_attribute(group, "keys", axis.keys);
+    put_attribute(group, "logarithmic", std::int64_t{axis.logarithmic});
+    std::vector<std::string> texts;
+    std::vector<double> numbers;
+    for (const auto& setting : axis.values)
+        for (const std::string& value : setting) {
+            texts.push_back(value);
+            numbers.push_back(number_or_nan(value));
+        }
+    const std::vector<std::size_t> shape{axis.size(), axis.keys.size()};
+    put_texts(group, "texts", shape, texts);
+    put_dataset(group, "values", H5T_NATIVE_DOUBLE, space(shape), numbers.data());
+}
+
+// Integers whose meaning stands beside them.
+void put_named(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
+               const std::vector<std::int8_t>& values, const std::vector<std::string>& names) {
+    put_attribute(put_dataset(parent, name, H5T_NATIVE_INT8, space(shape), values.data()), "names", names);
+}
+
+void put_points(hid_t file, const ScanResult& result) {
+    const auto group = make_group(file, "points");
+    const auto shape = result.shape();
+    std::vector<std::int8_t> outcomes, stops;
+    std::vector<std::string> messages;
+    for (const PointResult& p : result.points) {
+        outcomes.push_back(static_cast<std::int8_t>(p.outcome));
+        stops.push_back(static_cast<std::int8_t>(p.outcome == Outcome::not_run ? -1 : p.stop));
+        messages.push_back(p.message);
+    }
+    put_named(group, "outcome", shape, outcomes, outcome_names());
+    put_named(group, "stop", shape, stops, stop_words());
+    std::vector<double> column(result.points.size());
+    for (std::size_t m = 0; m < n_measures; ++m) {
+        for (std::size_t i = 0; i < column.size(); ++i) column[i] = result.points[i].measures[m];
+        put_dataset(group, measure_names[m], H5T_NATIVE_DOUBLE, space(shape), column.data());
+    }
+    put_texts(group, "message", shape, messages);
+}
+
+void put_boundary(hid_t file, const ScanResult& result) {
+    const auto around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
+    std::vector<std::int64_t> ends;
+    for (const auto& [a, b] : boundary_edges(result.shape(), result.outcomes(), around)) {
+        ends.push_back(static_cast<std::int64_t>(a));
+        ends.push_back(static_cast<std::int64_t>(b));
+    }
+    put_dataset(file, "boundary", H5T_NATIVE_INT64, space({ends.size() / 2, 2}), ends.data());
+}
+
+void put_threshold(hid_t parent, const ThresholdMap& map) {
+    const auto group = make_group(parent, map.name);
+    put_attribute(group, "label", map.label);
+    put_dataset(group, "first", {map.first.begin(), map.first.end()});
+    put_dataset(group, "second", {map.second.begin(), map.second.end()});
+    put_dataset(group, "values", H5T_NATIVE_DOUBLE, space({map.first.size(), map.second.size()}), map.values.data());
+}
+
+std::vector<std::byte> image_of(const Stored& stored) {
+    const Quiet quiet;
+    const ScanResult& result = stored.result;
+    const auto file = make_image(std::max<std::size_t>(result.points.size() * 256, 1 << 16));
+    put_attribute(file, "id", stored.id);
+    put_attribute(file, "sequence", stored.sequence);
+    const Scan& scan = result.scan;
+    const auto what = make_group(file, "scan");
+    put_text(what, "text", scan.text);
+    put_attribute(what, "path", scan.path);
+    put_attribute(what, "title", scan.title);
+    put_attribute(what, "until", std::string(scan.to_the_end ? "end" : "decided"));
+    if (scan.boundary) {
+        const auto around = scan.boundary->around;
+        put_attribute(what, "boundary", around ? std::string(name(*around)) : std::string("outcome"));
+        put_attribute(what, "seeds", std::int64_t{scan.boundary->seeds});
+    }
+    put_text(file, "case", scan.case_text);
+    {
+        const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
+        put_attribute(text, "path", scan.case_path);
+        put_attribute(text, "set", scan.sets);
+    }
+    const auto about = make_group(file, "about");
+    for (const auto& [key, value] : result.about)
+        std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
+    const auto axes = make_group(file, "axes");
+    for (std::size_t a = 0; a < scan.axes.size(); ++a) put_axis(axes, std::to_string(a), scan.axes[a]);
+    put_points(file, result);
+    put_boundary(file, result);
+    const auto lines = make_group(file, "thresholds");
+    for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
+    return bytes_of(file);
+}
+
+// ---- reading HDF5
+
+std::vector<std::string> get_text_array(hid_t parent, const std::string& name) {
+    const Handle dataset(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, "open dataset", name);
+    const Handle extent(H5Dget_space(dataset), H5Sclose, "read", name);
+    const Handle type = text_type();
+    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
+    require(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()) >= 0, "read", name);
+    std::vector<std::string> texts;
+    for (const char* text : data) texts.emplace_back(text ? text : "");
+    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
+    return texts;
+}
+
+std::string get_text(hid_t object, const std::string& name) {
+    return get_texts(open_attribute(object, name), name).at(0);
+}
+
+std::uint64_t get_count(hid_t object, const std::string& name) {
+    return get_attribute<std::uint64_t>(open_attribute(object, name), H5T_NATIVE_UINT64, name);
+}
+
+Axis get_axis(hid_t parent, const std::string& name) {
+    const auto group = open_group(parent, name);
+    Axis axis;
+    axis.keys = get_texts(open_attribute(group, "keys"), "keys");
+    axis.logarithmic = get_count(group, "logarithmic") != 0;
+    const auto texts = get_text_array(group, "texts");
+    for (std::size_t i = 0; i + axis.keys.size() <= texts.size(); i += axis.keys.size())
+        axis.values.emplace_back(texts.begin() + static_cast<std::ptrdiff_t>(i),
+                                 texts.begin() + static_cast<std::ptrdiff_t>(i + axis.keys.size()));
+    return axis;
+}
+
+Scan get_scan(hid_t file) {
+    Scan scan;
+    const auto what = open_group(file, "scan");
+    scan.text = get_text_array(what, "text").at(0);
+    scan.path = get_text(what, "path");
+    scan.title = get_text(what, "title");
+    scan.to_the_end = get_text(what, "until") == "end";
+    if (H5Aexists(what, "boundary") > 0) {
+        scan.boundary.emplace();
+        scan.boundary->around = outcome_from_name(get_text(what, "boundary"));
+        scan.boundary->seeds = static_cast<int>(get_count(what, "seeds"));
+    }
+    scan.case_text = get_text_array(file, "case").at(0);
+    const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
+    scan.case_path = get_text(text, "path");
+    scan.sets = get_texts(open_attribute(text, "set"), "set");
+    const auto axes = open_group(file, "axes");
+    for (const std::string& axis : member_names(axes)) scan.axes.push_back(get_axis(axes, axis));
+    return scan;
+}
+
+std::vector<PointResult> get_points(hid_t file, std::size_t count) {
+    const auto group = open_group(file, "points");
+    const auto outcomes = get_integers(group, "outcome"), stops = get_integers(group, "stop");
+    const auto messages = get_text_array(group, "message");
+    std::vector<PointResult> points(count);
+    if (outcomes.size() != count || stops.size() != count || messages.size() != count)
+        throw std::runtime_error("/points has not the shape of /axes");
+    for (std::size_t i = 0; i < count; ++i) {
+        if (outcomes[i] < 0 || outcomes[i] >= n_outcomes) throw std::runtime_error("/points/outcome: an unknown one");
+        points[i].point = i;
+        points[i].outcome = static_cast<Outcome>(outcomes[i]);
+        points[i].stop = static_cast<int>(stops[i]);
+        points[i].message = messages[i];
+    }
+    for (std::size_t m = 0; m < n_measures; ++m) {
+        const auto column = get_array(group, measure_names[m]).data;
+        if (column.size() != count) throw std::runtime_error("/points has not the shape of /axes");
+        for (std::size_t i = 0; i < count; ++i) points[i].measures[m] = column[i];
+    }
+    return points;
+}
+
+Handle open_file(const fs::path& file) {
+    const auto access = property_list(H5P_FILE_ACCESS);
+    H5Pset_file_locking(access, false, true);  // as for results: a file never changes in place
+    return {H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "it"};
+}
+
+Stored read_file(const fs::path& path) {
+    const Quiet quiet;
+    const auto file = open_file(path);
+    if (!has(file, "scan") || !has(file, "points")) throw std::runtime_error("no scan of tubule: it lacks /scan");
+    Stored stored;
+    stored.id = get_count(file, "id");
+    stored.sequence = get_count(file, "sequence");
+    stored.result.scan = get_scan(file);
+    const auto about = open_group(file, "about");
+    for (const std::string& key : attribute_names(about))
+        stored.result.about.emplace_back(key, get_value(open_attribute(about, key), key));
+    stored.result.points = get_points(file, stored.result.scan.size());
+    return stored;
+}
+
+// The file with its journal.
+Stored load(const fs::path& path) {
+    try {
+        const auto journal = read_journal(path);  // before the file: see replay
+        Stored stored = read_file(path);
+        replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
+            if (kind != Entry::point) throw std::runtime_error("its journal is of a run, not of a scan");
+            PointResult p = from_bytes(payload);
+            stored.result.points.at(p.point) = std::move(p);
+        });
+        return stored;
+    } catch (const std::exception& error) {
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+    }
+}
+
+bool same_scan(const Scan& a, const Scan& b) {
+    const auto same_axis = [](const Axis& x, const Axis& y) { return x.keys == y.keys && x.values == y.values; };
+    const auto choice = [](const Scan& s) {
+        return s.boundary ? std::pair(s.boundary->around, s.boundary->seeds) : std::pair(std::optional<Outcome>(), 0);
+    };
+    return a.case_text == b.case_text && a.sets == b.sets && a.to_the_end == b.to_the_end &&
+           a.boundary.has_value() == b.boundary.has_value() && choice(a) == choice(b) &&
+           std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(), same_axis);
+}
+
+}  // namespace
+
+std::vector<std::size_t> ScanResult::shape() const {
+    std::vector<std::size_t> shape;
+    for (const Axis& axis : scan.axes) shape.push_back(axis.size());
+    return shape;
+}
+
+std::vector<Outcome> ScanResult::outcomes() const {
+    std::vector<Outcome> all;
+    for (const PointResult& p : points) all.push_back(p.outcome);
+    return all;
+}
+
+struct ScanWriter::Impl {
+    explicit Impl(const fs::path& f) : file(f), journal(f) {}
+
+    fs::path file;
+    Journal journal;
+    Stored stored;
+    bool complete = false;
+    Clock::time_point written_at;
+    Clock::duration cost{};
+
+    void write() {
+        const auto start = Clock::now();
+        durable::replace(file, image_of(stored));
+        journal.restart(stored.id);
+        written_at = Clock::now();
+        cost = written_at - start;
+    }
+};
+
+ScanWriter::ScanWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ScanWriter::ScanWriter(ScanWriter&&) noexcept = default;
+ScanWriter::~ScanWriter() = default;
+
+ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const About& about) {
+    const auto path = fs::weakly_canonical(file);
+    if (fs::exists(path) && !is_scan(path))
+        throw std::runtime_error(fmt::format(
+            "{}: is no scan\nnot replaced, as it may be needed: remove it first, or write elsewhere", path.string()));
+    auto impl = std::make_unique<Impl>(path);
+    std::random_device random;
+    Stored& c = impl->stored;
+    c.id = (std::uint64_t{random()} << 32) | random();
+    c.result.scan = scan;
+    c.result.about = about;
+    c.result.points.resize(scan.size());
+    for (std::size_t i = 0; i < c.result.points.size(); ++i) {
+        c.result.points[i].point = i;
+        c.result.points[i].measures.fill(std::numeric_limits<double>::quiet_NaN());
+    }
+    impl->write();
+    return ScanWriter(std::move(impl));
+}
+
+ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
+    const auto path = fs::weakly_canonical(file);
+    load(path);  // refuses what is no scan before anything is touched
+    auto impl = std::make_unique<Impl>(path);
+    impl->stored = load(path);
+    if (!same_scan(impl->stored.result.scan, scan))
+        throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another scan, case, --set or --over",
+                                    file.string(), scan.path));
+    for (const auto& [key, value] : impl->stored.result.about)
+        if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
+    if (impl->complete)
+        impl->journal.remove();
+    else
+        impl->write();
+    return ScanWriter(std::move(impl));
+}
+
+const ScanResult& ScanWriter::result() const {
+    return impl_->stored.result;
+}
+
+bool ScanWriter::complete() const {
+    return impl_->complete;
+}
+
+void ScanWriter::point(const PointResult& p) {
+    Stored& c = impl_->stored;
+    impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
+    ++c.sequence;
+    c.result.points.at(p.point) = p;
+    // For those who look in meanwhile, as often as takes less than 2 % of the time.
+    if (Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
+        impl_->write();
+}
+
+void ScanWriter::finish(const About& more) {
+    About& about = impl_->stored.result.about;
+    for (const auto& [key, value] : more) {
+        const auto same = std::find_if(about.begin(), about.end(), [&](const auto& old) { return old.first == key; });
+        if (same != about.end())
+            same->second = value;
+        else
+            about.emplace_back(key, value);
+    }
+    impl_->stored.thresholds = threshold_maps(impl_->stored.result.scan);
+    durable::replace(impl_->file, image_of(impl_->stored));
+    impl_->journal.remove();
+}
+
+bool is_scan(const fs::path& file) {
+    const Quiet quiet;
+    try {
+        std::error_code none;
+        return fs::is_regular_file(file, none) && has(open_file(file), "scan");
+    } catch (const std::runtime_error&) {
+        return false;
+    }
+}
+
+ScanResult read_scan_result(const fs::path& file) {
+    return load(file).result;
+}
+
+void repair_scan(const fs::path& file) {
+    const auto path = fs::weakly_canonical(file);
+    if (!fs::exists(journal_path(path))) return;
+    load(path);
+    Journal journal(path);
+    durable::replace(path, image_of(load(path)));
+    journal.remove();
+}
+
+}  // namespace tubule

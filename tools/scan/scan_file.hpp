@@ -1,0 +1,56 @@
+// The result of a scan, NAME.hdf, with the house's promise: a point that was handed over survives a kill at any later
+// moment, in NAME.hdf.journal until the file is written again as a whole. Layout: docs/scans.md.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "common/result/result.hpp"
+#include "tools/scan/description.hpp"
+#include "tools/scan/point.hpp"
+
+namespace tubule {
+
+struct ScanResult {
+    Scan scan;
+    About about;
+    std::vector<PointResult> points;  // of the whole grid, in order; Outcome::not_run where nothing is known
+
+    std::vector<std::size_t> shape() const;
+    std::vector<Outcome> outcomes() const;
+};
+
+// One writer a file. Throws std::runtime_error naming the file, for I/O errors, for a second writer, and for a file of
+// that name that is no scan.
+class ScanWriter {
+public:
+    // Begins anew; an old scan of that name is replaced.
+    static ScanWriter create(const std::filesystem::path& file, const Scan& scan, const About& about);
+    // Goes on with the points of an unfinished scan. Throws CaseError if the file belongs to another one.
+    static ScanWriter resume(const std::filesystem::path& file, const Scan& scan);
+    ScanWriter(ScanWriter&&) noexcept;
+    ~ScanWriter();
+
+    const ScanResult& result() const;
+    bool complete() const;  // of a resumed scan: nothing is left to do
+    void point(const PointResult& p);
+    // Writes the file whole and removes the journal. What `more` says replaces what /about said by the same names.
+    void finish(const About& more);
+
+private:
+    struct Impl;
+    explicit ScanWriter(std::unique_ptr<Impl>);
+    std::unique_ptr<Impl> impl_;
+};
+
+// Whether the file is an HDF5 file with a scan in it. Never throws.
+bool is_scan(const std::filesystem::path& file);
+
+// Its journal included. Throws std::runtime_error naming the file.
+ScanResult read_scan_result(const std::filesystem::path& file);
+
+// Merges a left-over journal into the file, so that any HDF5 program sees all points.
+void repair_scan(const std::filesystem::path& file);
+
+}  // namespace tubule

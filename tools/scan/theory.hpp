@@ -1,0 +1,31 @@
+// Closed forms that are drawn over a map: functions of a case that vanish on a line.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/scan/description.hpp"
+
+namespace tubule {
+
+struct Threshold {
+    std::string name;                               // of its group in the file
+    std::string label;                              // in pictures
+    std::optional<double> (*value)(const Case& c);  // nothing where it says nothing of such a case
+};
+
+// All that are known: to add one, see theory.cpp.
+const std::vector<Threshold>& thresholds();
+
+// A threshold on part of the grid's nodes: rows along the first axis, columns along the second.
+struct ThresholdMap {
+    std::string name, label;
+    std::vector<std::size_t> first, second;  // places on the axes
+    std::vector<double> values;              // row by row; not a number where it says nothing
+};
+
+// Of a grid with two axes of numbers; those that change their sign on it.
+std::vector<ThresholdMap> threshold_maps(const Scan& scan);
+
+}  // namespace tubule

@@ -1,0 +1,19 @@
+// A case handed to the tier it names.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+#include "surface3d/run.hpp"
+
+namespace tubule {
+
+// Names of the series a run of this case writes, "time" first.
+std::vector<std::string> series_names(const Case& c);
+
+// Runs the case, or goes on from `restart`. Throws as the tier's own run.
+RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart = nullptr);
+
+}  // namespace tubule

@@ -1,0 +1,38 @@
+// When a tube in gradient flow has become so uniform that its fate is known: the closed dispersion relation (maths 5)
+// says that all its waves only decay from here on, whatever the radius does on its way to rest.
+#pragma once
+
+#include <optional>
+
+#include "common/case/case.hpp"
+
+namespace tubule {
+
+// What a row says of a tube.
+struct TubeState {
+    double energy = 0, volume = 0, r_min = 0, r_max = 0;
+};
+
+class UniformFate {
+public:
+    // Empty where the relation does not apply: other models and shapes, a volume that is kept, an f with f_HK.
+    static std::optional<UniformFate> of(const Case& c);
+
+    // Whether the waves are small, in amplitude and in energy, and each that the symmetry of the start allows loses
+    // against the radius, by a margin, at every radius from here to the one where the tube rests.
+    bool decided(const TubeState& s) const;
+
+private:
+    UniformFate(const Bending& energy, double length, int waves, double floor)
+        : energy_(energy), length_(length), waves_(waves), floor_(floor) {}
+    double drift(double R) const;
+    bool waves_decay(double R) const;
+    double radius_at_rest(double R) const;
+
+    Bending energy_;
+    double length_;
+    int waves_;     // over the length, of the longest wave that the start has
+    double floor_;  // radius at which a run stops
+};
+
+}  // namespace tubule
