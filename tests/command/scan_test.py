@@ -325,6 +325,8 @@ class Kill(ScanTest):
             self.assertEqual(status, 130)
             self.assertEqual(about(self.result)["stop"], "interrupted")
             self.assertEqual(self.files(), {"case.toml", "scan.hdf"})  # no journal is left
+        self.disturbed(signal.SIGKILL, len(known) + 1)
+        self.assertIn("none yet", self.tubule("show", self.result)[0])
         self.scan("case.toml", *SLOW, "--resume")
         self.assert_kept(known)
         self.assertEqual(about(self.result)["stop"], "finished")

@@ -379,10 +379,12 @@ ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
                                     file.string(), scan.path));
     for (const auto& [key, value] : impl->stored.result.about)
         if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
-    if (impl->complete)
+    if (impl->complete) {
         impl->journal.remove();
-    else
+    } else {
+        std::erase_if(impl->stored.result.about, [](const auto& entry) { return entry.first == "stop"; });
         impl->write();
+    }
     return ScanWriter(std::move(impl));
 }
 
