@@ -7,11 +7,21 @@
 #include <numeric>
 
 #include "common/case/read.hpp"
+#include "common/theory/waves.hpp"
 
 namespace tubule {
 namespace {
 
 constexpr std::size_t most_nodes = 41;  // along an axis: a line needs fewer than a map
+
+// Of a start with waves along the axis alone: how many of the cells that it repeats there are in its length. Tier 1
+// keeps that symmetry.
+int repeats(const Tube& tube) {
+    int waves = 0;
+    for (const TubeMode& mode : tube.modes)
+        if (mode.amplitude != 0) waves = mode.m == 0 ? std::gcd(waves, mode.n) : 1;
+    return waves;
+}
 
 // Whether its shapes at rest without energy are the surfaces of constant mean curvature H0, and of which period:
 // E = INT k20 (H-H0)^2 alone.
@@ -22,9 +32,7 @@ std::optional<double> delaunay_period(const Case& c) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only_k20 = only_k20 && (std::string_view(term.key) == "k20" ? c.energy.k[i] > 0 : c.energy.k[i] == 0);
     });
-    int waves = 0;
-    for (const TubeMode& mode : tube->modes)
-        if (mode.amplitude != 0) waves = std::gcd(waves, mode.n);
+    const int waves = repeats(*tube);
     if (!only_k20 || waves == 0) return std::nullopt;
     return tube->length / waves;
 }
@@ -40,6 +48,38 @@ std::optional<double> shortest_unduloid(const Case& c) {
     return period ? std::optional(*period * std::abs(c.energy.H0) - 4) : std::nullopt;
 }
 
+// The straight tube that rests: of a gradient flow with free volume that of radius 1/|H0| where no term but k20 has a
+// say in it, else that of the start. Nothing where a fixed volume makes the tension an outcome.
+std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
+    const auto* tube = std::get_if<Tube>(&c.shape);
+    if (!tube || c.equilibrium) return std::nullopt;
+    if (c.model.kind != ModelKind::gradient_flow) {
+        if (theory::keeps_volume(c.model)) return std::nullopt;
+        return theory::UniformTube{c.energy, tube->radius, theory::tension_of_free_volume(c.energy, tube->radius)};
+    }
+    if (theory::keeps_volume(c.model)) return theory::UniformTube{c.energy, tube->radius, 0};
+    const theory::UniformTube rest{c.energy, 1 / std::abs(c.energy.H0), 0};
+    const double k20 = c.energy.k[0], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
+    if (c.energy.H0 == 0 || k20 == 0 || std::abs(theory::radius_rate(rest)) > rounding) return std::nullopt;
+    return rest;
+}
+
+// What drives the waves of m = 0, of those that fit: -G of maths 5 of the one that is driven most. The models differ in
+// what they make of it, but not in its sign.
+std::optional<double> pearling(const Case& c) {
+    const auto tube = tube_at_rest(c);
+    if (!tube) return std::nullopt;
+    const auto& shape = std::get<Tube>(c.shape);
+    const theory::Stiffness G = theory::stiffness(*tube, 0);
+    if (!(G.q4 > 0)) return std::nullopt;  // ill-posed: there is no such wave
+    const double longest = 2 * std::numbers::pi * std::max(repeats(shape), 1) / shape.length;
+    const double lowest = std::sqrt(std::max(-G.q2 / (2 * G.q4), 0.0)) / longest;  // G is a parabola in q^2
+    double most = -G(longest);
+    for (const double n : {std::floor(lowest), std::ceil(lowest)})
+        if (n >= 1) most = std::max(most, -G(n * longest));
+    return std::abs(most) > 1e-12 * std::abs(G.q0) ? most : 0;  // without k42 they are neutral at q R = 1, not beyond
+}
+
 std::vector<std::size_t> some_of(std::size_t size) {
     std::vector<std::size_t> places;
     const std::size_t n = std::min(size, most_nodes);
@@ -52,7 +92,8 @@ std::vector<std::size_t> some_of(std::size_t size) {
 const std::vector<Threshold>& thresholds() {
     static const std::vector<Threshold> all{
         {"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
-        {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid}};
+        {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
+        {"pearling", "straight tube at rest, a wave with m = 0 neutral", pearling}};
     return all;
 }
 
