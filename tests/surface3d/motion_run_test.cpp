@@ -125,7 +125,9 @@ TEST(MotionGuards, IllPosed) {
     EXPECT_EQ(lost.summary.stop.reason, Stop::ill_posed) << lost.summary.stop.message;
     EXPECT_EQ(lost.summary.stop.time, 0);
     EXPECT_EQ(lost.watch.frames.size(), 1u);
-    EXPECT_EQ(run_case(sphere, {"energy.k42=-0.2", "time.end=1e-3", "discretisation.step=5e-4"}).summary.stop.reason,
+    EXPECT_EQ(run_case(sphere, {"energy.k42=-0.2", "time.end=1e-3", "discretisation.step=5e-4",
+                                "discretisation.elements=320", "accuracy.energy=1e-2"})
+                  .summary.stop.reason,
               Stop::finished);
 }
 
