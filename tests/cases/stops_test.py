@@ -36,6 +36,8 @@ class Stops(unittest.TestCase):
                 with self.subTest(case=case.stem):
                     expect = tomllib.loads(case.read_text())["expect"]
                     stop = expect.get("stop", "finished")
+                    if stop == "finished" and stop in reached:
+                        continue  # those are run by cases.* as well; here one of each kind of stop is enough
                     result = Path(folder, case.stem + ".hdf")
                     done = subprocess.run(
                         [PROGRAM, "run", str(case), "-o", str(result)], capture_output=True, text=True, timeout=100

@@ -136,7 +136,7 @@ TEST(MotionGuards, PinchOff) {
     // is resolved, and then says that it closes.
     const Outcome o = run_case(
         "[energy]\nk20 = 0.2\nH0 = -2\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\nmode = [{amplitude = 0.6, n = "
-        "1}]\n[accuracy]\nenergy = 1e-2\n[discretisation]\nelements = 450\norder = 3\n[time]\nend = 0.5\n");
+        "1}]\n[accuracy]\nenergy = 1e-2\nr_min = 0.15\n[discretisation]\nelements = 450\norder = 3\n[time]\nend = 0.5\n");
     EXPECT_EQ(o.summary.stop.reason, Stop::pinch_off) << o.summary.stop.message;
     EXPECT_LT(o.summary.stop.time, 0.1418);
     EXPECT_LT(o.last("r_min"), 0.2);
