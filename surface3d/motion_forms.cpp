@@ -90,8 +90,7 @@ private:
     void size(CellWork& work) const;
     Point point(const SurfacePoint<double>& p, const CellColumns<3>& gradient, const CellColumns<3>& normals, int cell,
                 int q) const;
-    void fill_tables(const Point& at, const CellColumns<3>& gradient, const SurfacePoint<double>& p, int q,
-                     CellTables& t) const;
+    void fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
@@ -143,8 +142,7 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     return at;
 }
 
-void Assembler::fill_tables(const Point& at, const CellColumns<3>& gradient, const SurfacePoint<double>&, int q,
-                            CellTables& t) const {
+void Assembler::fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const {
     const auto phi = table_.value.col(q);
     const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_cell_nodes> g = at.e.transpose() * gradient;
     t.phi.row(q) = phi.transpose();
@@ -312,7 +310,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
         const SurfacePoint<double> p = tangent_point(X, table_, q);
         const CellColumns<3> gradient = gradients(p, table_, q);
         at.push_back(point(p, gradient, normals, cell, q));
-        fill_tables(at.back(), gradient, p, q, work.t);
+        fill_tables(at.back(), gradient, q, work.t);
     }
     add_momentum(at, cell, work);
     add_bending(at, cell, work);

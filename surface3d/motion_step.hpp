@@ -28,8 +28,8 @@ struct MotionState {
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
     double relaxation = 0.1;             // time in which the mesh becomes even
-    // Where H varies less, relative to INT H^2 (variation_of_H), area and volume are one condition: lambda is left out,
-    // as the pressure stands for it, and the area alone is kept to rounding.
+    // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition as far as the mesh can tell: lambda is
+    // left out, as the pressure stands for it, and the area alone is kept to rounding.
     double least_variation = 1e-8;
     bool second_order = true;  // else Euler steps on the surface of their beginning
 };
