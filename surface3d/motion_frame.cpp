@@ -15,7 +15,8 @@ void for_each_number(Memory& m, Visit&& visit) {
     visit("restart_least_variation", m.least_variation), visit("restart_lowest_total", m.lowest_total);
     visit("restart_total_start", m.total_start), visit("restart_dissipated", m.dissipated);
     visit("restart_corrected", m.corrected), visit("restart_error", m.error);
-    visit("restart_reference_energy", m.reference_energy);
+    visit("restart_reference_energy", m.reference_energy), visit("restart_defect", m.defect);
+    visit("restart_dissipation_past", m.dissipation_past);
 }
 
 Array column(const std::string& name, const Eigen::VectorXd& values) {

@@ -21,13 +21,13 @@ namespace {
 // Measured choices: docs/decisions.md, "Surfaces in motion".
 constexpr int first_triangles = 180, most_triangles = 40000;    // of the finer run of a pair
 constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarser one
-constexpr double fall = 2;  // at least so many times more accurate is the finer one than the two differ
 constexpr int most_pairs = 6;
 constexpr int least_triangles = 80;             // fewer tell nothing
 constexpr double tolerance_per_accuracy = 0.5;  // time_tolerance = this * asked accuracy^1.5, see tolerance_for()
 constexpr double relaxes_in = 0.2;              // of the time that the shape needs to change
 constexpr double loosest_tolerance = 1e-4;      // beyond it steps are too long to be compared
 constexpr double first_step = 1e-4;             // of the time in which the mesh relaxes
+constexpr double moment = 1e-2;                 // of the first step, see set_moving()
 constexpr double growth = 1.6, safety = 0.85;   // of steps
 constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
 constexpr double creep = 10;                    // increase since its lowest, of the asked accuracy
@@ -92,6 +92,7 @@ bool ended_early(Stop reason) {
 struct Settings {
     int elements = first_triangles;
     double tolerance = 1e-4;
+    double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
 };
 
 double tolerance_for(double accuracy) {
@@ -107,9 +108,12 @@ Settings coarser(const Settings& s) {
     return {static_cast<int>(s.elements / fewer_triangles), s.tolerance * longer_tolerance};
 }
 
-// `excess` is how many times more than asked the two runs before differed. Errors fall with the fourth power of the
-// mesh width and the power 2/3 of the tolerance.
-Settings finer(const Settings& s, double excess) {
+// Errors fall with the fourth power of the mesh width and the power 2/3 of the tolerance. Where the energies of a pair
+// agree and the balance is off, waves are damped by steps that are too long: the mesh is kept, once.
+Settings finer(const Settings& s, double asked, double difference, double defect) {
+    const double excess = std::max(difference, defect) / asked;
+    if (difference <= asked && s.difference == 0)
+        return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), difference};
     const double by = std::clamp(std::sqrt(excess), 1.6, 4.0);
     return {static_cast<int>(std::ceil(by * s.elements)), s.tolerance / std::clamp(std::pow(excess, 1.5), 4.0, 64.0)};
 }
@@ -121,6 +125,7 @@ public:
                   std::chrono::steady_clock::time_point started)
         : case_(c), watch_(watch), recorded_(recorded), coarser_(coarser), started_(started) {
         memory_.elements = settings.elements, memory_.tolerance = settings.tolerance;
+        memory_.error = settings.difference;
         outputs_ = c.time.output;
         outputs_.push_back(c.time.end);
         std::sort(outputs_.begin(), outputs_.end());
@@ -134,14 +139,18 @@ public:
 
     RunSummary summary;
     Trace trace;
-    double error() const { return memory_.error; }  // largest difference from the coarser run, absolute
+    // Largest ones, absolute: of the energy from the coarser run; of the balance with what dissipates, which shows what
+    // both runs of a pair lose alike.
+    double difference() const { return memory_.error; }
+    double defect() const { return memory_.defect; }
 
 private:
     void make_stepper(const CurvedMesh& mesh);
+    void set_moving();
     void look();
     double length() const { return std::sqrt(memory_.area); }
     double total() const { return now_.bending.energy + now_.kinetic; }
-    double defect() const { return total() - memory_.total_start + memory_.dissipated; }
+    double defect_now() const { return total() - memory_.total_start + memory_.dissipated; }
     double left_until_output() const { return outputs_[next_output_] - state_.time; }
 
     // What became of a trial step: nothing to say if it is taken.
@@ -151,6 +160,7 @@ private:
     };
     std::optional<Refusal> attempt(double tau);
     std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
+    double dissipated_until(double tau, double rate) const;
     void take(const MotionStep& next, const MotionMeasures& m);
     void set_next_step(double tau, double asked, double error);
     std::optional<StopReport> step();
@@ -236,11 +246,20 @@ void MotionAttempt::begin() {
             state_.u[start.mesh.size() + i] = case_.velocity.omega * x.x();
         }
     state_.u_past = state_.u;
+    if (stepper_->law().inertia == 0 && !paper_) set_moving();
     look();
     memory_.total_start = memory_.lowest_total = total();
     trace.add(0, now_.bending.energy);
     write_row();
     write_frame();
+}
+
+// Without inertia the surface is not at rest at the start: the velocity of a very short step.
+void MotionAttempt::set_moving() {
+    const MotionState soon = stepper_->step(state_, moment * memory_.next_step).state;
+    state_.u = state_.u_past = soon.u;
+    state_.w = state_.w_past = soon.w;
+    state_.p = soon.p, state_.lambda = soon.lambda;
 }
 
 void MotionAttempt::resume(const Restart& restart) {
@@ -302,12 +321,22 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     }
 }
 
+// In a step of length tau at whose end so much dissipates: the parabola through the last three rates.
+double MotionAttempt::dissipated_until(double tau, double rate) const {
+    const double before = state_.step, slope = (rate - now_.dissipation) / tau;
+    const double bend =
+        before > 0 ? (slope - (now_.dissipation - memory_.dissipation_past) / before) / (tau + before) : 0;
+    return tau * (now_.dissipation + rate) / 2 - bend * tau * tau * tau / 6;
+}
+
 void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
-    memory_.dissipated += next.state.step * (now_.dissipation + m.dissipation) / 2;
+    memory_.dissipated += dissipated_until(next.state.step, m.dissipation);
+    memory_.dissipation_past = now_.dissipation;
     memory_.corrected += std::abs(next.correction);
     state_ = next.state;
     now_ = m;
     memory_.lowest_total = std::min(memory_.lowest_total, total());
+    memory_.defect = std::max(memory_.defect, std::abs(defect_now()));
     ++steps_;
 }
 
@@ -417,7 +446,7 @@ std::optional<StopReport> MotionAttempt::step() {
     trace.add(t, now_.bending.energy);
     error_now_ = memory_.reference_energy;  // nothing is known
     if (coarser_ && t <= coarser_->end()) {
-        error_now_ = std::abs(now_.bending.energy - (*coarser_)(t)) / fall;
+        error_now_ = std::abs(now_.bending.energy - (*coarser_)(t));
         memory_.error = std::max(memory_.error, error_now_);
     }
     write_row();
@@ -466,7 +495,7 @@ void MotionAttempt::go() {
                        {"meshes", std::int64_t{meshes_}},
                        {"relaxation", memory_.relaxation},
                        {"dissipated", memory_.dissipated},
-                       {"identity_defect", defect()},
+                       {"identity_defect", defect_now()},
                        {"correction_energy", memory_.corrected}};
 }
 
@@ -477,7 +506,7 @@ void MotionAttempt::write_row() {
     row_ = {state_.time, state_.step, m.bending.energy};
     row_.insert(row_.end(), m.bending.energy_term.begin(), m.bending.energy_term.end());
     for (const double value : {m.dissipation,
-                               defect(),
+                               defect_now(),
                                m.bending.area,
                                m.bending.volume,
                                m.r_min,
@@ -604,7 +633,8 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         const Stop reason = fine->summary.stop.reason;
         const double compared_until = trace.empty() ? 0 : trace.end();
         const bool known = compared_until >= fine->summary.stop.time * (1 - 1e-3) && compared_until > 0;
-        describe(fine->summary, c, known ? fine->error() : fine->summary.reference_energy, pair);
+        const double difference = known ? fine->difference() : fine->summary.reference_energy;
+        describe(fine->summary, c, std::max(difference, fine->defect()), pair);
         const bool given = settings_given(c) || !resizable;
         if (fine->summary.as_accurate_as_asked || given || pair == most_pairs ||
             settings.elements * 1.6 > most_triangles || ended_early(reason)) {
@@ -615,7 +645,7 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
             accept(fine->summary, c, given);
             return fine->summary;
         }
-        settings = finer(settings, fine->summary.estimated_error / c.accuracy.energy);
+        settings = finer(settings, c.accuracy.energy * fine->summary.reference_energy, difference, fine->defect());
         observer.discard();
         restart = nullptr;
         trace = std::move(fine->trace);

@@ -268,7 +268,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
         const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
         out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
-    } else if (from.step > 0) {
+    } else {
         const Eigen::RowVectorXd along =
             (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum();
         out.error = along.cwiseAbs().maxCoeff() / 2;

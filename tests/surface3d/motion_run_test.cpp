@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "common/case/read.hpp"
@@ -93,6 +95,32 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
+TEST(MotionRun, TheBalanceHoldsFromTheStart) {
+    // Gradient flow of a sphere: E = 4 pi (2 + H0 R)^2, and 4 pi R^2 dR/dt = -dE/dR = -8 pi H0 (2 + H0 R), so that
+    // 16 pi dissipate at R = 1, H0 = -1.
+    // What else dissipates there is the noise of the mesh: 840 on 180 triangles, 124 on 320, 51.4 on 720.
+    const Outcome sphere = run_case(
+        "[energy]\nk20 = 1\nH0 = -1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 1e-4\n[discretisation]\n"
+        "elements = 720\norder = 4\nstep = 1e-4\n");
+    EXPECT_NEAR(sphere.series("dissipation").front() / (16 * std::numbers::pi), 1, 0.05);
+    // A capsule, whose curvature jumps: first steps are too long, are refused, and taken when they are short enough.
+    const Outcome capsule = run_case(
+        "[energy]\nk20 = 0.125\nk42 = 0.06\nH0 = -2\n[model]\nkind = \"overdamped\"\n[shape]\nkind = \"capsule\"\n"
+        "radius = 0.5\nlength = 2\n[accuracy]\nenergy = 1e-2\n[time]\nend = 1e-3\n[discretisation]\nelements = 120\n");
+    ASSERT_EQ(capsule.summary.stop.reason, Stop::finished) << capsule.summary.stop.message;
+    const auto& details = capsule.summary.details;
+    const auto rejected = std::find_if(details.begin(), details.end(),
+                                       [](const auto& detail) { return detail.first == "rejected_steps"; });
+    ASSERT_NE(rejected, details.end());
+    EXPECT_GT(std::get<std::int64_t>(rejected->second), 0);
+    double worst = 0;
+    for (const double defect : capsule.series("identity_defect")) worst = std::max(worst, std::abs(defect));
+    EXPECT_LT(worst, 1e-2 * capsule.summary.reference_energy);
+    EXPECT_GE(capsule.summary.estimated_error, worst / capsule.summary.reference_energy);
+    // The layer at its seam takes a hundredth of the energy at once: what a balance that began late would miss.
+    EXPECT_GT(capsule.series("energy").front() - capsule.last("energy"), 2 * worst);
+}
+
 TEST(MotionRun, GradientFlowOfFixedVolume) {
     const Outcome o = run_case(wavy, {"model.volume=fixed"});
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
@@ -136,7 +164,8 @@ TEST(MotionGuards, PinchOff) {
     // is resolved, and then says that it closes.
     const Outcome o = run_case(
         "[energy]\nk20 = 0.2\nH0 = -2\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\nmode = [{amplitude = 0.6, n = "
-        "1}]\n[accuracy]\nenergy = 1e-2\nr_min = 0.15\n[discretisation]\nelements = 450\norder = 3\n[time]\nend = 0.5\n");
+        "1}]\n[accuracy]\nenergy = 1e-2\nr_min = 0.15\n[discretisation]\nelements = 450\norder = 3\n[time]\nend = "
+        "0.5\n");
     EXPECT_EQ(o.summary.stop.reason, Stop::pinch_off) << o.summary.stop.message;
     EXPECT_LT(o.summary.stop.time, 0.1418);
     EXPECT_LT(o.last("r_min"), 0.2);
@@ -147,7 +176,7 @@ TEST(MotionGuards, StepsThatAreTooLarge) {
     EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
     EXPECT_NE(o.summary.stop.message.find("the energy rises"), std::string::npos) << o.summary.stop.message;
     EXPECT_LT(o.summary.stop.time, 1);
-    EXPECT_LT(o.last("energy"), o.series("energy").front());  // the step that rose was not taken
+    EXPECT_LE(o.last("energy"), o.series("energy").front());  // the step that rose was not taken
 }
 
 TEST(MotionGuards, StartsThatCannotMove) {
