@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+"""The suite behind docs/consistency.md: that it notices, and what it writes. Its scenes themselves: test
+consistency_study.
+
+    consistency_test.py TUBULE
+"""
+
+import contextlib
+import csv
+import io
+import sys
+import tempfile
+import tomllib
+import unittest
+from dataclasses import replace
+from pathlib import Path
+
+SUITE = Path(__file__).resolve().parents[2] / "tools/consistency"
+sys.path.insert(0, str(SUITE))
+import cases  # noqa: E402
+import consistency  # noqa: E402
+import page  # noqa: E402
+from rows import Cost, Row, Table  # noqa: E402
+from scenes import SCENES  # noqa: E402
+
+PROGRAM = sys.argv[1]
+
+
+def row(differences, bound=1e-2, error=0.0, **more):
+    """A value of 2, and differences relative to a scale of 4 by triangles."""
+    found = {triangles: [2.0 + 4 * d, 2.0] for triangles, d in differences.items()}
+    return Row("energy", [2.0, 2.0], 4.0, bound, error, [0.0, 1.0], found, **more)
+
+
+class Rows(unittest.TestCase):
+    def test_differences_and_order(self):
+        """Triangles 4 times as many are half as wide: from 1.6e-3 to 1e-4, 16 times less, is order 4."""
+        one = row({100: 1.6e-3, 200: -9e-4, 400: 1e-4})
+        self.assertAlmostEqual(one.difference(100), 1.6e-3, delta=1e-12)
+        self.assertAlmostEqual(one.difference(200), 9e-4, delta=1e-12)
+        self.assertAlmostEqual(one.order, 4, delta=1e-6)
+        self.assertEqual(one.complaints(), [])
+
+    def test_too_far_apart(self):
+        self.assertEqual(row({100: 1e-1, 400: 1.1e-2}).complaints(), ["differs by 0.011, more than 0.01"])
+        self.assertEqual(row({100: 1e-1, 400: 1.1e-2}, bound=None).complaints(), [])
+        self.assertIn("differs by nan", row({100: 1e-1, 400: float("nan")}, must_fall=False).complaints()[0])
+
+    def test_does_not_fall(self):
+        slow = {100: 1.5e-3, 400: 1e-3}  # order log2(1.5) = .585
+        self.assertEqual(row(slow).complaints(), ["falls with order 0.58 only"])
+        self.assertEqual(row(slow, must_fall=False).complaints(), [])
+        self.assertEqual(row(slow, error=4e-4).complaints(), [])  # the reference is no better
+        self.assertEqual(row(slow, error=3e-4).complaints(), ["falls with order 0.58 only"])
+
+    def test_tier_1_alone(self):
+        alone = Row("a rate", [1.0], 1.0, 1e-5, 2e-5)
+        self.assertEqual(alone.complaints(), ["differs by 2e-05, more than 1e-05"])
+        self.assertIsNone(alone.order)
+
+
+class Cases(unittest.TestCase):
+    def test_text_reads_back(self):
+        case = cases.case("three_modes", about={"title": 'a "quoted" \\ title'}, energy={"k40": None, "k42": 1e-7})
+        self.assertEqual(tomllib.loads(cases.text(case)), case)
+        self.assertNotIn("k40", case["energy"])
+        self.assertNotIn("expect", case)
+        self.assertEqual([mode["amplitude"] for mode in case["shape"]["mode"]], [0.12, 0.08, 0.04])
+
+    def test_changes_leave_the_original(self):
+        case = cases.case("three_modes")
+        cases.changed(case, shape={"mode": [{"amplitude": 1.0}]}, time=None)
+        self.assertEqual(case, cases.case("three_modes"))
+
+
+class Page(unittest.TestCase):
+    def test_files(self):
+        scene = Table("figure", "The figure", "Words.", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
+        rest = Table("sphere-at-rest", "At rest", "", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
+        rates = Table("rates-fluid", "Rates", "", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "page.md"
+            page.write(path, [scene, rest, rates])
+            text = path.read_text()
+            self.assertIn("in motion by\n1.0e-04 of E_ref", text)
+            self.assertIn("## The figure\n\nWords.\n", text)
+            self.assertIn("| energy, largest of 2 times | 2 | exact | 1.6e-03 | 1.0e-04 | 4.0 | 1e-02 |\n", text)
+            self.assertIn("| *CPU s* | 0.5 |  | 1 | 20 |  |  |", text)
+            rows = list(csv.DictReader(io.StringIO(path.with_suffix(".csv").read_text())))
+            self.assertEqual([float(r["difference"]) for r in rows][:4], [1.6e-3, 0, 1e-4, 0])
+            self.assertIn("<svg", path.with_suffix(".svg").read_text())
+
+
+class Suite(unittest.TestCase):
+    def called(self, *arguments, program=PROGRAM, scenes=SCENES):
+        out, err = io.StringIO(), io.StringIO()
+        with tempfile.TemporaryDirectory() as folder:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                status = consistency.main([str(program), folder, *arguments], scenes)
+        return status, out.getvalue(), err.getvalue()
+
+    def test_a_scene(self):
+        """The cheapest one, as it is; and with bounds that it does not meet."""
+        (scene,) = [scene for scene in SCENES if scene.name == "spheroid-at-rest"]
+        status, out, err = self.called("--only", scene.name)
+        self.assertEqual((status, err), (0, ""))
+        self.assertIn("| energy_42 |", out)
+
+        def stricter(tools, cost):
+            rows = scene.measure(tools, cost)
+            return [replace(r, bound=1e-12) if r.quantity == "volume" else r for r in rows]
+
+        status, _, err = self.called("--only", scene.name, scenes=[replace(scene, measure=stricter)])
+        self.assertEqual(status, 1)
+        self.assertRegex(err, r"^consistency: A spheroid, at rest: volume differs by .*, more than 1e-12\n$")
+
+    def test_a_run_that_fails(self):
+        status, _, err = self.called("--only", "spheroid-at-rest", program="/bin/false")
+        self.assertEqual(status, 2)
+        self.assertIn("ended with status 1", err)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

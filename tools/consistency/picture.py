@@ -1,0 +1,35 @@
+"""Differences against triangles: shapes at rest, rates, and the energies of what moves."""
+
+import style  # from tools/plot, on the path since runs.py
+from matplotlib.ticker import NullFormatter
+
+HEIGHT = 2.6  # inches
+PANELS = (
+    ("energy at rest", "-at-rest", lambda row: row.quantity == "energy"),
+    ("rates of small waves", "rates-", lambda row: bool(row.found)),
+    ("energy in motion, largest", "", lambda row: row.quantity == "energy" and len(row.times) > 1),
+)
+
+
+def draw(tables, path):
+    plt = style.plt
+    figure, panels = plt.subplots(1, len(PANELS), figsize=(style.WIDTH, HEIGHT), sharey=True, layout="constrained")
+    for axes, (title, part, wanted) in zip(panels, PANELS):
+        lines = []
+        for scene in tables:
+            for row in scene.rows:
+                if part in scene.name and wanted(row):
+                    name = scene.name.removesuffix("-at-rest").removeprefix("rates-")
+                    lines.append((f"{name} {row.quantity}" if part == "rates-" else name, row))
+        for i, (label, row) in enumerate(lines):
+            colour = style.line_colours(len(lines))[i]
+            axes.loglog(row.meshes, [row.difference(t) for t in row.meshes], color=colour, label=label,
+                        marker=style.MARKERS[i % len(style.MARKERS)])  # fmt: skip
+        axes.set(title=title, xlabel="triangles")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.legend(fontsize=5.5, labelspacing=0.2)
+        for t, power in ((100, 2),):
+            axes.loglog([t, 4 * t], [1e-3, 1e-3 / 4**power], color="0.6", lw=0.6, ls=":")
+    panels[0].set_ylabel("relative difference of the tiers")
+    style.save(figure, [path])
+    plt.close(figure)
