@@ -82,7 +82,7 @@ class Page(unittest.TestCase):
             path = Path(folder) / "page.md"
             page.write(path, [scene, rest, rates])
             text = path.read_text()
-            self.assertIn("in motion by\n1.0e-04 of E_ref", text)
+            self.assertIn("energies in motion by 0.0001 of E_ref", text)
             self.assertIn("## The figure\n\nWords.\n", text)
             self.assertIn("| energy, largest of 2 times | 2 | exact | 1.6e-03 | 1.0e-04 | 4.0 | 1e-02 |\n", text)
             self.assertIn("| *CPU s* | 0.5 |  | 1 | 20 |  |  |", text)

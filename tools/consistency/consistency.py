@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Both tiers on the same scenes: differences, how they fall with the mesh width, and what they cost.
 
-    consistency.py TUBULE FOLDER [-o docs/consistency.md]     about ten minutes; results are kept in FOLDER
+    consistency.py TUBULE FOLDER [-o docs/consistency.md]     minutes; results are kept in FOLDER
     consistency.py TUBULE FOLDER --only figure --only rotation
 
 Ends with status 0 if all differences are within their bounds, 1 if not, 2 if a run fails. With -o it writes the page,

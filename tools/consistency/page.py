@@ -46,79 +46,100 @@ def numbers(tables):
                                      "" if row.bound is None else row.bound))  # fmt: skip
     return out.getvalue()
 
-READING = """**In short.** Where a start is smooth both tiers say the same, and what they differ by vanishes as the mesh is refined. On the finest
-meshes here integrals at rest differ by {at_rest} at most, rates of small waves by {rates}, energies in motion by
-{motion} of E_ref at all output times ({figure} for the figure's tube), shapes in motion by {shapes} of their size.
+READING = """**In short.** Where a start is smooth both tiers say the same, and what they differ by vanishes as the mesh is
+refined. On the finest meshes here integrals at rest differ by {at_rest} at most, rates of small waves by {rates},
+energies in motion by {motion} of E_ref at all output times ({figure} for the figure's tube, {equilibrium} where the cell
+comes to rest), shapes in motion by {shapes} of their size.
 
-**What limits it.** At rest the recovery of curvature: integrals are of order 5 and more; values at single points, such as the extremes of
-H and K ({extremes}), are far less accurate than integrals and say so only slowly. In motion the time steps of 3D. In the first moments the force: it takes four derivatives of
-the surface, so of an interpolated start a part of it is noise of the size of a triangle. That part dissipates several times what the smooth force does on 80 triangles of the
-tube and percents of it on 300, at order 6 to 8; smooth waves begin right from the start. Without inertia the noise is gone in a moment, a fluid keeps it as waves of little energy.
+**What limits it.** *At rest* the recovery of curvature: integrals are of order 5 and more; values at single points, such
+as the extremes of H and K ({extremes}), are far less accurate than integrals. *In motion* the time steps of 3D: of waves
+at rest the fixed step leaves (rate x step)^2/3, the rest follows the tolerance. *At the first moment* the force: it
+takes four derivatives of the surface, so that of an interpolated start a part of it is noise of the size of triangles.
+By it the overdamped tube dissipates {noise_coarse} times too much on the coarsest mesh and {noise_fine} times on the
+finest, where its smooth waves begin right to {waves}. Without inertia the noise is gone in a moment. A fluid keeps it as waves of little
+energy that show in what is taken at a point or an instant: its largest speed and lambda differ by up to {pointwise}.
 
-**Where they part.** Where curvature jumps, at the seams of the capsule: its energy at rest is off by {seams} and falls with the first order at best, extremes of H and K not
-at all; as a fluid it sends out waves that neither tier resolves, and energies differ by {capsule}. Where it comes to rest they agree again, to {equilibrium}.
-Of a model without inertia the first row in 3D has neither velocity nor dissipation, as none is known before the first step, so what was dissipated lacks half of that step: {dissipated} at most, and hardly less on finer meshes.
-Least and largest radius are those of nodes in 3D, and of closed surfaces something else (distances from the centre, not from the axis), so not compared there."""
+**Where they part.** *Where curvature jumps*, at the seams of the capsule: its energy at rest is off by {seams} and falls
+with the first order at best, extremes of H and K not at all; as a fluid it sends out waves that no mesh resolves, and
+energies differ by {capsule}, where tier 1 itself is known to {capsule_known} only. *The first row* of a model without
+inertia has neither velocity nor dissipation in 3D, as none is known before the first step, so that what was dissipated
+lacks half of that step: {dissipated} of E_ref at most.
+*Least and largest radius* are those of nodes in 3D, hence without an order; of closed surfaces they are something else
+(distances from the centre, in tier 1 from the axis), so not compared."""
 
 HEAD = """# Do both tiers say the same?
 
 Every quantity that tier 1 (`axisym`) and tier 3D (`surface3d`) can both compute, on the same starts. This page, [all
 numbers](consistency.csv) and the picture are made by
 
-    tools/figures consistency        # about ten minutes of one core
+    tools/figures consistency        # {minutes:.0f} minutes of one core
 
 which ends with status 1 if a difference exceeds its bound. Do not edit them: the texts are in `tools/consistency/`.
 
 {reading}
 
-![Differences between the tiers against the number of triangles](consistency.svg)
+![Differences between the tiers against the number of triangles; dotted: fourth order in the mesh width](consistency.svg)
 
 ## How to read the tables
 
 - *Tier 1* is asked for an accuracy far beyond that of 3D; the last value is shown if there are several times.
 - *Its error* is what it states for the energy; for all else, how far a run asked for ten times less is from it. Where an
   exact value is named, that is the reference and the error is zero.
-- *T* triangles of order 4. *Differences* are the largest of all output times (in `consistency.csv` each by itself), relative to
-  E_ref for energies and for what was dissipated, to the size of the shape for distances (radius of the sphere of the same area, or of the
-  tube), to 4 pi for INT K, else to the largest value of tier 1.
-- *Order* is that of the difference in the mesh width, from the coarsest to the finest mesh; empty where tier 1's error or rounding would decide
-  it. The tolerance of the time steps falls with T^-3, so that errors in time fall as those in space should, with the fourth power of the
-  mesh width; of fixed steps the length falls with the mesh width.
-- *Bound*: more than that on the finest mesh, or an order below 1 (but for extremes, and where curvature jumps), fails the command. Empty: only told.
-- *CPU seconds* of one thread, tier 3D with the coarser run that it makes for its own error; the machine was busy.
+- *T* triangles of order 4. *Differences* are the largest of all output times (in `consistency.csv` each by itself),
+  relative to E_ref for energies and for what was dissipated, to the size of the shape for distances (radius of the
+  sphere of the same area, or of the tube), to 4 pi for INT K, else to the largest value of tier 1.
+- *Order* is that of the difference in the mesh width, from the coarsest to the finest mesh; empty where tier 1's error
+  or rounding would decide it. The tolerance of the time steps falls with T^-3, so that errors in time fall as those in
+  space should, with the fourth power of the mesh width; fixed steps (rates) are the same on all meshes.
+- *Bound*: more than that on the finest mesh fails the command, and so does an order below 1 if more than a tenth of the
+  bound is left (but for extremes, and where curvature jumps). Empty: only told.
+- *CPU seconds* of one thread, in 3D with the coarser run that it makes for its own error; the machine was busy.
 """
 
 
 INTEGRALS = ("area", "volume", "energy", "energy_20", "energy_40", "energy_42", "integral_K")
-SMOOTH = ("figure", "waves-overdamped", "waves-stokes", "waves-fluid", "rotation", "spheroid-fluid")
+AT_REST = ("tube-at-rest", "spheroid-at-rest")
+INERTIAL = ("waves-fluid", "rotation", "spheroid-fluid")
+MOVING = ("figure", "waves-overdamped", "waves-stokes", *INERTIAL)
+RATES = ("rates-gradient-flow", "rates-overdamped", "rates-stokes", "rates-pearling", "rates-buckling")
 
 
 def reading(tables):
     """What the tables say, in words."""
+
+    def largest(scenes, *quantities, what=lambda row: row.difference(row.meshes[-1])):
+        """Of such rows, all if none are named; differences on the finest meshes."""
+        found = [
+            what(row)
+            for scene in tables
+            for row in scene.rows
+            if scene.name in scenes and row.found and (row.quantity in quantities or not quantities)
+        ]
+        return f"{max(found):.2g}" if found else "(not run)"
+
     return READING.format(
-        at_rest=_worst(tables, lambda scene, row: scene.endswith("-at-rest") and "capsule" not in scene and row.quantity in INTEGRALS),
-        extremes=_worst(tables, lambda scene, row: scene.endswith("-at-rest") and "capsule" not in scene and row.quantity[:3] in ("min", "max")),
-        rates=_worst(tables, lambda scene, row: scene.startswith("rates-")),
-        figure=_worst(tables, lambda scene, row: scene == "figure" and row.quantity == "energy"),
-        motion=_worst(tables, lambda scene, row: scene in SMOOTH and row.quantity == "energy"),
-        shapes=_worst(tables, lambda scene, row: scene in SMOOTH and row.quantity == "shape, Hausdorff"),
-        dissipated=_worst(tables, lambda scene, row: scene in SMOOTH and row.quantity == "dissipated"),
-        capsule=_worst(tables, lambda scene, row: scene == "capsule-fluid" and row.quantity == "energy"),
-        seams=_worst(tables, lambda scene, row: scene == "capsule-at-rest" and row.quantity == "energy"),
-        equilibrium=_worst(tables, lambda scene, row: scene == "capsule-equilibrium" and row.quantity == "energy"),
+        at_rest=largest(AT_REST, *INTEGRALS),
+        extremes=largest(AT_REST, "min H", "max H", "min K", "max K"),
+        rates=largest(RATES),
+        motion=largest(MOVING, "energy"),
+        figure=largest(("figure",), "energy"),
+        equilibrium=largest(("capsule-equilibrium",), "energy"),
+        shapes=largest(MOVING, "shape, Hausdorff"),
+        noise_coarse=largest(("tube-begins",), "overdamped, dissipation", what=lambda row: row.difference(row.meshes[0])),
+        noise_fine=largest(("tube-begins",), "overdamped, dissipation"),
+        waves=largest(("tube-begins",), "overdamped, wave 1", "overdamped, wave 2"),
+        pointwise=largest(INERTIAL, "speed", "lambda"),
+        seams=largest(("capsule-at-rest",), "energy"),
+        capsule=largest(("capsule-fluid",), "energy"),
+        capsule_known=largest(("capsule-fluid",), "energy", what=lambda row: row.error),
+        dissipated=largest(MOVING, "dissipated"),
     )
-
-
-def _worst(tables, wanted):
-    """The largest difference on the finest meshes of such rows."""
-    found = [row.difference(row.meshes[-1]) for scene in tables for row in scene.rows if row.found and wanted(scene.name, row)]
-    return f"{max(found):.1e}" if found else "(not run)"
 
 
 def write(path, tables):
     """PATH, and beside it the same name with .csv and .svg."""
     path = Path(path)
-    parts = [HEAD.format(reading=reading(tables))]
+    parts = [HEAD.format(reading=reading(tables), minutes=sum(scene.cost.total for scene in tables) / 60)]
     for scene in tables:
         parts.append(f"## {scene.title}\n\n{scene.words}\n\n{table(scene)}\n")
     keep(path, "\n".join(parts))

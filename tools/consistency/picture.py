@@ -1,9 +1,9 @@
 """Differences against triangles: shapes at rest, rates, and the energies of what moves."""
 
 import style  # from tools/plot, on the path since runs.py
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
-HEIGHT = 2.6  # inches
+HEIGHT = 3.6  # inches
 PANELS = (
     ("energy at rest", "-at-rest", lambda row: row.quantity == "energy"),
     ("rates of small waves", "rates-", lambda row: bool(row.found)),
@@ -25,11 +25,12 @@ def draw(tables, path):
             colour = style.line_colours(len(lines))[i]
             axes.loglog(row.meshes, [row.difference(t) for t in row.meshes], color=colour, label=label,
                         marker=style.MARKERS[i % len(style.MARKERS)])  # fmt: skip
+        axes.loglog([100, 400], [1e-3, 1e-3 / 16], color="0.6", lw=0.6, ls=":")  # fourth order in the mesh width
         axes.set(title=title, xlabel="triangles")
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.legend(fontsize=5.5, labelspacing=0.2)
-        for t, power in ((100, 2),):
-            axes.loglog([t, 4 * t], [1e-3, 1e-3 / 4**power], color="0.6", lw=0.6, ls=":")
+        axes.xaxis.set_major_locator(FixedLocator([100, 200, 400, 1000]))
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.legend(fontsize=5.5, labelspacing=0.2, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     panels[0].set_ylabel("relative difference of the tiers")
     style.save(figure, [path])
     plt.close(figure)

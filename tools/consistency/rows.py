@@ -58,6 +58,10 @@ class Cost:
     axisym: float = 0.0
     surface: dict = field(default_factory=dict)  # triangles -> seconds
 
+    @property
+    def total(self):
+        return self.axisym + sum(self.surface.values())
+
 
 @dataclass
 class Table:
