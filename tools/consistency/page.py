@@ -56,8 +56,8 @@ as the extremes of H and K ({extremes}), are far less accurate than integrals. *
 at rest the fixed step leaves (rate x step)^2/3, the rest follows the tolerance. *At the first moment* the force: it
 takes four derivatives of the surface, so that of an interpolated start a part of it is noise of the size of triangles.
 By it the overdamped tube dissipates {noise_coarse} times too much on the coarsest mesh and {noise_fine} times on the
-finest, where its smooth waves begin right to {waves}. Without inertia the noise is gone in a moment. A fluid keeps it as waves of little
-energy that show in what is taken at a point or an instant: its largest speed and lambda differ by up to {pointwise}.
+finest, where its smooth waves begin right to {waves}. Without inertia the noise is gone in a moment.
+A fluid seems to keep it as waves of little energy that show in what is taken at a point or an instant: its largest speed and lambda differ by up to {pointwise}.
 
 **Where they part.** *Where curvature jumps*, at the seams of the capsule: its energy at rest is off by {seams} and falls
 with the first order at best, extremes of H and K not at all; as a fluid it sends out waves that no mesh resolves, and
