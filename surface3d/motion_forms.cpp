@@ -61,7 +61,7 @@ public:
           bending_(bending),
           base_(base),
           table_(space.tabulation()),
-          pressure_table_(pressure_table()),
+          pressure_table_(space.tabulation(unknowns.p < 0 ? 1 : unknowns.last_mesh().order)),
           n_(space.width()),
           nv_(law.components() * n_),
           H_(unknowns.H < 0 ? -1 : nv_),
@@ -81,12 +81,6 @@ private:
         CurvatureJet<double> f;
     };
 
-    Tabulation pressure_table() const {
-        std::vector<QuadraturePoint> points;
-        for (int q = 0; q < table_.points(); ++q)
-            points.push_back({table_.point(0, q), table_.point(1, q), table_.weight[q]});
-        return Tabulation(unknowns_.p < 0 ? 1 : unknowns_.last_mesh().order, points);
-    }
     void size(CellWork& work) const;
     Point point(const SurfacePoint<double>& p, const CellColumns<3>& gradient, const CellColumns<3>& normals, int cell,
                 int q) const;

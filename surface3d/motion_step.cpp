@@ -44,6 +44,15 @@ Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const Vect
     });
 }
 
+MotionState at_rest(const CurvedMesh& mesh, int components, int pressures) {
+    MotionState s;
+    s.X = s.X_past = node_positions(mesh);
+    s.w = s.w_past = VectorField::Zero(3, mesh.size());
+    s.u = s.u_past = Eigen::VectorXd::Zero(components * mesh.size());
+    s.p = Eigen::VectorXd::Zero(pressures);
+    return s;
+}
+
 MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending,
                              const MotionControl& control)
     : mesh_(mesh),
@@ -59,23 +68,8 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
     law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
 }
 
-CurvedMesh MotionStepper::mesh(const VectorField& X) const {
-    CurvedMesh out = mesh_;
-    for (int i = 0; i < out.size(); ++i) out.nodes[i] = X.col(i);
-    return out;
-}
-
 MotionState MotionStepper::start(const CurvedMesh& mesh) const {
-    MotionState s;
-    s.X.resize(3, mesh.size());
-    for (int i = 0; i < mesh.size(); ++i) s.X.col(i) = mesh.nodes[i];
-    s.X_past = s.X;
-    s.w.setZero(3, mesh.size());
-    s.w_past = s.w;
-    s.u.setZero(law_.components() * mesh.size());
-    s.u_past = s.u;
-    s.p.setZero(unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
-    return s;
+    return at_rest(mesh, law_.components(), unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
 }
 
 MotionFields MotionStepper::fields(const CurvedMesh& mesh) {
@@ -173,8 +167,7 @@ Eigen::MatrixXd MotionStepper::rigid_motions(const StepBase& base) const {
     const bool tube = mesh_.period > 0;
     const Eigen::SparseMatrix<double> mass = mass_matrix(space_, *base.mesh);
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(unknowns_.size(), tube ? 4 : 6);
-    VectorField x(3, n);
-    for (int i = 0; i < n; ++i) x.col(i) = base.mesh->nodes[i];
+    const VectorField x = node_positions(*base.mesh);
     for (int motion = 0; motion < out.cols(); ++motion) {
         const int axis = tube && motion == 3 ? 2 : motion % 3;
         const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);

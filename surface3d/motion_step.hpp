@@ -24,6 +24,9 @@ struct MotionState {
     double lambda = 0;
 };
 
+// With so many components of the velocity at a node, and so many pressures.
+MotionState at_rest(const CurvedMesh& mesh, int components, int pressures);
+
 // What is kept on the way, and how the mesh moves.
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
@@ -49,7 +52,7 @@ public:
 
     // At rest.
     MotionState start(const CurvedMesh& mesh) const;
-    CurvedMesh mesh(const VectorField& X) const;
+    CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
     // Velocities of the surface at the nodes.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
 

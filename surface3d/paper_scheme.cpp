@@ -29,14 +29,6 @@ PaperModuli paper_moduli(const Bending& bending) {
     return out;
 }
 
-// The functions of the pressure at the quadrature points of the space.
-Tabulation pressure_table(const SurfaceSpace& space) {
-    const Tabulation& table = space.tabulation();
-    std::vector<QuadraturePoint> points;
-    for (int q = 0; q < table.points(); ++q) points.push_back({table.point(0, q), table.point(1, q), table.weight[q]});
-    return Tabulation(space.order() - 1, points);
-}
-
 using Frame = Eigen::Matrix<double, 3, 2>;
 template <int rows>
 using OfVelocity = Eigen::Matrix<double, rows, Eigen::Dynamic, rows == 1 ? Eigen::RowMajor : Eigen::ColMajor, rows,
@@ -200,7 +192,7 @@ PaperStepper::PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const B
       moduli_(paper_moduli(bending)),
       smoothing_(smoothing),
       unknowns_(mesh),
-      pressure_(pressure_table(space_)),
+      pressure_(space_.tabulation(mesh.order - 1)),
       A_(unknowns_.pattern()),
       solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {
     if (!law.inextensible)
@@ -211,21 +203,8 @@ PaperStepper::PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const B
         throw std::invalid_argument(fmt::format("curvatures are smoothed by eps >= 0, not {:g}", smoothing));
 }
 
-CurvedMesh PaperStepper::mesh(const VectorField& X) const {
-    CurvedMesh out = mesh_;
-    for (int i = 0; i < out.size(); ++i) out.nodes[i] = X.col(i);
-    return out;
-}
-
 MotionState PaperStepper::start(const CurvedMesh& mesh) const {
-    MotionState s;
-    s.X.resize(3, mesh.size());
-    for (int i = 0; i < mesh.size(); ++i) s.X.col(i) = mesh.nodes[i];
-    s.X_past = s.X;
-    s.w = s.w_past = VectorField::Zero(3, mesh.size());
-    s.u = s.u_past = Eigen::VectorXd::Zero(3 * mesh.size());
-    s.p = Eigen::VectorXd::Zero(unknowns_.size() - unknowns_.p);
-    return s;
+    return at_rest(mesh, 3, unknowns_.size() - unknowns_.p);
 }
 
 PaperFields PaperStepper::fields(const CurvedMesh& mesh) {

@@ -48,7 +48,7 @@ public:
 
     // At rest. The velocity has three components in all models, the overdamped one, too.
     MotionState start(const CurvedMesh& mesh) const;
-    CurvedMesh mesh(const VectorField& X) const;
+    CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
 
     // What is explicit in a step from this surface.
     PaperFields fields(const CurvedMesh& mesh);

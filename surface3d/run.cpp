@@ -152,8 +152,7 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
     const CurvatureField& field = m.curvature;
     Record out;
     out.mesh = mesh_number;
-    VectorField points(3, m.start.mesh.size());
-    for (int i = 0; i < points.cols(); ++i) points.col(i) = m.start.mesh.nodes[i];
+    const VectorField points = node_positions(m.start.mesh);
     out.arrays = {array("points", points)};
     if (!m.has_curvature()) return out;
     Eigen::RowVectorXd energy_density(points.cols());

@@ -81,6 +81,24 @@ Eigen::SparseMatrix<double> mass_matrix(const SurfaceSpace& space, const CurvedM
     return A;
 }
 
+VectorField node_positions(const CurvedMesh& mesh) {
+    VectorField X(3, mesh.size());
+    for (int i = 0; i < mesh.size(); ++i) X.col(i) = mesh.nodes[i];
+    return X;
+}
+
+CurvedMesh with_nodes(CurvedMesh mesh, const VectorField& X) {
+    for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] = X.col(i);
+    return mesh;
+}
+
+Tabulation SurfaceSpace::tabulation(int order) const {
+    std::vector<QuadraturePoint> points;
+    for (int q = 0; q < tabulation_.points(); ++q)
+        points.push_back({tabulation_.point(0, q), tabulation_.point(1, q), tabulation_.weight[q]});
+    return Tabulation(order, points);
+}
+
 Eigen::SparseMatrix<double> stiffness_matrix(const SurfaceSpace& space, const CurvedMesh& mesh) {
     const Tabulation& table = space.tabulation();
     Eigen::SparseMatrix<double> A = space.pattern();

@@ -50,6 +50,8 @@ public:
     int width() const { return width_; }  // nodes of a cell
     int node(int cell, int a) const { return cells_[cell * width_ + a]; }
     const Tabulation& tabulation() const { return tabulation_; }
+    // At the same points, functions of another order.
+    Tabulation tabulation(int order) const;
 
     // Runs `cell_work(cell)` for every cell, on all threads. No two cells that share a node are under way at once, and
     // those that do always come in the same order: work may add to nodal values, with the same sum to the last bit.
@@ -96,6 +98,10 @@ private:
     Eigen::SparseMatrix<double> pattern_;
     std::vector<int> slots_;  // of each entry of each cell matrix, column by column
 };
+
+// All nodes, one column each, and the same mesh with its nodes there.
+VectorField node_positions(const CurvedMesh& mesh);
+CurvedMesh with_nodes(CurvedMesh mesh, const VectorField& X);
 
 // The nodes of a cell as it sees them, one column each.
 inline CellColumns<3> cell_nodes(const CurvedMesh& mesh, int cell) {

@@ -49,7 +49,7 @@ def numbers(tables):
 READING = """**In short.** Where a start is smooth both tiers say the same, and what they differ by vanishes as the mesh is
 refined. On the finest meshes here integrals at rest differ by {at_rest} at most, rates of small waves by {rates},
 energies in motion by {motion} of E_ref at all output times ({figure} for the figure's tube, {equilibrium} where the cell
-comes to rest), shapes in motion by {shapes} of their size.
+comes to rest), what was dissipated by {dissipated}, shapes in motion by {shapes} of their size.
 
 **What limits it.** *At rest* the recovery of curvature: integrals are of order 5 and more; values at single points, such
 as the extremes of H and K ({extremes}), are far less accurate than integrals. *In motion* the time steps of 3D: of waves
@@ -61,9 +61,7 @@ A fluid seems to keep it as waves of little energy that show in what is taken at
 
 **Where they part.** *Where curvature jumps*, at the seams of the capsule: its energy at rest is off by {seams} and falls
 with the first order at best, extremes of H and K not at all; as a fluid it sends out waves that no mesh resolves, and
-energies differ by {capsule}, where tier 1 itself is known to {capsule_known} only. *The first row* of a model without
-inertia has neither velocity nor dissipation in 3D, as none is known before the first step, so that what was dissipated
-lacks half of that step: {dissipated} of E_ref at most.
+energies differ by {capsule}, where tier 1 itself is known to {capsule_known} only.
 *Least and largest radius* are those of nodes in 3D, hence without an order; of closed surfaces they are something else
 (distances from the centre, in tier 1 from the axis), so not compared."""
 

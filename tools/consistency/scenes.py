@@ -142,7 +142,7 @@ MOVING_TUBES = [
         "The figure's tube, gradient flow",
         "`cases/figure_k42_006.toml`.",
         motion(case("figure_k42_006"), 1e-8, 8e-5,
-               within(1e-4, "energy", "energy_20", "energy_42") | within(2e-3, "dissipated")
+               within(1e-4, "energy", "energy_20", "energy_42") | within(1e-3, "dissipated")
                | within(2e-4, "area", "volume", "r_min", "r_max", *SHAPES)),
     ),
     Scene(
