@@ -84,24 +84,25 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-void refuse_what_has_none(const Model& model) {
+void refuse_what_has_none(const Model& model, int first) {
     if (model.kind == ModelKind::fluid)
         throw std::invalid_argument(
             "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
-    if (model.kind != ModelKind::gradient_flow && !model.keeps_volume.value_or(true))
+    if (first == 0 && model.kind != ModelKind::gradient_flow && !model.keeps_volume.value_or(true))
         throw std::invalid_argument("the spectrum of a model that flows is that with the volume fixed");
 }
 
 }  // namespace
 
 Held held_by(const Model& model) {
-    if (model.kind != ModelKind::gradient_flow) return Held::area_and_volume;
+    if (model.kind != ModelKind::gradient_flow)
+        return model.keeps_volume.value_or(true) ? Held::area_and_volume : Held::area;
     return model.keeps_volume.value_or(false) ? Held::volume : Held::nothing;
 }
 
 Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
                   const SpectrumSettings& settings) {
-    refuse_what_has_none(model);
+    refuse_what_has_none(model, settings.first);
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
@@ -111,12 +112,15 @@ Spectrum spectrum(const Bending& bending, const Model& model, Held held, const M
         if (held == Held::volume || held == Held::area_and_volume) c.volume = e.observed.volume;
         if (held == Held::reduced_volume) c.reduced_volume = reduced_volume(e.observed.area, e.observed.volume);
         const bool last = elements + elements / 2 > settings.max_elements;
-        if (held != Held::nothing && !out.at_rest()) {
+        if (settings.first == 0 && held != Held::nothing && !out.at_rest()) {
             if (!last) continue;  // perhaps a finer mesh shows it at rest
             throw std::invalid_argument(
                 "the shape is not at rest: in motion, only the gradient flow with the volume free has a spectrum");
         }
-        auto modes = mode_stability(problem, e, settings.last, dissipation(model), settings.count);
+        const ModeStability stability(problem, e);
+        std::vector<ModeRates> modes;
+        for (int m = settings.first; m <= settings.last; ++m)
+            modes.push_back(stability.rates(m, dissipation(model), settings.count));
         const bool first = out.modes.empty();
         out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
         out.modes = std::move(modes);

@@ -11,7 +11,7 @@
 namespace tubule::axisym {
 
 struct SpectrumSettings {
-    int last = 2;            // m = 0 ... last
+    int first = 0, last = 2;  // m = first ... last
     int count = 3;           // rates of each m
     double accuracy = 1e-6;  // of each rate, relative to the larger of it and the slowest rate there is
     int max_elements = 200;
@@ -32,11 +32,13 @@ struct Spectrum {
 // What a model holds fixed by itself: nothing, or the volume, in gradient flow; area and volume otherwise.
 Held held_by(const Model& model);
 
-// Of a whole tube or cell. A shape that is not at rest has rates only in the gradient flow with nothing held, those of
-// the flow linearised about its motion at this instant. For all else the multipliers are those that balance the force
-// best. Throws std::invalid_argument for a fluid (its inertia is not in the second variation), for a model that flows
-// with the volume free, and for other models than the gradient flow of a shape that moves; SolveError if an
-// eigenproblem is not solved.
+// Of a whole tube or cell. Of a shape that is not at rest in the gradient flow, the rates are those of the flow
+// linearised about its motion at this instant. For all else the multipliers are those that balance the force best, as
+// if the shape were held by them.
+// With m = 0 there are constraints: no rates then of a model that flows with the volume free, and none of a shape that
+// moves, but for the gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates; what
+// the motion itself does to waves is left out where the model flows, so they are an estimate. None of a fluid
+// (std::invalid_argument), as its inertia is not in the second variation. SolveError if an eigenproblem is not solved.
 Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
                   const SpectrumSettings& settings = {});
 
