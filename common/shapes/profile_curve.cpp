@@ -55,22 +55,31 @@ double extrapolated(const double* x, const double* values, double at) {
     return sum;
 }
 
-// The functions of ProfileCurve, the points having these fractions s of the arc length.
-BlendedCurve functions_of(const ProfileCurve& curve, const std::vector<double>& r, const std::vector<double>& z,
+// Two functions from their values at these fractions s of the arc length, as ProfileCurve has them: of a cell the first
+// one over sin(pi s), as functions of c.
+BlendedCurve functions_of(ProfileCurve::Kind kind, const std::vector<double>& first, const std::vector<double>& second,
                           const std::vector<double>& s) {
     const std::size_t n = s.size();
     std::vector<Point> values(n);
-    if (curve.kind != ProfileCurve::Kind::cell) {
-        for (std::size_t i = 0; i < n; ++i) values[i] = {r[i], z[i] - curve.length * s[i]};
+    if (kind != ProfileCurve::Kind::cell) {
+        for (std::size_t i = 0; i < n; ++i) values[i] = {first[i], second[i]};
         return blended(s, values, true);
     }
     std::vector<double> c(n), scale(n);
-    for (std::size_t i = 0; i < n; ++i) c[i] = -std::cos(pi * s[i]), scale[i] = r[i] / std::sin(pi * s[i]);
+    for (std::size_t i = 0; i < n; ++i) c[i] = -std::cos(pi * s[i]), scale[i] = first[i] / std::sin(pi * s[i]);
     c.front() = -1, c.back() = 1;
     scale.front() = extrapolated(&c[1], &scale[1], -1);  // it is 0/0 at the poles
     scale.back() = extrapolated(&c[n - 1 - terms], &scale[n - 1 - terms], 1);
-    for (std::size_t i = 0; i < n; ++i) values[i] = {scale[i], z[i]};
+    for (std::size_t i = 0; i < n; ++i) values[i] = {scale[i], second[i]};
     return blended(c, values, false);
+}
+
+// The functions of the curve itself: of a tube z without its rise.
+BlendedCurve functions_of(const ProfileCurve& curve, const std::vector<double>& r, const std::vector<double>& z,
+                          const std::vector<double>& s) {
+    std::vector<double> level = z;
+    for (std::size_t i = 0; i < s.size(); ++i) level[i] -= curve.length * s[i];
+    return functions_of(curve.kind, r, level, s);
 }
 
 struct Moments {
@@ -141,6 +150,15 @@ ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<doubl
     curve.arc_length = total.length;
     curve.mean_radius = total.radius / total.length;
     return curve;
+}
+
+BlendedCurve along_curve(const ProfileCurve& curve, const std::vector<double>& first,
+                         const std::vector<double>& second) {
+    std::vector<double> s = curve.functions.x;
+    require(first.size() == s.size() && second.size() == s.size(), "values on a profile: one for each of its points");
+    if (curve.kind == ProfileCurve::Kind::cell)
+        for (double& c : s) c = std::acos(-std::clamp(c, -1.0, 1.0)) / pi;
+    return functions_of(curve.kind, first, second, s);
 }
 
 }  // namespace tubule

@@ -58,6 +58,12 @@ struct ProfileCurve {
 // neighbours, ends that do not fit, and a surface inside out.
 ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<double>& z, double length);
 
+// Two more functions on the curve, from their values at the points that it was made from, as `functions` has r and z:
+// of a cell the first one over sin(pi s). For value_at(), at s or c. Throws std::invalid_argument unless there is one
+// value a point.
+BlendedCurve along_curve(const ProfileCurve& curve, const std::vector<double>& first,
+                         const std::vector<double>& second);
+
 // (r, z) at 0 <= s <= 1.
 template <class S>
 std::array<S, 2> profile_at(const ProfileCurve& curve, const S& s) {
