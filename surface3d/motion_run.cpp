@@ -95,6 +95,10 @@ struct Settings {
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
 };
 
+double begin_time(const Case& c) {
+    return c.handover ? c.handover->time : 0;
+}
+
 double tolerance_for(double accuracy) {
     return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, loosest_tolerance);
 }
@@ -130,7 +134,7 @@ public:
         outputs_.push_back(c.time.end);
         std::sort(outputs_.begin(), outputs_.end());
         outputs_.erase(std::unique(outputs_.begin(), outputs_.end()), outputs_.end());
-        outputs_.erase(outputs_.begin(), std::upper_bound(outputs_.begin(), outputs_.end(), 0.0));
+        outputs_.erase(outputs_.begin(), std::upper_bound(outputs_.begin(), outputs_.end(), begin_time(c)));
     }
 
     void begin();
@@ -233,13 +237,18 @@ void MotionAttempt::begin() {
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, case_.energy);
     const MotionLaw law = motion_law(case_.model);
     memory_.area = o.area, memory_.volume = o.volume;
-    memory_.reference_energy = std::max(std::abs(o.energy), o.magnitude);
+    memory_.reference_energy =
+        case_.handover ? case_.handover->reference_energy : std::max(std::abs(o.energy), o.magnitude);
     memory_.relaxation = case_.surface.relaxation.value_or(relaxes_in * time_to_change(law, o, start.mesh.period == 0));
     memory_.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
-    memory_.next_step = case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end));
+    memory_.next_step =
+        case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end - begin_time(case_)));
     make_stepper(start.mesh);
     state_ = stepper_->start(start.mesh);
-    if (case_.velocity.rotates)
+    state_.time = begin_time(case_);
+    if (start.velocity.size() > 0)
+        state_.u = start.velocity.transpose().reshaped();
+    else if (case_.velocity.rotates)
         for (int i = 0; i < start.mesh.size(); ++i) {
             const Eigen::Vector3d& x = start.mesh.nodes[i];
             state_.u[i] = -case_.velocity.omega * x.y();
@@ -249,7 +258,7 @@ void MotionAttempt::begin() {
     if (stepper_->law().inertia == 0 && !paper_) set_moving();
     look();
     memory_.total_start = memory_.lowest_total = total();
-    trace.add(0, now_.bending.energy);
+    trace.add(state_.time, now_.bending.energy);
     write_row();
     write_frame();
 }

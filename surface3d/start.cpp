@@ -45,11 +45,30 @@ TriangleMesh uniform_tube(double radius, double length, int triangles) {
                       std::max(static_cast<int>(std::lround(around / side)), 3));
 }
 
-// The shape map(base), with its curvatures where the case wants the exact ones.
+// A surface of revolution with waves, as a map from a base; it may move.
+struct WavedMap {
+    const WavedProfile& surface;
+    const Torus& base;
+    template <class S>
+    Vector3<S> operator()(const Vector3<S>& p) const {
+        return position(surface, base, p);
+    }
+    VectorField velocities(const TriangleMesh& triangles, int order) const {
+        if (!surface.velocity) return {};
+        const CurvedMesh nodes =
+            mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return velocity(surface, base, p); });
+        VectorField out(3, nodes.size());
+        for (int i = 0; i < out.cols(); ++i) out.col(i) = nodes.nodes[i];
+        return out;
+    }
+};
+
+// The shape map(base), with its curvatures where the case wants the exact ones, and its velocity if it has one.
 template <class Map>
 StartMesh mapped(const Case& c, const TriangleMesh& base, const Map& map) {
     const int order = element_order(c);
     StartMesh start{mapped_mesh(base, order, map), true, {}, {}};
+    if constexpr (requires { map.velocities(base, order); }) start.velocity = map.velocities(base, order);
     if (c.surface.recovery == Recovery::exact) start.exact = exact_curvature(start.mesh, exact_nodes(base, order, map));
     return start;
 }
@@ -151,10 +170,11 @@ struct MakeStart {
     StartMesh operator()(const Torus& torus) const {
         return on_torus(torus, [&](const auto& p) { return position(torus, p); });
     }
-    StartMesh operator()(const ProfileCurve& curve) const {
+    StartMesh operator()(const WavedProfile& surface) const {
+        const ProfileCurve& curve = surface.curve;
         // Where the torus is only a base, its grid must be one of cells about as long as wide.
         const Torus base{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
-        const auto map = [&](const auto& p) { return position(curve, base, p); };
+        const WavedMap map{surface, base};
         if (curve.kind == ProfileCurve::Kind::ring) return on_torus(base, map);
         const bool tube = curve.kind == ProfileCurve::Kind::tube;
         return meshed_in_rings(c, triangles, map,
@@ -185,7 +205,7 @@ struct MakeStart {
         const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");
         if (!r || !z) refuse(c, fmt::format("shape.path: {} holds no surface and no profile of one", from.path));
         try {
-            return (*this)(profile_curve(r->data, z->data, number(frame, "length")));
+            return (*this)(WavedProfile{profile_curve(r->data, z->data, number(frame, "length")), {}, {}});
         } catch (const std::invalid_argument& error) {
             refuse(c, fmt::format("shape.path: {}: {}", from.path, error.what()));
         }
@@ -207,7 +227,8 @@ struct MakeStart {
 }  // namespace
 
 StartMesh start_mesh(const Case& c, int triangles) {
-    return std::visit(MakeStart{c, triangles}, c.shape);
+    const MakeStart make{c, triangles};
+    return c.handover ? make(c.handover->surface) : std::visit(make, c.shape);
 }
 
 }  // namespace tubule::surface3d

@@ -17,11 +17,12 @@
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
+#include "common/shapes/waved_profile.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule {
 
-enum class Tier { axisym, surface3d };
+enum class Tier { axisym, surface3d, automatic };
 enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
 
 using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
@@ -85,6 +86,20 @@ struct TimeSpan {
     std::optional<double> limit;       // wall clock seconds
 };
 
+// Tier "auto": when an axisymmetric run goes on in three dimensions.
+struct AutoChoices {
+    double noise = 1e-6;    // amplitude of every wave around the axis at the start, relative to the largest radius
+    double largest = 1e-2;  // amplitude at which they are computed, likewise
+    int modes = 4;          // waves e^{i m phi} with m = 1 ... modes
+};
+
+// Where a run of tier surface3d begins instead of at the shape: not in case files, but from tier "auto".
+struct Handover {
+    WavedProfile surface;
+    double time = 0;
+    double reference_energy = 0;  // E_ref of the whole run
+};
+
 // What a run of the case must give: checked by `tubule run --expect`.
 struct Expectation {
     std::string series;          // e.g. "energy", "r_min"
@@ -111,9 +126,11 @@ struct Case {
     Accuracy accuracy;
     Discretisation discretisation;  // of tier axisym
     SurfaceDiscretisation surface;  // of tier surface3d
+    AutoChoices automatic;          // of tier "auto"
     TimeSpan time;
     std::optional<EquilibriumChoices> equilibrium;  // instead of a motion
     Expect expect;
+    std::optional<Handover> handover;
 
     bool moves() const { return time.end > 0; }
 };

@@ -89,7 +89,8 @@ inline std::vector<std::string> known_series() {
                              "height",
                              "r_middle",
                              "pole_curvature",
-                             "distance_to_start"})
+                             "distance_to_start",
+                             "tier"})
         names.push_back(name);
     names.push_back("mode_<n>");
     names.push_back("growth_<m>");
@@ -292,10 +293,31 @@ inline bool is_tube(const Shape& shape) {
 // Why a start is not one for tier "axisym": the key to blame, and the words that follow it. Empty if it is one.
 std::pair<std::string, std::string> not_axisymmetric(const Shape& shape);
 
+template <class Keys>
+void check_neck(Keys& k, const Case& c) {
+    const Tube* tube = std::get_if<Tube>(&c.shape);
+    if (!tube) return;
+    k.check("accuracy.r_min", [&]() -> std::string {
+        const Neck neck = narrowest(*tube);
+        if (c.accuracy.r_min < neck.radius) return {};
+        return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}", neck.radius,
+                           neck.z, c.accuracy.r_min);
+    });
+}
+
 // What no table can tell alone.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
-    if (c.tier != Tier::axisym) {
+    if (c.tier == Tier::automatic) {
+        k.check("discretisation.scheme", [&] {
+            return c.surface.scheme == Scheme::paper
+                       ? "must not be \"paper\" in tier \"auto\": it has no error estimate"
+                       : "";
+        });
+        if (not_axisymmetric(c.shape).first.empty()) check_neck(k, c);
+        return;
+    }
+    if (c.tier == Tier::surface3d) {
         if (c.surface.scheme != Scheme::paper) return;
         k.check("discretisation.scheme", [&]() -> std::string {
             if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not control it";
@@ -332,14 +354,28 @@ void check_together(Keys& k, const Case& c) {
                        : "";
         });
     }
-    const Tube* tube = std::get_if<Tube>(&c.shape);
-    if (!tube) return;
-    k.check("accuracy.r_min", [&]() -> std::string {
-        const Neck neck = narrowest(*tube);
-        if (c.accuracy.r_min < neck.radius) return {};
-        return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}", neck.radius,
-                           neck.z, c.accuracy.r_min);
+    check_neck(k, c);
+}
+
+template <class Keys>
+void keys(Keys& k, AutoChoices& a) {
+    k.number("noise", a.noise, {.above = 0, .to = 0.1});
+    k.number("largest", a.largest, {.above = 0, .to = 0.1});
+    k.integer("modes", a.modes, {.from = 1, .to = 20});
+    k.check("noise", [&]() -> std::string {
+        if (a.noise < a.largest) return {};
+        return fmt::format("must be below auto.largest = {}, not {}", a.largest, a.noise);
     });
+}
+
+// Tier auto moves what the shape is, and finds out how.
+template <class Keys>
+void automatic_keys(Keys& k, Case& c) {
+    k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
+    k.table("model", [&](auto& k) { keys(k, c.model); });
+    k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
+    k.table("auto", [&](auto& k) { keys(k, c.automatic); });
+    k.table("time", [&](auto& k) { keys(k, c.time); });
 }
 
 // Tier axisym moves a profile or looks for its equilibria.
@@ -372,21 +408,27 @@ void surface_motion_keys(Keys& k, Case& c) {
 
 template <class Keys>
 void keys(Keys& k, Case& c) {
-    k.choice("tier", c.tier, {{"axisym", Tier::axisym}, {"surface3d", Tier::surface3d}}, k.required);
+    k.choice("tier", c.tier, {{"axisym", Tier::axisym}, {"surface3d", Tier::surface3d}, {"auto", Tier::automatic}},
+             k.required);
     k.table("about", [&](auto& k) {
         k.text("title", c.title);
         k.text("source", c.source);
     });
     k.table("energy", [&](auto& k) { keys(k, c.energy); });
+    if (c.tier != Tier::automatic) k.absent("auto", "must be absent: it belongs to tier \"auto\"");
     if (c.tier == Tier::axisym)
         motion_keys(k, c);
-    else
+    else if (c.tier == Tier::surface3d)
         surface_motion_keys(k, c);
+    else
+        automatic_keys(k, c);
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
-    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier == Tier::axisym || c.moves()); });
+    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier != Tier::surface3d || c.moves()); });
     k.table("discretisation", [&](auto& k) {
         if (c.tier == Tier::surface3d)
             keys(k, c.surface, c.moves());
+        else if (c.tier == Tier::automatic)
+            keys(k, c.surface, true);
         else if (c.equilibrium)
             k.integer("order", c.discretisation.order, {.from = 3, .to = 7, .step = 2});
         else

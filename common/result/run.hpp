@@ -21,6 +21,7 @@ struct RunObserver {
     virtual void discard() {}  // the run begins again with finer settings: forget all rows and frames
     virtual void progress(double /*time*/, double /*energy*/, double /*step*/) {}
     virtual bool interrupted() { return false; }
+    virtual void note(const std::string& /*words*/) {}  // what is worth telling at once
 };
 
 struct RunSummary {

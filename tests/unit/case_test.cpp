@@ -89,7 +89,8 @@ TEST(CaseRefusal, TextThatIsNoToml) {
 }
 
 TEST(CaseRefusal, UnknownKeysAndTables) {
-    const std::string tables = "tier, about, energy, model, equilibrium, velocity, shape, accuracy, discretisation, time, expect";
+    const std::string tables =
+        "tier, about, energy, auto, model, equilibrium, velocity, shape, accuracy, discretisation, time, expect";
     expect_refused({
         Edit{"tier =", "teir =", "1:1: unknown key teir; did you mean 'tier'? Allowed here: " + tables},
         Edit{"[discretisation]", "[speed]", "18:2: unknown key speed. Allowed here: " + tables},
@@ -127,7 +128,7 @@ TEST(CaseRefusal, UnknownSeries) {
         "integral_H2, integral_K, gauss_bonnet_defect, elements, kinetic_energy, speed, momentum_x, momentum_y, "
         "momentum_z, angular_momentum_x, angular_momentum_y, angular_momentum_z, stretching, quality, turn, "
         "correction_energy, lambda, parameter, special, reduced_volume, sigma, P, negative_directions, "
-        "meridian_length, height, r_middle, pole_curvature, distance_to_start, mode_<n>, growth_<m>";
+        "meridian_length, height, r_middle, pole_curvature, distance_to_start, tier, mode_<n>, growth_<m>";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
         Edit{"energy = {", "enrgy = {", "24:1: unknown key expect.enrgy; did you mean 'energy'?" + at_end},
@@ -142,7 +143,7 @@ TEST(CaseRefusal, UnknownSeries) {
 
 TEST(CaseRefusal, MissingKeys) {
     expect_refused({
-        Edit{"tier = \"axisym\"", "", "1:1: missing key tier: one of \"axisym\", \"surface3d\""},
+        Edit{"tier = \"axisym\"", "", "1:1: missing key tier: one of \"axisym\", \"surface3d\", \"auto\""},
         Edit{"kind = \"tube\"", "",
              "9:1: missing key shape.kind: one of \"tube\", \"sphere\", \"ellipsoid\", \"torus\", "
              "\"capsule\", \"dumbbell\", \"file\", \"result\""},
@@ -155,12 +156,12 @@ TEST(CaseRefusal, MissingKeys) {
         Edit{"value = 1.0, ", "", "24:10: missing key expect.energy.value: a finite number"},
         Edit{"time = 0.1\n", "", "25:1: missing key expect.at.0.time: a number >= 0 and <= 1.4 (time.end)"},
     });
-    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: one of \"axisym\", \"surface3d\"");
+    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: one of \"axisym\", \"surface3d\", \"auto\"");
 }
 
 TEST(CaseRefusal, WrongTypes) {
     expect_refused({
-        Edit{"\"axisym\"", "1", "1:8: tier must be one of \"axisym\", \"surface3d\", not 1"},
+        Edit{"\"axisym\"", "1", "1:8: tier must be one of \"axisym\", \"surface3d\", \"auto\", not 1"},
         Edit{"\"test\"", "2024-01-01", "3:9: about.title must be a string, not a date or time"},
         Edit{"title = \"test\"", "source = true", "3:10: about.source must be a string, not true"},
         Edit{"0.06", "\"0.06\"", "6:7: energy.k42 must be a finite number, not the string \"0.06\""},
@@ -191,7 +192,7 @@ TEST(CaseRefusal, UnknownChoices) {
         "\"time-limit\", \"interrupted\"";
     expect_refused({
         Edit{"\"axisym\"", "\"Axisim\"",
-             "1:8: tier must be one of \"axisym\", \"surface3d\", not \"Axisim\"; did you mean 'axisym'?"},
+             "1:8: tier must be one of \"axisym\", \"surface3d\", \"auto\", not \"Axisim\"; did you mean 'axisym'?"},
         Edit{"\"gradient-flow\"", "\"water\"",
              "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"water\""},
         Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"kept\"",
@@ -328,7 +329,8 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
         Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
         Override{"mode.0.n=1",
-                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, model, equilibrium, velocity, "
+                 "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, auto, model, equilibrium, "
+                 "velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
                  "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
@@ -521,6 +523,54 @@ TEST(CaseFile, TheDocumentedExampleIsOne) {
     ASSERT_NE(begin, std::string::npos);
     const std::string example = guide.substr(begin + fence.size(), guide.find("```", begin + 3) - begin - fence.size());
     EXPECT_EQ(refusal(example), "accepted");
+}
+
+TEST(TierAuto, ReadsItsTables) {
+    const std::string text = with("tier = \"axisym\"", "tier = \"auto\"");
+    const Case plain = parse_case(text, {"discretisation.order=4"}, "case.toml");
+    EXPECT_EQ(plain.tier, Tier::automatic);
+    EXPECT_EQ(plain.automatic.noise, 1e-6);  // the defaults of docs/case_files.md
+    EXPECT_EQ(plain.automatic.largest, 1e-2);
+    EXPECT_EQ(plain.automatic.modes, 4);
+    EXPECT_EQ(plain.accuracy.r_min, 1e-2);  // as in tier surface3d
+    const Case c = parse_case(text,
+                              {"discretisation.order=3", "auto.noise=1e-5", "auto.largest=0.05", "auto.modes=7",
+                               "discretisation.elements=90", "shape.mode.0.m=2"},
+                              "case.toml");
+    EXPECT_EQ(c.automatic.noise, 1e-5);
+    EXPECT_EQ(c.automatic.largest, 0.05);
+    EXPECT_EQ(c.automatic.modes, 7);
+    EXPECT_EQ(c.surface.elements, 90);
+    const Case again = parse_case(effective_toml(c), {}, "again.toml");
+    EXPECT_EQ(again.automatic.modes, 7);
+    EXPECT_EQ(effective_toml(again), effective_toml(c));
+}
+
+TEST(TierAuto, RefusesWhatBelongsElsewhere) {
+    const auto refused = [](const std::string& set) {
+        return refusal(with("tier = \"axisym\"", "tier = \"auto\""), {"discretisation.order=4", set});
+    };
+    EXPECT_EQ(refused("auto.noise=0"), "--set auto.noise=0: auto.noise must be a number > 0 and <= 0.1, not 0");
+    EXPECT_EQ(refused("auto.noise=0.05"),
+              "--set auto.noise=0.05: auto.noise must be below auto.largest = 0.01, not 0.05");
+    EXPECT_EQ(refused("auto.largest=0.5"),
+              "--set auto.largest=0.5: auto.largest must be a number > 0 and <= 0.1, not 0.5");
+    EXPECT_EQ(refused("auto.modes=0"), "--set auto.modes=0: auto.modes must be an integer >= 1 and <= 20, not 0");
+    EXPECT_EQ(refused("auto.mods=3"),
+              "--set auto.mods=3: unknown key auto.mods; did you mean 'modes'? Allowed here: noise, largest, modes");
+    EXPECT_EQ(refused("equilibrium.modes=2"),
+              "--set equilibrium.modes=2: equilibrium must be absent: it belongs to tier \"axisym\"");
+    EXPECT_EQ(refused("discretisation.parametrisation=even").substr(0, 92),
+              "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation. Allow");
+    EXPECT_EQ(
+        refused("discretisation.scheme=paper"),
+        "--set discretisation.scheme=paper: discretisation.scheme must not be \"paper\" in tier \"auto\": it has no "
+        "error estimate");
+    EXPECT_EQ(refused("accuracy.r_min=0.8").substr(0, 79),
+              "--set accuracy.r_min=0.8: accuracy.r_min must be below the smallest radius of t");
+    for (const std::string tier : {"axisym", "surface3d"})
+        EXPECT_EQ(refusal(with("tier = \"axisym\"", "tier = \"" + tier + "\"") + "[auto]\nmodes = 3\n"),
+                  "case.toml:28:1: auto must be absent: it belongs to tier \"auto\"");
 }
 
 TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {

@@ -1,6 +1,4 @@
 // tubule run CASE... : runs cases, each into a result file.
-#include "surface3d/run.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
@@ -17,7 +15,6 @@
 #include <vector>
 
 #include "axisym/derivatives.hpp"
-#include "axisym/equilibrium_run.hpp"
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
@@ -51,7 +48,7 @@ namespace {
 class Recorder : public RunObserver {
 public:
     Recorder(const Case& c, ResultWriter& writer, bool quiet, double begin)
-        : writer_(writer), progress_(begin, c.time.end, {.quiet = quiet}) {}
+        : case_(c), writer_(writer), quiet_(quiet), progress_(begin, c.time.end, {.quiet = quiet}) {}
     void row(std::span<const double> values) override { writer_.row(values); }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
@@ -59,9 +56,15 @@ public:
     void discard() override { writer_.discard(); }
     void progress(double time, double energy, double step) override { progress_(time, energy, step); }
     bool interrupted() override { return tubule::interrupted(); }
+    void note(const std::string& words) override {
+        const char* wiped = ProgressStyle::is_terminal(stderr) ? "\r\x1b[K" : "";  // the bar, drawn again soon
+        if (!quiet_) fmt::print(stderr, "{}{}: {}\n", wiped, case_.path, words);
+    }
 
 private:
+    const Case& case_;
     ResultWriter& writer_;
+    bool quiet_;
     Progress progress_;
 };
 
@@ -123,6 +126,8 @@ void report(const Case& c, const RunSummary& s, const std::filesystem::path& fil
     if (s.reference_energy > 0)
         fmt::print("    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
                    s.estimated_error, s.reference_energy, c.accuracy.energy);
+    for (const auto& [key, value] : s.details)
+        if (key == "choice" || key == "reason") fmt::print("    {}: {}\n", key, std::get<std::string>(value));
     fmt::print("    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
 }
 
@@ -143,15 +148,16 @@ bool derivatives_pass(const Case& c) {
 struct Opened {
     ResultWriter writer;
     std::optional<surface3d::Restart> restart;
+    std::optional<Result> unfinished;  // the file that it belongs to, as it was found
 };
 
 Opened create(const Case& c, const std::filesystem::path& file) {
-    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), series_names(c)), std::nullopt};
+    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), series_names(c)), std::nullopt, std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
 std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
-    const Result old = read_result(file);
+    Result old = read_result(file);
     if (old.case_text.text != c.text || old.case_text.sets != c.sets)
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
                                     file.string(), c.path));
@@ -163,7 +169,7 @@ std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
     ResultWriter writer = ResultWriter::resume(file);
     const Record& record = writer.restart_record();
     surface3d::Restart restart{record, record.mesh ? old.meshes.at(*record.mesh) : SurfaceCells{}};
-    return Opened{std::move(writer), std::move(restart)};
+    return Opened{std::move(writer), std::move(restart), std::move(old)};
 }
 
 // A result that cannot be written or resumed is found before anything is computed: bad input.
@@ -187,18 +193,17 @@ int run_case(Case c, const RunOptions& options) {
             if (e.time) c.time.output.push_back(*e.time);
 
     const auto started = std::chrono::steady_clock::now();
-    if (c.tier == Tier::surface3d) surface3d::check_start(c);
-    if (c.equilibrium) axisym::check_equilibrium(c);
+    check_start(c);
     std::optional<Opened> result = open_result(c, file, options.resume);
     if (!result) {
         if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
-    auto& [writer, restart] = *result;
+    auto& [writer, restart, unfinished] = *result;
     RunSummary summary;
     {
         Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->record.time : 0);
-        summary = run_tier(c, recorder, restart ? &*restart : nullptr);
+        summary = run_tier(c, recorder, restart ? &*restart : nullptr, unfinished ? &*unfinished : nullptr);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     writer.finish(about_end(c, summary, seconds));
@@ -213,9 +218,10 @@ void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& fil
     const auto* start = std::get_if<ResultFrame>(&c.shape);
     std::error_code none;
     if (start && std::filesystem::equivalent(std::filesystem::path(c.path).parent_path() / start->path, file, none))
-        throw CaseError(fmt::format("{}: {} is where the run starts (shape.path) and must not be its result as well: "
-                                    "choose another one with -o",
-                                    c.path, file.string()));
+        throw CaseError(
+            fmt::format("{}: {} is where the run starts (shape.path) and must not be its result as well: "
+                        "choose another one with -o",
+                        c.path, file.string()));
 }
 
 }  // namespace

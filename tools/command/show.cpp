@@ -66,18 +66,25 @@ std::string array_list(const Record& record) {
     return list;
 }
 
-// The numbers of the first frame are the columns: the frames of a result are all alike.
+bool alike(const Record& a, const Record& b) {
+    return a.mesh.has_value() == b.mesh.has_value() &&
+           std::equal(a.numbers.begin(), a.numbers.end(), b.numbers.begin(), b.numbers.end(),
+                      [](const auto& x, const auto& y) { return x.first == y.first; });
+}
+
+// The numbers of the frames are the columns. Most results have frames that are all alike; else a new header says so.
 void add_frames(Text& out, const std::vector<Record>& frames) {
-    if (frames.empty()) return;
-    const bool on_meshes = frames.front().mesh.has_value();
-    add(out, "\n{:>6} {:>14}{}", "frame", "time", on_meshes ? "   mesh" : "");
-    for (const auto& [name, value] : frames.front().numbers) add(out, " {:>14}", name);
-    add(out, "  arrays\n");
     for (std::size_t i = 0; i < frames.size(); ++i) {
-        add(out, "{:>6} {:>14.8g}", i, frames[i].time);
-        if (frames[i].mesh) add(out, " {:>6}", *frames[i].mesh);
-        for (const auto& [name, value] : frames[i].numbers) add(out, " {:>14.8g}", value);
-        add(out, "  {}\n", array_list(frames[i]));
+        const Record& frame = frames[i];
+        if (i == 0 || !alike(frame, frames[i - 1])) {
+            add(out, "\n{:>6} {:>14}{}", "frame", "time", frame.mesh ? "   mesh" : "");
+            for (const auto& [name, value] : frame.numbers) add(out, " {:>14}", name);
+            add(out, "  arrays\n");
+        }
+        add(out, "{:>6} {:>14.8g}", i, frame.time);
+        if (frame.mesh) add(out, " {:>6}", *frame.mesh);
+        for (const auto& [name, value] : frame.numbers) add(out, " {:>14.8g}", value);
+        add(out, "  {}\n", array_list(frame));
     }
 }
 

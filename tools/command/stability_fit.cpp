@@ -54,14 +54,18 @@ double amplitude_of(const Result& result, const Record& frame, WaveNumbers wave)
     return axisym::mode_amplitude(axisym::frame_meridian(frame), wave.n);
 }
 
-// The rows have every step, the frames only what was asked for.
+// The rows have every step, the frames only what was asked for. A run of both tiers has profiles, of which nothing with
+// m > 0 is known, and then surfaces, the first of them at the time of the last profile.
 Amplitudes amplitudes_of(const Result& result, WaveNumbers wave) {
     const std::string name = fmt::format("mode_{}", wave.n);
     const auto series = result.series.find(name);
     if (wave.m == 0 && series != result.series.end())
         return {result.series.at("time"), series->second, fmt::format("rows ({})", name)};
     Amplitudes out;
+    const bool surfaces = !result.frames.empty() && result.frames.back().mesh;
     for (const Record& frame : result.frames) {
+        if (surfaces && !frame.mesh && wave.m > 0) continue;
+        if (!out.times.empty() && out.times.back() == frame.time) out.times.pop_back(), out.values.pop_back();
         out.times.push_back(frame.time);
         out.values.push_back(amplitude_of(result, frame, wave));
     }

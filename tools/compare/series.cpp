@@ -15,9 +15,9 @@ constexpr double same_time = 1e-12;  // of the later one
 constexpr double halved = 4;         // by this at least the error falls if rows are half as far apart, at the ends, too
 
 // How the run went, not what it computed.
-const std::set<std::string> of_the_run{"time",         "step_size",          "order",      "newton_iterations",
-                                       "elements",     "wall_seconds",       "mesh_width", "identity_defect",
-                                       "energy_error", "gauss_bonnet_defect"};
+const std::set<std::string> of_the_run{"time",         "step_size",           "order",      "newton_iterations",
+                                       "elements",     "wall_seconds",        "mesh_width", "identity_defect",
+                                       "energy_error", "gauss_bonnet_defect", "tier"};
 
 bool same(double s, double t) {
     return std::abs(s - t) <= same_time * std::max(std::abs(s), std::abs(t));

@@ -110,6 +110,11 @@ class Result:
         return float(max(ends, default=0.0))
 
     @property
+    def last_shape_time(self):
+        """Of the last frame, which may be a profile or a surface."""
+        return max((frame.time for frame in [*self.frames[-1:], *self.surfaces[-1:]]), default=0.0)
+
+    @property
     def stopped_early(self):
         """The reason ("pinch-off", ...) when the run did not get to its end, else None."""
         reason = self.about.get("stop", "unfinished")

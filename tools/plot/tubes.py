@@ -41,7 +41,7 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
     lone = len(results) == 1
 
     def is_stop(result, frame):
-        return result.stopped_early is not None and frame is frames_of(result)[-1]
+        return result.stopped_early is not None and frame.time >= result.last_shape_time
 
     def has(result, time):
         """A frame at that time, or none to expect because the run had stopped."""

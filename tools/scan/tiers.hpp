@@ -13,7 +13,12 @@ namespace tubule {
 // Names of the series a run of this case writes, "time" first.
 std::vector<std::string> series_names(const Case& c);
 
-// Runs the case, or goes on from `restart`. Throws as the tier's own run.
-RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart = nullptr);
+// Throws CaseError where the shape of the case cannot be meshed, or the result that it starts from cannot be read.
+void check_start(const Case& c);
+
+// Runs the case, or goes on from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the tier's
+// own run.
+RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart = nullptr,
+                    const Result* unfinished = nullptr);
 
 }  // namespace tubule

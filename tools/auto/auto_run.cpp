@@ -1,0 +1,306 @@
+#include "tools/auto/auto_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <stdexcept>
+
+#include "axisym/run.hpp"
+#include "tools/auto/choice.hpp"
+#include "tools/auto/joined_file.hpp"
+#include "tools/auto/profile_watch.hpp"
+#include "tools/auto/waves.hpp"
+
+namespace tubule {
+
+namespace {
+
+// Times at which rates are found, beside those of frames: so many equal parts of the run, and the first of them halved
+// so often, for what is quick at the start.
+constexpr int parts = 48, halvings = 12;
+// A wave this many times the noise has grown, and is handed over with the largest one.
+constexpr double grown = 10;
+// Of the logarithm of an amplitude: what the switch is late or early by, in e-folds, is worth a word.
+constexpr double uncertain = 0.3;
+
+// The wall time of all parts together.
+class Clock {
+public:
+    explicit Clock(const Case& c) : limit_(c.time.limit) {}
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+    }
+    // What time.limit leaves for the next part.
+    void limit(Case& part) const {
+        if (limit_) part.time.limit = std::max(*limit_ - seconds(), 1e-3);
+    }
+    // The limit as the user knows it.
+    void reword(StopReport& stop) const {
+        if (stop.reason == Stop::time_limit) stop.message = fmt::format("used the {} s of time.limit", *limit_);
+    }
+
+private:
+    std::optional<double> limit_;
+    std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+};
+
+std::vector<double> until(const std::vector<double>& times, double end) {
+    std::vector<double> out;
+    for (const double t : times)
+        if (t < end) out.push_back(t);
+    return out;
+}
+
+// Output times of the case, and those for rates.
+std::set<double> times_for_rates(const Case& c) {
+    std::set<double> out;
+    for (int i = 1; i < parts; ++i) out.insert(c.time.end * i / parts);
+    for (int i = 1; i <= halvings; ++i) out.insert(c.time.end / parts * std::pow(0.5, i));
+    for (const double t : c.time.output) out.erase(t);
+    return out;
+}
+
+double number(const Record& record, const std::string& name) {
+    for (const auto& [key, value] : record.numbers)
+        if (key == name) return value;
+    return 0;
+}
+
+// The frame that a run in three dimensions begins with has these numbers.
+constexpr const char *switch_m = "switch_m", *switch_reference = "switch_E_ref", *switch_error = "switch_error";
+
+bool is_switch(const Record& record) {
+    return !record.mesh && number(record, switch_m) > 0;
+}
+
+std::string percent(double amplitude) {
+    return fmt::format("{:.3g} of the radius", amplitude);
+}
+
+// What is not known for certain about the rates, in words; empty if there is nothing to say.
+std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
+    std::string out;
+    const auto say = [&](const std::string& words) { out += (out.empty() ? "" : "; ") + words; };
+    if (known.unknown > 0)
+        say(
+            fmt::format("the growth rates of waves are not known at {} of {} times, and were taken to be those before "
+                        "({})",
+                        known.unknown, known.states, known.why_unknown));
+    if (known.estimated > 0)
+        say(fmt::format("the shape moves at {} of {} times: growth rates there leave out what its flow does to waves",
+                        known.estimated, known.states));
+    const NoiseGrowth::Peak peak = growth.largest();
+    if (peak.m == growth.modes() && peak.amplitude > grown * c.automatic.noise)
+        say(fmt::format("m = {} grows most and is the last one looked at: more auto.modes may show faster ones",
+                        peak.m));
+    if (peak.m > 0 && growth.error(peak.m) > uncertain)
+        say(fmt::format("the growth of m = {} is known to a factor {:.2g} only", peak.m,
+                        std::exp(growth.error(peak.m))));
+    return out;
+}
+
+void add_doubts(RunSummary& s, const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
+    if (const std::string words = doubts(c, known, growth); !words.empty()) s.warnings.push_back(words);
+}
+
+void set_choice(RunSummary& s, const std::string& choice, const std::string& reason) {
+    s.details.insert(s.details.begin(), {{"choice", choice}, {"reason", reason}});
+}
+
+// Why a run stayed axisymmetric.
+std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
+    const NoiseGrowth::Peak peak = growth.largest();
+    if (peak.amplitude <= c.automatic.noise * (1 + 1e-12))
+        return fmt::format("start and model are axisymmetric, and no wave around the axis grows (m = 1 to {})",
+                           growth.modes());
+    return fmt::format(
+        "start and model are axisymmetric, and waves around the axis stay small: at most {} (m = {} at t = {:.6g})",
+        percent(peak.amplitude), peak.m, peak.time);
+}
+
+// Rows and frames of the axisymmetric part on their way to the file, kept for later. Its last frame is held back.
+class FirstPart : public RunObserver {
+public:
+    FirstPart(RunObserver& file, RowMap map, const NoiseGrowth& growth, double end)
+        : file_(file), map_(std::move(map)), growth_(growth), end_(end) {}
+    void row(std::span<const double> values) override {
+        before.rows.push_back(map_(values));
+        file_.row(before.rows.back());
+    }
+    void frame(const std::function<Record()>& make) override {
+        Record record = make();
+        set_amplitudes(record, amplitudes_at(growth_, record.time));
+        if (record.time == end_)
+            last = std::move(record);
+        else
+            write(std::move(record));
+    }
+    void write(Record record) {
+        file_.frame([&] { return record; });
+        before.frames.push_back(std::move(record));
+    }
+    void checkpoint(const Record& state) override { file_.checkpoint(state); }
+    void discard() override {
+        file_.discard();
+        before = {};
+        last.reset();
+    }
+    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
+    bool interrupted() override { return file_.interrupted(); }
+
+    Before before;
+    std::optional<Record> last;
+
+private:
+    RunObserver& file_;
+    RowMap map_;
+    const NoiseGrowth& growth_;
+    double end_;
+};
+
+class AutoRun {
+public:
+    AutoRun(const Case& c, RunObserver& file)
+        : case_(c), file_(file), clock_(c), choice_(choice_for(c)), names_(auto_series_names(c)) {}
+
+    RunSummary in_three_dimensions(const surface3d::Restart* restart);
+    RunSummary axisymmetric(const Record* restart);
+    // From the frame of the switch, or from a state after it.
+    RunSummary after_switch(const Record& at, const Before& before, const surface3d::Restart* restart);
+
+private:
+    RowMap axisym_rows() const {
+        return {names_, axisym::series_names(axisym_case(case_, case_.time.end, {})), 1, clock_.seconds()};
+    }
+    RunSummary watched(ProfileWatch& watch, const std::set<double>& for_rates, const Record* restart);
+    RunSummary with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch);
+
+    const Case& case_;
+    RunObserver& file_;
+    Clock clock_;
+    Choice choice_;
+    std::vector<std::string> names_;
+    std::vector<std::string> warnings_;  // of the part before
+    std::string effort_;
+};
+
+RunSummary AutoRun::in_three_dimensions(const surface3d::Restart* restart) {
+    if (!restart) file_.note(fmt::format("tier surface3d: {}", choice_.reason));
+    const Case c = surface_case(case_);
+    const Before nothing;
+    SurfacePart part(file_, {names_, surface3d::series_names(c), 2, 0}, nothing);
+    RunSummary s = surface3d::run(c, part, restart);
+    set_choice(s, "surface3d", choice_.reason);
+    return s;
+}
+
+// A run that is stationary, but for waves that will be too large before its end, goes on: nothing else would show them.
+RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rates, const Record* restart) {
+    std::vector<double> output = case_.time.output;
+    output.insert(output.end(), for_rates.begin(), for_rates.end());
+    std::sort(output.begin(), output.end());
+    Case c = axisym_case(case_, case_.time.end, output);
+    clock_.limit(c);
+    RunSummary s = axisym::run(c, watch, restart);
+    const NoiseGrowth& growth = watch.growth();
+    if (s.stop.reason != Stop::stationary || growth.empty() || watch.reached()) return s;
+    for (int m = 1; m <= growth.modes(); ++m) {
+        const double end =
+            growth.amplitude(m, s.stop.time) * std::exp(growth.last_rate(m) * (c.time.end - s.stop.time));
+        if (end < case_.automatic.largest) continue;
+        c.time.stationary.reset();
+        clock_.limit(c);
+        const Record from = *watch.last_frame();
+        return axisym::run(c, watch, &from);
+    }
+    return s;
+}
+
+RunSummary AutoRun::axisymmetric(const Record* restart) {
+    const std::set<double> for_rates = times_for_rates(case_);
+    ProfileWatch watch(case_, file_, axisym_rows(), for_rates);
+    if (restart) watch.resume(*restart);
+    RunSummary s = watched(watch, for_rates, restart);
+    if (watch.reached()) return with_switch(*watch.reached(), watch);
+    clock_.reword(s.stop);
+    set_choice(s, "axisym", why_axisymmetric(case_, watch.growth()));
+    add_doubts(s, case_, watch.known(), watch.growth());
+    return s;
+}
+
+RunSummary AutoRun::with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch) {
+    file_.discard();
+    Case c = axisym_case(case_, at.time, until(case_.time.output, at.time));
+    c.time.stationary.reset();
+    clock_.limit(c);
+    FirstPart part(file_, axisym_rows(), watch.growth(), at.time);
+    RunSummary s = axisym::run(c, part);
+    add_doubts(s, case_, watch.known(), watch.growth());
+    if (s.stop.reason != Stop::finished || !part.last) {
+        if (part.last) part.write(*part.last);
+        clock_.reword(s.stop);
+        set_choice(s, "axisym", fmt::format("m = {} would be too large at t = {:.6g}", at.m, at.time));
+        return s;
+    }
+    Record last = *part.last;
+    last.numbers.insert(last.numbers.end(), {{switch_m, static_cast<double>(at.m)},
+                                             {switch_reference, s.reference_energy},
+                                             {switch_error, s.estimated_error}});
+    part.write(last);
+    warnings_ = s.warnings, effort_ = s.effort;
+    return after_switch(last, part.before, nullptr);
+}
+
+RunSummary AutoRun::after_switch(const Record& at, const Before& before, const surface3d::Restart* restart) {
+    const int m = static_cast<int>(number(at, switch_m));
+    std::vector<double> amplitudes = amplitudes_of(at);
+    const double largest = amplitudes.at(m - 1);
+    const std::string reason = fmt::format("a wave with m = {} grows from {:.3g} to {} at t = {:.6g}", m,
+                                           case_.automatic.noise, percent(largest), at.time);
+    file_.note(fmt::format("from tier axisym to surface3d: {}", reason));
+    for (double& a : amplitudes)
+        if (a < grown * case_.automatic.noise && a < largest) a = 0;
+
+    Case c = surface_case(case_);
+    c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, number(at, switch_reference)};
+    clock_.limit(c);
+    SurfacePart part(file_, {names_, surface3d::series_names(c), 2, clock_.seconds()}, before);
+    RunSummary s = surface3d::run(c, part, restart);
+    clock_.reword(s.stop);
+    s.estimated_error = std::max(s.estimated_error, number(at, switch_error));
+    s.as_accurate_as_asked = s.as_accurate_as_asked && number(at, switch_error) <= case_.accuracy.energy;
+    s.warnings.insert(s.warnings.begin(), warnings_.begin(), warnings_.end());
+    if (!effort_.empty()) s.effort = fmt::format("{}, then {}", effort_, s.effort);
+    set_choice(s, "axisym, then surface3d", reason);
+    s.details.insert(s.details.end(),
+                     {{"switch_time", at.time}, {"switch_mode", std::int64_t{m}}, {"switch_amplitude", largest}});
+    return s;
+}
+
+}  // namespace
+
+std::vector<std::string> auto_series_names(const Case& c) {
+    return joined_series_names(c, choice_for(c).axisymmetric);
+}
+
+void check_auto_start(const Case& c) {
+    if (!choice_for(c).axisymmetric) surface3d::check_start(surface_case(c));
+}
+
+RunSummary run_auto(const Case& c, RunObserver& file, const surface3d::Restart* restart, const Result* unfinished) {
+    AutoRun run(c, file);
+    if (!choice_for(c).axisymmetric) return run.in_three_dimensions(restart);
+    if (!restart) return run.axisymmetric(nullptr);
+    if (!restart->record.mesh && !is_switch(restart->record)) return run.axisymmetric(&restart->record);
+    if (!unfinished) throw std::invalid_argument("a run of tier \"auto\" goes on in three dimensions with its file");
+    const Before before = axisymmetric_part(*unfinished);
+    if (before.frames.empty() || !is_switch(before.frames.back()))
+        throw std::runtime_error("the result has no frame at which its run went on in three dimensions");
+    return run.after_switch(before.frames.back(), before, restart->record.mesh ? restart : nullptr);
+}
+
+}  // namespace tubule

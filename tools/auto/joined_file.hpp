@@ -1,0 +1,58 @@
+// The rows and frames of both tiers in one result file: docs/results.md, "Both tiers in one file".
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+
+namespace tubule {
+
+// Series of a run that begins axisymmetric: those that both tiers have, momenta that vanish by symmetry, and `tier`,
+// 1 or 2. One that begins in three dimensions has all of that tier, and `tier`.
+std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymmetric);
+
+// A tier's rows as those of the file.
+class RowMap {
+public:
+    // Of tier 1 or 2; `seconds` is the wall time that was used before.
+    RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier, double seconds);
+    std::vector<double> operator()(std::span<const double> row) const;
+
+private:
+    std::vector<int> source_;  // of each column, or one of these:
+    static constexpr int zero = -1, tier_number = -2;
+    std::size_t wall_;
+    int tier_;
+    double seconds_;
+};
+
+// What the file holds before a run in three dimensions goes on with it.
+struct Before {
+    std::vector<std::vector<double>> rows;
+    std::vector<Record> frames;
+};
+
+// Of an unfinished file, its axisymmetric part.
+Before axisymmetric_part(const Result& unfinished);
+
+// A run in three dimensions, as the file's second part or all of it: where it begins again, the first part stays.
+class SurfacePart : public RunObserver {
+public:
+    SurfacePart(RunObserver& file, RowMap map, const Before& before) : file_(file), map_(map), before_(before) {}
+    void row(std::span<const double> values) override { file_.row(map_(values)); }
+    std::size_t mesh(const SurfaceCells& cells) override { return file_.mesh(cells); }
+    void frame(const std::function<Record()>& make) override { file_.frame(make); }
+    void checkpoint(const Record& state) override { file_.checkpoint(state); }
+    void discard() override;
+    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
+    bool interrupted() override { return file_.interrupted(); }
+
+private:
+    RunObserver& file_;
+    RowMap map_;
+    const Before& before_;
+};
+
+}  // namespace tubule

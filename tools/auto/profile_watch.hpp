@@ -1,0 +1,62 @@
+// An axisymmetric run of tier "auto" as it goes: noise grows along it, until it is too large.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+#include "tools/auto/joined_file.hpp"
+#include "tools/auto/noise_growth.hpp"
+
+namespace tubule {
+
+// How well the rates are known.
+struct RatesKnown {
+    int states = 0, unknown = 0, estimated = 0;
+    std::string why_unknown;  // the last time
+};
+
+class ProfileWatch : public RunObserver {
+public:
+    // Frames at the times `only_for_rates` do not go to the file.
+    ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::set<double> only_for_rates);
+
+    // Goes on from a frame of the file: with the amplitudes that it says.
+    void resume(const Record& frame);
+
+    void row(std::span<const double> values) override { file_.row(map_(values)); }
+    void frame(const std::function<Record()>& make) override;
+    void checkpoint(const Record& state) override;
+    void discard() override;
+    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
+    bool interrupted() override { return reached_ || file_.interrupted(); }
+
+    const NoiseGrowth& growth() const { return growth_; }
+    const RatesKnown& known() const { return known_; }
+    // When, and with which wave, the run must go on in three dimensions.
+    const std::optional<NoiseGrowth::Peak>& reached() const { return reached_; }
+    const std::optional<Record>& last_frame() const { return last_frame_; }
+
+private:
+    void look_at(const Record& frame);
+    Record with_amplitudes(Record frame) const;
+
+    const Case& case_;
+    RunObserver& file_;
+    RowMap map_;
+    std::set<double> only_for_rates_;
+    NoiseGrowth growth_;
+    RatesKnown known_;
+    double last_time_ = -1;
+    std::optional<NoiseGrowth::Peak> reached_;
+    std::optional<Record> last_frame_;
+};
+
+// The numbers wave_1, wave_2, ... of a frame: amplitudes that noise has reached, relative to the largest radius.
+void set_amplitudes(Record& frame, const std::vector<double>& amplitudes);
+std::vector<double> amplitudes_of(const Record& frame);
+std::vector<double> amplitudes_at(const NoiseGrowth& growth, double time);
+
+}  // namespace tubule

@@ -1,0 +1,84 @@
+#include "tools/auto/waves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <stdexcept>
+
+#include "axisym/curve_frame.hpp"
+#include "axisym/spectrum.hpp"
+
+namespace tubule {
+
+namespace {
+
+constexpr double rate_accuracy = 1e-3;
+
+axisym::Spectrum spectrum_of(const Case& c, Model model, const axisym::Meridian& profile) {
+    axisym::SpectrumSettings settings;
+    settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
+    if (model.kind == ModelKind::fluid) model.kind = ModelKind::stokes;
+    return axisym::spectrum(c.energy, model, axisym::held_by(model), profile, settings);
+}
+
+double fastest(const axisym::ModeRates& mode) {
+    return mode.rates.empty() ? 0 : mode.rates[0];
+}
+
+const std::vector<double>* values(const Record& frame, const std::string& name) {
+    for (const Array& array : frame.arrays)
+        if (array.name == name) return &array.data;
+    return nullptr;
+}
+
+double number(const Record& frame, const std::string& name) {
+    for (const auto& [key, value] : frame.numbers)
+        if (key == name) return value;
+    return 0;
+}
+
+}  // namespace
+
+double rate_with_inertia(double stokes, double overdamped) {
+    if (stokes == 0 || overdamped == 0) return 0;
+    const double b = overdamped / stokes;
+    const auto root = std::sqrt(std::complex<double>(b * b + 4 * overdamped));
+    return (-b + root.real()) / 2;
+}
+
+WaveRates wave_rates(const Case& c, const Record& frame) {
+    const axisym::Meridian profile = axisym::frame_meridian(frame);
+    const axisym::Spectrum found = spectrum_of(c, c.model, profile);
+    WaveRates out;
+    for (const axisym::ModeRates& mode : found.modes) out.rates.push_back(fastest(mode));
+    out.estimated = c.model.kind != ModelKind::gradient_flow && !found.at_rest();
+    out.accuracy = found.estimated_error;
+    if (c.model.kind != ModelKind::fluid) return out;
+    Model overdamped = c.model;
+    overdamped.kind = ModelKind::overdamped;
+    const axisym::Spectrum inert = spectrum_of(c, overdamped, profile);
+    for (std::size_t i = 0; i < out.rates.size(); ++i)
+        out.rates[i] = rate_with_inertia(out.rates[i], fastest(inert.modes[i]));
+    return out;
+}
+
+WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
+    const auto *r = values(frame, "r"), *z = values(frame, "z");
+    if (!r || !z) throw std::invalid_argument("the frame holds no profile");
+    WavedProfile out{profile_curve(*r, *z, number(frame, "length")), {}, {}};
+    const double radius = *std::max_element(r->begin(), r->end());
+    const axisym::Spectrum found = spectrum_of(c, c.model, axisym::frame_meridian(frame));
+    for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
+        const axisym::ModeRates& mode = found.modes[i];
+        if (relative_amplitudes[i] == 0 || mode.shape.empty()) continue;
+        std::vector<double> w = mode.shape;
+        for (double& value : w) value *= relative_amplitudes[i] * radius;
+        out.waves.push_back(normal_wave(out.curve, mode.m, w));
+    }
+    const auto *normal = values(frame, "u_n"), *along = values(frame, "u_t"), *around = values(frame, "u_theta");
+    if (c.model.kind == ModelKind::fluid && normal && along)
+        out.velocity = profile_velocity(out.curve, {*normal, *along, around ? *around : std::vector<double>{}});
+    return out;
+}
+
+}  // namespace tubule

@@ -1,0 +1,31 @@
+// Waves around the axis of a profile that an axisymmetric run has computed: how fast they grow, and the surface with
+// them on it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+struct WaveRates {
+    std::vector<double> rates;  // the fastest of m = 1 ... auto.modes
+    bool estimated = false;     // the shape moves, and the model flows: what that does to waves is left out
+    double accuracy = 0;        // relative to the larger of a rate and the slowest one
+};
+
+// Of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be had.
+WaveRates wave_rates(const Case& c, const Record& frame);
+
+// The rate of a wave with inertia, from those of the same model without it (viscosity and friction alone) and of the
+// overdamped model (mass instead of friction): s^2/overdamped + s/stokes = 1, the root with the largest real part. As
+// each has the flow that suits it best, a fluid with the best compromise is no faster.
+double rate_with_inertia(double stokes, double overdamped);
+
+// The surface of a frame with the fastest growing wave of each m on it: relative_amplitudes[m - 1] of the largest
+// radius, as a normal displacement; none where that is 0. A fluid keeps its velocity.
+WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes);
+
+}  // namespace tubule
