@@ -112,6 +112,37 @@ TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
     EXPECT_THROW(found(free, straight), std::invalid_argument);
 }
 
+TEST(Dispersion, wavesAroundTheAxisAlone) {
+    // With m >= 1 nothing needs to be held: the closed forms of a tube whose volume is free, at the tension that holds
+    // it, and the same rates as beside those of m = 0.
+    Model free = model(ModelKind::overdamped);
+    free.keeps_volume = false;
+    const Bending energy = bending(0.3, -1.6, 0, 0.15);
+    const double R = 0.8, length = 3;
+    SpectrumSettings around;
+    around.first = 1, around.count = 1, around.accuracy = 1e-8;
+    const Meridian tube = meridian(Tube{R, length, {}});
+    const Spectrum found = spectrum(energy, free, held_by(free), tube, around);
+    const UniformTube exact{energy, R, theory::tension_of_free_volume(energy, R)};
+    EXPECT_NEAR(found.sigma, exact.tension, 1e-8);
+    ASSERT_EQ(found.modes.size(), 2u);
+    for (int m = 1; m <= 2; ++m) {
+        EXPECT_EQ(found.modes[m - 1].m, m);
+        double fastest = -1e300;
+        for (int n = m == 1 ? 1 : 0; n <= 3; ++n)
+            fastest = std::max(fastest, growth(exact, free, 2 * pi * n / length, m).rate());
+        EXPECT_NEAR(found.modes[m - 1].rates[0] / fastest, 1, 1e-8) << m;
+    }
+    // In motion: those of the gradient flow at this instant, whatever is held; of what flows, an estimate that says so.
+    const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
+    const Model gradient = model(ModelKind::gradient_flow);
+    const Spectrum whole = spectrum(bending(1), gradient, Held::nothing, wavy),
+                   part = spectrum(bending(1), gradient, Held::nothing, wavy, around);
+    EXPECT_NEAR(part.modes[0].rates[0] / whole.modes[1].rates[0], 1, 1e-5);
+    EXPECT_FALSE(spectrum(bending(1), free, held_by(free), wavy, around).at_rest());
+    EXPECT_THROW(spectrum(bending(1), model(ModelKind::fluid), Held::nothing, wavy, around), std::invalid_argument);
+}
+
 TEST(ProfileModes, ofTubesAndCells) {
     // Exact: the amplitudes the shapes were given. Of a sphere the middle of the volume is off by products of them.
     const Meridian tube = meridian(Tube{1.1, 3, {{0.2, 1, 0, 0.3}, {0.05, 3, 0, 1}}});

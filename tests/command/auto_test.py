@@ -42,7 +42,7 @@ class Buckling(ProgramTest):
         end = about(self.result)
         self.assertEqual(end["choice"], "axisym, then surface3d")
         self.assertEqual(end["switch_mode"], 1)
-        # The rates are asked for to 1e-3, and found more accurately on meshes that fine.
+        # The rates are asked for to 1e-2; those of a straight tube come out to 1e-8 on any mesh.
         self.assertAlmostEqual(end["switch_time"], SWITCH, delta=1e-4 * SWITCH)
         self.assertAlmostEqual(end["switch_amplitude"], 1e-2, delta=1e-6)
         for words in self.printed:
@@ -67,21 +67,21 @@ class Buckling(ProgramTest):
     def test_the_wave_goes_on_at_its_rate(self):
         out, _ = self.tubule("stability", self.result, "--fit", "1,1", "--csv")
         times, amplitudes = np.array([list(map(float, row)) for row in list(csv.reader(io.StringIO(out)))[1:]]).T
-        self.assertEqual(list(times[1:]), [8.0, 8.6])
+        self.assertEqual(list(times[1:]), [7.7, 7.8, 7.9, 8.0, 8.1, 8.2])
         self.assertAlmostEqual(amplitudes[0], 1e-2, delta=1e-4)
-        # Rates fall with the square of the amplitude, which is .02 at the end.
+        # Rates fall with the square of the amplitude, which is .015 at the end.
         rate = math.log(amplitudes[-1] / amplitudes[0]) / (times[-1] - times[0])
         self.assertAlmostEqual(rate / RATE, 1, delta=0.02)
 
     def test_frames_of_both_tiers_are_shown_and_drawn(self):
         with h5py.File(self.result) as file:
             frames = [file["frames"][name] for name in sorted(file["frames"])]
-            self.assertEqual(["mesh" in frame.attrs for frame in frames], [False] * 3 + [True] * 3)
+            self.assertEqual(["mesh" in frame.attrs for frame in frames], [False] * 3 + [True] * 7)
             waves = [frame.attrs["wave_1"] for frame in frames[:3]]
             for wave, frame in zip(waves, frames):
                 self.assertAlmostEqual(wave / (1e-4 * math.exp(RATE * frame.attrs["time"])), 1, delta=1e-3)
             self.assertEqual(frames[2].attrs["switch_m"], 1)
-            self.assertEqual(len(file["VTKHDF/Steps/Values"]), 3)
+            self.assertEqual(len(file["VTKHDF/Steps/Values"]), 7)
         out, _ = self.tubule("show", self.result)
         self.assertRegex(out, r"frame +time +length? *.*wave_1")
         self.assertRegex(out, r"frame +time +mesh +energy")
@@ -97,13 +97,13 @@ class Buckling(ProgramTest):
         self.assertEqual(about(self.result)["choice"], "axisym, then surface3d")
         self.assertAlmostEqual(about(self.result)["switch_time"], SWITCH, delta=1e-3 * SWITCH)
         self.assertTrue((np.diff(ends["time"]) >= 0).all() and (np.diff(ends["tier"]) >= 0).all())
-        self.assertEqual(ends["time"][-1], 8.6)
+        self.assertEqual(ends["time"][-1], 8.2)
         self.assertAlmostEqual(ends["energy"][-1], whole["energy"][-1], delta=1e-4 * E_REF)
         self.assertAlmostEqual(ends["r_max"][-1], whole["r_max"][-1], delta=1e-4)
         with h5py.File(self.result) as file:
             frames = [file["frames"][name].attrs for name in sorted(file["frames"])]
             self.assertEqual(sum("switch_m" in frame for frame in frames), 1)
-            self.assertEqual(["mesh" in frame for frame in frames], [False] * 3 + [True] * 3)
+            self.assertEqual(["mesh" in frame for frame in frames], [False] * 3 + [True] * 7)
 
     def disturbed(self, number, tier):
         self.result.unlink()

@@ -23,7 +23,7 @@ namespace {
 // so often, for what is quick at the start.
 constexpr int parts = 48, halvings = 12;
 // A wave this many times the noise has grown, and is handed over with the largest one.
-constexpr double grown = 10;
+constexpr double grown = 2;
 // Of the logarithm of an amplitude: what the switch is late or early by, in e-folds, is worth a word.
 constexpr double uncertain = 0.3;
 
@@ -90,6 +90,9 @@ std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& gr
             fmt::format("the growth rates of waves are not known at {} of {} times, and were taken to be those before "
                         "({})",
                         known.unknown, known.states, known.why_unknown));
+    if (known.rough > 0)
+        say(fmt::format("the growth rates of waves are known to a tenth of them at best at {} of {} times", known.rough,
+                        known.states));
     if (known.estimated > 0)
         say(fmt::format("the shape moves at {} of {} times: growth rates there leave out what its flow does to waves",
                         known.estimated, known.states));

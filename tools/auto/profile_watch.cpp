@@ -8,6 +8,10 @@
 
 namespace tubule {
 
+namespace {
+constexpr double rough_rates = 0.1;  // error, relative
+}
+
 ProfileWatch::ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::set<double> only_for_rates)
     : case_(c),
       file_(file),
@@ -29,6 +33,7 @@ void ProfileWatch::look_at(const Record& frame) {
         const WaveRates found = wave_rates(case_, frame);
         rates = found.rates;
         known_.estimated += found.estimated;
+        known_.rough += found.accuracy > rough_rates;
     } catch (const std::exception& error) {
         ++known_.unknown;
         known_.why_unknown = error.what();

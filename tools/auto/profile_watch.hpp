@@ -14,7 +14,7 @@ namespace tubule {
 
 // How well the rates are known.
 struct RatesKnown {
-    int states = 0, unknown = 0, estimated = 0;
+    int states = 0, unknown = 0, estimated = 0, rough = 0;
     std::string why_unknown;  // the last time
 };
 

@@ -12,11 +12,14 @@ namespace tubule {
 
 namespace {
 
-constexpr double rate_accuracy = 1e-3;
+// Of rates: enough for amplitudes, which noise decides about anyway. More elements cost more than they tell.
+constexpr double rate_accuracy = 1e-2;
+constexpr int most_elements = 60;
 
 axisym::Spectrum spectrum_of(const Case& c, Model model, const axisym::Meridian& profile) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
+    settings.max_elements = most_elements;
     if (model.kind == ModelKind::fluid) model.kind = ModelKind::stokes;
     return axisym::spectrum(c.energy, model, axisym::held_by(model), profile, settings);
 }
