@@ -23,6 +23,7 @@ void add_plot(CLI::App& app, int& exit_status);
 void add_compare(CLI::App& app, int& exit_status);
 void add_chart(CLI::App& app, int& exit_status);
 void add_scan(CLI::App& app, int& exit_status);
+void add_confirm(CLI::App& app, int& exit_status);
 
 // What a result says of its making when it begins: the build, the machine, when.
 About about_start();
@@ -32,6 +33,7 @@ struct RunOptions {
     std::vector<std::string> cases, sets;
     std::string output;
     bool resume = false, quiet = false, expect = false, check_derivatives = false;
+    bool silent = false;  // quiet, and no words on stdout even if the run ends early
 };
 int run_cases(const RunOptions& options);
 std::filesystem::path result_path(const RunOptions& options, const Case& c);

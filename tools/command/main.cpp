@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
     tubule::add_equilibrium(app, status);
     tubule::add_stability(app, status);
     tubule::add_scan(app, status);
+    tubule::add_confirm(app, status);
     tubule::add_check(app, status);
     tubule::add_show(app, status);
     tubule::add_plot(app, status);

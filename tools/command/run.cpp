@@ -209,7 +209,7 @@ int run_case(Case c, const RunOptions& options) {
     writer.finish(about_end(c, summary, seconds));
     const bool compared = options.expect && summary.stop.reason != Stop::interrupted;
     const int status = compared ? compare(c, file) : exit_code(summary.stop.reason);
-    if (!options.quiet || status != 0) report(c, summary, file, seconds);
+    if (!options.silent && (!options.quiet || status != 0)) report(c, summary, file, seconds);
     return status;
 }
 
