@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <map>
 #include <memory>
 #include <set>
 #include <stdexcept>
 #include <utility>
+#include <variant>
 
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
@@ -187,6 +190,42 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model
         out.push_back(state(motion, until, y));
     }
     return out;
+}
+
+std::optional<TubeStart> tube_start(const Case& c) {
+    const Tube* shape = std::get_if<Tube>(&c.shape);
+    if (!shape || c.equilibrium) return std::nullopt;
+    TubeStart start{{c.energy, shape->radius, 0}, shape->length, {}};
+    std::map<std::pair<int, int>, std::complex<double>> sums;
+    for (const TubeMode& mode : shape->modes)
+        if (mode.n == 0 && mode.m == 0)
+            start.tube.radius += mode.amplitude * std::cos(mode.phase);
+        else
+            sums[{mode.n, mode.m}] += std::polar(1.0, mode.phase) * mode.amplitude;
+    for (const auto& [wave, sum] : sums)
+        if (std::abs(sum) > 0) start.waves.push_back({wave.first, wave.second, std::abs(sum), 0});
+    if (c.model.kind == ModelKind::gradient_flow) return start;
+    if (!keeps_volume(c.model))
+        start.tube.tension = tension_of_free_volume(c.energy, start.tube.radius);
+    else if (!start.waves.empty())
+        start.tube.tension = tension_of_waves(start.tube, c.model, start.length, start.waves);
+    return start;
+}
+
+std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to) try {
+    std::optional<TubeStart> start = tube_start(c);
+    if (!start || !(to > from)) return std::nullopt;
+    std::vector<Wave>& waves = start->waves;
+    auto ours = std::find_if(waves.begin(), waves.end(), [&](const Wave& w) { return w.n == n && std::abs(w.m) == m; });
+    if (ours == waves.end()) {
+        if (c.model.kind != ModelKind::gradient_flow && keeps_volume(c.model)) return std::nullopt;
+        ours = waves.insert(ours, {n, m, 1, 0});
+    }
+    const auto at = ours - waves.begin();
+    const auto states = waves_in_time(start->tube, c.model, start->length, waves, {from, to});
+    return std::log(std::abs(states[1].amplitudes[at] / states[0].amplitudes[at])) / (to - from);
+} catch (const std::invalid_argument&) {  // a wave without meaning, such as one that is infinitely fast
+    return std::nullopt;
 }
 
 }  // namespace tubule::theory

@@ -1,6 +1,7 @@
 // Several small waves of a tube in time, by integrating the ordinary differential equations of maths 5.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/theory/dispersion.hpp"
@@ -33,5 +34,18 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model
 double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves);
 
 bool keeps_volume(const Model& model);
+
+// A case of motion that begins as a tube: that tube made straight, and its waves. The tension is that of the start; 0
+// where nothing decides it (fixed volume, no waves).
+struct TubeStart {
+    UniformTube tube;
+    double length = 1;
+    std::vector<Wave> waves;  // each once: those of a case that differ by their phase alone are added
+};
+std::optional<TubeStart> tube_start(const Case& c);  // nothing for other cases
+
+// The mean rate of a wave between two times by linear theory of the case: log(a(to)/a(from))/(to - from). Nothing where
+// that is not known: the volume is kept, so that all waves decide together, and the case lacks this one.
+std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to);
 
 }  // namespace tubule::theory

@@ -450,8 +450,9 @@ class Shown(ScanTest):
         self.tubule("plot", self.result, "-o", picture)
         self.assertIn("longest unduloid, L|H\u2080| = 2\u03c0", picture.read_text())
 
-    def test_pearling(self):
-        """maths 5 with P = 0 (free volume), c = H0 R, x = q^2: neutral where (1 + k42/k20) x^2 + 2 c x + 1 = 0."""
+    def test_pearling_and_buckling(self):
+        """maths 5 with P = 0 (free volume), c = H0 R, x = q^2: neutral where (1 + k42/k20) x^2 + 2 c x + 1 = 0, m = 0,
+        and where (1 + k42/k20) x + 2 (1 + c) = 0, m = 1. No wave with m = 2 grows, as P > -3 and c > -5/2."""
         case = CASE.replace("[shape]", '[model]\nkind = "overdamped"\nvolume = "free"\n[shape]')
         self.write("free.toml", case.replace('parametrisation = "graph"', ""))
         self.scan("free.toml", "--over", "shape.length=3:12:7", "--over", f"{K42}=0:1:5", "--set", "time.end=1e-9")
@@ -459,10 +460,14 @@ class Shown(ScanTest):
             L, k42 = (file[f"axes/{i}/values"][:, 0] for i in (0, 1))
             line = file["thresholds/pearling"]
             found, first, second = (line[name][()] for name in ("values", "first", "second"))
+            buckling = file["thresholds/buckling/values"][()]
+            self.assertNotIn("rings", file["thresholds"])
         k20, c, n = 0.2, -2, np.arange(1, 40)
         x = (2 * np.pi * n / L[first, None]) ** 2
         for j, k in enumerate(k42[second]):
             np.testing.assert_allclose(found[:, j], -2 * k20 * ((1 + k / k20) * x**2 + 2 * c * x + 1).min(axis=1))
+            driven = -2 * k20 * x * ((1 + k / k20) * x + 2 * (1 + c))
+            np.testing.assert_allclose(buckling[:, j], driven.max(axis=1))
 
     def test_the_file_says_what_was_asked(self):
         text = f'title = "A small one"\ncase = "case.toml"\nover = ["{K42}=0,0.1"]\nset = ["{AMPLITUDE}=0.2"]\n'

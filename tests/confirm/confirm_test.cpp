@@ -6,6 +6,9 @@
 #include <set>
 
 #include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "surface3d/motion_frame.hpp"
+#include "surface3d/start.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 
@@ -89,57 +92,132 @@ PointResult straight() {
     PointResult p;
     p.outcome = Outcome::uniform_tube;
     p.measures.fill(0);
-    p[Measure::volume] = 3.141592653589793 * 12;  // radius 1
+    p[Measure::time] = 2;
     p[Measure::E_ref] = 1;
     return p;
 }
 
 // maths 5 (b) at P = 0, where f + F1/R + sigma0 = 0: R = k20 = 1, h = -1 - H0 = 1, F1 = F2 = 2.
 double rate(int n, int m) {
-    const double q = 2 * 3.141592653589793 * n / 12, Q = q * q + m * m, Z = Q - 1;
+    const double q = 2 * pi * n / 12, Q = q * q + m * m, Z = Q - 1;
     const double F2 = 2, F1 = 2, k42 = 4, G = F2 * Z * Z - 2 * F1 * q * q + 2 * k42 * q * q * q * q;
     return -Q * G / (Q + 1);
 }
 
-TEST(Confirm, explainsByTheRatesOfWavesThatFit) {
-    const auto all = explain(parse_case(tube, {}, "tube.toml"), straight());
-    ASSERT_EQ(all.size(), 1u);  // it ends where it began
-    ASSERT_EQ(all[0].waves.size(), 3u);
-    for (const theory::FittingWave& wave : all[0].waves) {
+TEST(Confirm, knowsTheFastestWavesThatFit) {
+    const auto waves = fastest_waves(parse_case(tube, {}, "tube.toml"));
+    ASSERT_EQ(waves.size(), 3u);
+    for (const theory::FittingWave& wave : waves) {
         double most = -1e300;
         for (int n = wave.m < 2 ? 1 : 0; n < 10; ++n) most = std::max(most, rate(n, wave.m));
         EXPECT_NEAR(wave.rate, most, 1e-12 * std::abs(most)) << wave.m;
     }
-    EXPECT_LT(all[0].waves[0].rate, 0);  // k42 > 3 k20: it does not pearl (maths 5, thresholds) ...
-    EXPECT_GT(all[0].waves[1].rate, 0);  // ... but buckle, as P = 0 < -2 (1 + c) = 2
+    EXPECT_LT(waves[0].rate, 0);  // k42 > 3 k20: it does not pearl (maths 5, thresholds) ...
+    EXPECT_GT(waves[1].rate, 0);  // ... but buckle, as P = 0 < -2 (1 + c) = 2
 }
 
 TEST(Confirm, makesACaseInThreeDimensions) {
     const Case c = parse_case(tube, {}, "tube.toml");
-    const auto waves = added_waves(c, straight());
-    const Case s = parse_case(surface_case(c, waves, {.elements = 123, .noise = 2e-3, .end = 7.0}), {}, "s.toml");
+    const Case s = parse_case(surface_case(c, straight(), {.elements = 123, .noise = 2e-3, .end = 7.0}), {}, "s.toml");
     EXPECT_EQ(s.tier, Tier::surface3d);
     EXPECT_EQ(s.surface.elements, 123);
     EXPECT_EQ(s.time.end, 7);
+    EXPECT_EQ(std::count_if(s.time.output.begin(), s.time.output.end(), [](double t) { return t <= 2; }),
+              20);                         // until tier 1's end
+    EXPECT_EQ(s.time.output.size(), 39u);  // and from there to the end, where there is a frame anyway
     EXPECT_FALSE(s.time.stationary);
     EXPECT_EQ(s.energy.k, c.energy.k);
     const auto& modes = std::get<Tube>(s.shape).modes;
-    ASSERT_EQ(modes.size(), 1 + waves.size());
     EXPECT_EQ(modes[0].m, 0);
     EXPECT_EQ(modes[0].amplitude, 1e-3);  // as in tier 1
-    std::set<int> around;
+    std::set<std::pair<int, int>> added;
     for (std::size_t i = 1; i < modes.size(); ++i) {
-        EXPECT_EQ(modes[i].amplitude, 2e-3);
-        around.insert(modes[i].m);
+        EXPECT_NEAR(modes[i].amplitude, 2e-3, 1e-15);
+        added.insert({modes[i].n, modes[i].m});
     }
-    EXPECT_EQ(around, (std::set<int>{1, 2}));
+    EXPECT_EQ(added.size() + 1, modes.size());  // none twice
+    EXPECT_TRUE(added.contains({1, 1}) && added.contains({1, 2}));
+    for (const theory::FittingWave& wave : fastest_waves(c)) EXPECT_EQ(added.contains({wave.n, wave.m}), wave.m > 0);
+}
+
+TEST(Confirm, addsWavesToASphereToo) {
+    const Case c = parse_case(
+        "tier = \"axisym\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"sphere\"\nradius = 2.0\n"
+        "[[shape.mode]]\namplitude = 0.1\nl = 2\n[time]\nend = 1.0\n",
+        {}, "sphere.toml");
+    const Case s = parse_case(surface_case(c, straight(), {.elements = 60, .noise = 2e-3, .end = {}}), {}, "s.toml");
+    const auto& modes = std::get<Sphere>(s.shape).modes;
+    ASSERT_EQ(modes.size(), 4u);
+    EXPECT_EQ(modes[0].m, 0);
+    for (std::size_t i = 1; i < 4; ++i) {
+        EXPECT_GT(modes[i].m, 0);
+        EXPECT_EQ(modes[i].amplitude, 2e-3);  // relative to the radius, as all are
+    }
+    EXPECT_TRUE(fastest_waves(c).empty());
 }
 
 TEST(Confirm, refusesShapesThatItCannotPerturb) {
     const std::string ellipsoid =
         "tier = \"axisym\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"ellipsoid\"\n"
         "a = 1.0\nb = 1.0\nc = 0.8\n[time]\nend = 1.0\n";
-    EXPECT_THROW(added_waves(parse_case(ellipsoid, {}, "ellipsoid.toml"), straight()), CaseError);
+    EXPECT_THROW(surface_case(parse_case(ellipsoid, {}, "ellipsoid.toml"), straight(), {}), CaseError);
+}
+
+// A result as a run in three dimensions would leave it: a straight tube whose wave n = 1, m = 1 grows from `first` by
+// `factor` in all.
+Result growing_tube(double first, double factor) {
+    const Case c = parse_case(tube, {}, "tube.toml");
+    Result result;
+    result.case_text.text = surface_case(c, straight(), {.elements = 60, .noise = 1e-3, .end = {}});
+    result.about = {{"stop", std::string("finished")}, {"stop_time", 2.0}, {"estimated_error", 1e-3}};
+    for (int i = 0; i <= 10; ++i) {
+        Case then = c;
+        std::get<Tube>(then.shape).modes = {{first * std::pow(factor, i / 10.0), 1, 1, 0.3}};
+        const surface3d::CurvedMesh mesh = surface3d::start_mesh(then, 60).mesh;
+        Record frame;
+        frame.time = 0.2 * i;
+        frame.mesh = result.meshes.size();
+        Array points{"points", {mesh.nodes.size(), 3}, {}};
+        for (const Eigen::Vector3d& x : mesh.nodes) points.data.insert(points.data.end(), {x[0], x[1], x[2]});
+        frame.arrays = {points};
+        result.meshes.push_back(surface3d::cells_of(mesh));
+        result.frames.push_back(frame);
+        const std::pair<const char*, double> row[] = {{"time", frame.time},  {"energy", 10 + frame.time},
+                                                      {"r_min", 1},          {"r_max", 1},
+                                                      {"area", 2 * pi * 12}, {"volume", pi * 12}};
+        for (const auto& [key, value] : row) result.series[key].push_back(value);
+    }
+    return result;
+}
+
+TEST(Confirm, seesAWaveThatGrows) {
+    PointResult axisymmetric = straight();
+    axisymmetric[Measure::time] = 1, axisymmetric[Measure::energy] = 10.5, axisymmetric[Measure::E_ref] = 5;
+    const Answer broken = answer(axisymmetric, growing_tube(1e-3, 20));
+    EXPECT_EQ(broken.verdict, Verdict::symmetry_broken);
+    EXPECT_EQ(broken.n, 1);
+    EXPECT_EQ(broken.m, 1);
+    EXPECT_NEAR(broken.noise, 1e-3, 1e-5);  // as made, but for the triangles
+    EXPECT_NEAR(broken.amplitude, 2e-2, 2e-4);
+    EXPECT_NEAR(broken.fit.rate, std::log(20) / 2, 1e-2);           // as made
+    EXPECT_NEAR(broken.linear_rate, rate(1, 1), 1e-10);             // of the case, whatever the frames show
+    EXPECT_NEAR(broken.energy_difference, (11 - 10.5) / 5, 1e-12);  // at t = 1, where it ended in tier 1
+
+    const Answer calm = answer(axisymmetric, growing_tube(1e-3, 2));  // not yet three times
+    EXPECT_EQ(calm.verdict, Verdict::agrees);
+    EXPECT_EQ(calm.outcome, Outcome::uniform_tube);
+
+    axisymmetric.outcome = Outcome::pinched;
+    EXPECT_EQ(answer(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::other_outcome);
+    axisymmetric[Measure::time] = 3;  // it was not there then
+    EXPECT_EQ(answer(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::no_answer);
+    EXPECT_TRUE(std::isnan(answer(axisymmetric, growing_tube(1e-3, 1)).energy_difference));
+
+    Result lost = growing_tube(1e-3, 1);
+    lost.about = {{"stop", std::string("solver-failed")}, {"stop_time", 2.0}};
+    EXPECT_EQ(answer(axisymmetric, lost).verdict, Verdict::no_answer);
+    lost.about.clear();
+    EXPECT_THROW(answer(axisymmetric, lost), std::runtime_error);  // it is still going on
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// tubule confirm SCAN: some points of a scan again in three dimensions, to see
-// whether they say the same.
+// tubule confirm SCAN: some points of a scan again in three dimensions, to see whether they say the same.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/case/read.hpp"
@@ -26,11 +26,11 @@ namespace tubule {
 
 namespace {
 
+namespace fs = std::filesystem;
 using confirm::Verdict;
-using Text = fmt::memory_buffer;
 
 template <class... Args>
-void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
+void add(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
 }
 
@@ -45,191 +45,114 @@ struct ConfirmOptions {
 };
 
 // A picked point in both tiers.
-struct Row {
+struct Point {
     confirm::Pick pick;
     std::vector<std::string> sets;  // what varies, key=value
-    PointResult axisymmetric;
-    confirm::Answer answer;
-    std::vector<confirm::Explanation> explanations;  // where they disagree
-    std::string file;
-};
-
-// The part of a point's settings that varies.
-std::vector<std::string> varied(const Scan& scan, std::size_t point) {
-    const auto all = scan.sets_of(point);
-    return {all.begin() + static_cast<std::ptrdiff_t>(scan.sets.size()), all.end()};
-}
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) throw CaseError(path.string() + ": cannot be written");
-}
-
-struct Planned {
-    Row row;
     Case c;
-    std::vector<confirm::AddedWave> waves;
-    std::string text;  // of the case in three dimensions
+    PointResult axisymmetric;
+    std::string surface_case, file;  // text; result
+    confirm::Answer answer;
 };
 
-// All is checked before anything is run.
-std::vector<Planned> plan(const ConfirmOptions& options, const ScanResult& result) {
-    const auto& around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
-    std::vector<Planned> all;
-    for (const confirm::Pick& pick : confirm::pick_points(result.shape(), result.outcomes(), around,
-                                                          static_cast<std::size_t>(options.points), options.seed)) {
-        Planned p{{pick, varied(result.scan, pick.point), result.points[pick.point], {}, {}, {}},
-                  result.scan.case_of(pick.point),
-                  {},
-                  {}};
-        if (p.c.tier != Tier::axisym)
-            throw CaseError(options.scan +
-                            ": is a scan of tier \"surface3d\" "
-                            "already: there is nothing to confirm");
-        p.waves = confirm::added_waves(p.c, p.row.axisymmetric);
-        p.text = confirm::surface_case(p.c, p.waves, options.choices);
-        all.push_back(std::move(p));
-    }
-    if (all.empty()) throw CaseError(options.scan + ": has no points to confirm: none was run without failing");
-    return all;
+bool agrees(const Point& p) {
+    return p.answer.verdict == Verdict::agrees;
 }
 
-// Runs the point, or goes on with it, or finds it done by an earlier call that asked the same. The exit status.
-int run_in_3d(Planned& p, const std::filesystem::path& folder) {
-    const std::filesystem::path toml = folder / fmt::format("point_{:06}.toml", p.row.pick.point),
-                                hdf = std::filesystem::path(toml).replace_extension(".hdf");
-    bool same = false;
-    try {
-        same = std::filesystem::exists(hdf) && read_result(hdf).case_text.text == p.text;
-    } catch (const std::runtime_error&) {  // killed before it was a result
-    }
-    write_text(toml, p.text);
-    p.row.file = hdf.string();
-    RunOptions run;
-    run.cases = {toml.string()};
-    run.output = hdf.string();
-    run.resume = same;
-    run.quiet = run.silent = true;
-    return run_cases(run);
-}
-
-bool agrees(const Row& row) {
-    return row.answer.verdict == Verdict::agrees;
-}
-
-std::string outcome_words(const Row& row) {
-    if (row.answer.verdict == Verdict::symmetry_broken) return "asymmetric";
-    return std::string(name(row.answer.outcome));
+std::string outcome_words(const Point& p) {
+    if (p.answer.verdict == Verdict::symmetry_broken) return "asymmetric";
+    return std::string(name(p.answer.outcome));
 }
 
 // ---- in words
 
-void add_explanation(Text& out, const Row& row) {
-    for (const confirm::Explanation& one : row.explanations) {
-        add(out,
-            "    straight tube of radius {:.6g}, tension {:.6g}; of the waves that "
-            "fit, fastest:\n",
-            one.radius, one.tension);
-        for (const theory::FittingWave& wave : one.waves)
-            add(out, "        m = {}, n = {:2}: rate {:.6g}{}\n", wave.m, wave.n, wave.rate,
-                wave.rate <= 0 ? ", decays"
-                : wave.m == 0  ? ", grows"
-                               : ", grows, and tier 1 cannot see it");
-    }
+void add_spectrum(std::string& out, const Point& p) {
+    const auto waves = confirm::fastest_waves(p.c);
+    if (!waves.empty()) add(out, "    the straight tube, fastest of the waves that fit:\n");
+    for (const theory::FittingWave& wave : waves)
+        add(out, "        m = {}, n = {:2}: rate {:.6g}{}\n", wave.m, wave.n, wave.rate,
+            !(wave.rate > 0) ? ", decays"
+            : wave.m == 0    ? ", grows"
+                             : ", grows, and tier 1 cannot see it");
 }
 
-std::string words(const std::vector<Row>& rows) {
-    Text out;
-    add(out, "{:>7}  {:8}  {:17}  {:17}  {:>10}  {:>9}  {:>7}  {:>9}  {:>8}  {}\n", "point", "why", "tier 1",
-        "surface3d", "t", "dE/E_ref", "wave", "size", "growth", "verdict");
-    for (const Row& row : rows)
-        add(out,
-            "{:>7}  {:8}  {:17}  {:17}  {:>10.4g}  {:>9.2g}  {:>7}  {:>9.2g}  "
-            "{:>8.3g}  {}\n",
-            row.pick.point, name(row.pick.why), name(row.axisymmetric.outcome), outcome_words(row), row.answer.time,
-            row.answer.energy_difference, fmt::format("{},{}", row.answer.largest.n, row.answer.largest.m),
-            row.answer.amplitude, row.answer.amplitude / row.answer.noise, name(row.answer.verdict));
-    for (const Row& row : rows) {
-        if (agrees(row)) continue;
-        add(out, "\npoint {}: {}, {}; {}\n", row.pick.point, fmt::join(row.sets, ", "), name(row.answer.verdict),
-            row.file);
-        add_explanation(out, row);
-    }
-    const auto agreeing = std::count_if(rows.begin(), rows.end(), agrees);
-    add(out, "\n{} of {} points agree\n", agreeing, rows.size());
-    return to_string(out);
-}
-
-// ---- in numbers
-
-using Numbers = std::vector<std::pair<std::string, double>>;
-Numbers numbers(const Row& row) {
-    const confirm::Answer& a = row.answer;
-    return {{"axisym_time", row.axisymmetric[Measure::time]},
-            {"axisym_energy", row.axisymmetric[Measure::energy]},
-            {"E_ref", row.axisymmetric[Measure::E_ref]},
-            {"time", a.time},
-            {"energy_difference", a.energy_difference},
-            {"energy_error", a.energy_error},
-            {"n", static_cast<double>(a.largest.n)},
-            {"m", static_cast<double>(a.largest.m)},
-            {"noise", a.noise},
-            {"amplitude", a.amplitude},
-            {"growth", a.amplitude / a.noise}};
-}
-std::vector<std::pair<std::string, std::string>> labels(const Row& row) {
-    return {{"why", std::string(name(row.pick.why))},
-            {"axisym_outcome", std::string(name(row.axisymmetric.outcome))},
-            {"outcome", outcome_words(row)},
-            {"stop", std::string(name(row.answer.stop))},
-            {"verdict", std::string(name(row.answer.verdict))},
-            {"file", row.file}};
-}
-
-std::string csv(const std::vector<Row>& rows) {
-    Text out;
-    add(out, "point,set");
-    for (const auto& [key, value] : labels(rows.front())) add(out, ",{}", key);
-    for (const auto& [key, value] : numbers(rows.front())) add(out, ",{}", key);
+void add_fit(std::string& out, const confirm::Answer& a) {
+    if (!(a.fit.rate == a.fit.rate)) return;
+    add(out, "    wave {},{}: rate {:.4g} +- {:.2g} for t = {:.4g} to {:.4g}", a.n, a.m, a.fit.rate, a.fit.error,
+        a.fit.from, a.fit.to);
+    if (a.linear_rate == a.linear_rate) add(out, "; {:.4g} by linear theory of the case", a.linear_rate);
     add(out, "\n");
-    for (const Row& row : rows) {
-        add(out, "{},\"{}\"", row.pick.point, fmt::join(row.sets, " "));
-        for (const auto& [key, value] : labels(row)) add(out, ",{}", value);
-        for (const auto& [key, value] : numbers(row)) add(out, ",{}", value);
-        add(out, "\n");
-    }
-    return to_string(out);
 }
 
-std::string json_text(const ConfirmOptions& options, const std::vector<Row>& rows) {
-    Text out;
-    add(out,
-        "{{\"scan\": {}, \"seed\": {}, \"elements\": {}, \"noise\": "
-        "{},\n\"points\": [",
-        json(options.scan), options.seed, options.choices.elements, json(options.choices.noise));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        const Row& row = rows[i];
-        const std::string words = json(labels(row)), values = json(numbers(row));
-        add(out,
-            "{}\n{{\"point\": {}, \"set\": {}, \"outcomes\": {}, \"numbers\": {}, "
-            "\"rates\": [",
-            i > 0 ? "," : "", row.pick.point, json(row.sets), words, values);
-        bool first = true;
-        for (const confirm::Explanation& one : row.explanations)
-            for (const theory::FittingWave& wave : one.waves) {
-                add(out,
-                    "{}{{\"radius\": {}, \"tension\": {}, \"m\": {}, \"n\": {}, \"q\": "
-                    "{}, \"rate\": {}}}",
-                    first ? "" : ", ", json(one.radius), json(one.tension), wave.m, wave.n, json(wave.q),
-                    json(wave.rate));
-                first = false;
-            }
-        add(out, "]}}");
+std::string words(const std::vector<Point>& points) {
+    std::string out;
+    add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>7}  {:>7}  {:>18}  {:>8}  {}\n", "point", "why",
+        "tier 1", "surface3d", "t", "dE/E_ref", "wave", "size", "growth", "rate", "linear", "verdict");
+    for (const Point& p : points) {
+        const confirm::Answer& a = p.answer;
+        add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8.3g}  {:>8.1e}  {:>5}  {:>7.2g}  {:>7.3g}  {:>18}  {:>8.3g}  {}\n",
+            p.pick.point, name(p.pick.why), name(p.axisymmetric.outcome), outcome_words(p), a.time, a.energy_difference,
+            fmt::format("{},{}", a.n, a.m), a.amplitude, a.amplitude / a.noise,
+            fmt::format("{:.3g} +- {:.1g}", a.fit.rate, a.fit.error), a.linear_rate, name(a.verdict));
     }
-    add(out, "\n]}}\n");
-    return to_string(out);
+    for (const Point& p : points) {
+        if (agrees(p)) continue;
+        add(out, "\npoint {}: {}; {}, {}; {}\n", p.pick.point, fmt::join(p.sets, ", "), name(p.answer.verdict),
+            p.answer.stop, p.file);
+        add_fit(out, p.answer);
+        add_spectrum(out, p);
+    }
+    add(out, "\n{} of {} points agree\n", std::count_if(points.begin(), points.end(), agrees), points.size());
+    return out;
+}
+
+// ---- as a table
+
+using Columns = std::vector<std::pair<std::string, Value>>;
+
+Columns columns(const Point& p) {
+    const confirm::Answer& a = p.answer;
+    Columns all{{"why", std::string(name(p.pick.why))},
+                {"axisym_outcome", std::string(name(p.axisymmetric.outcome))},
+                {"axisym_time", p.axisymmetric[Measure::time]},
+                {"outcome", outcome_words(p)},
+                {"stop", a.stop},
+                {"time", a.time},
+                {"energy_difference", a.energy_difference},
+                {"energy_error", a.energy_error},
+                {"n", std::int64_t{a.n}},
+                {"m", std::int64_t{a.m}},
+                {"noise", a.noise},
+                {"amplitude", a.amplitude},
+                {"rate", a.fit.rate},
+                {"rate_error", a.fit.error},
+                {"linear_rate", a.linear_rate},
+                {"verdict", std::string(name(a.verdict))},
+                {"file", p.file}};
+    for (const theory::FittingWave& wave : confirm::fastest_waves(p.c)) {
+        all.push_back({fmt::format("fastest_n_m{}", wave.m), std::int64_t{wave.n}});
+        all.push_back({fmt::format("fastest_rate_m{}", wave.m), wave.rate});
+    }
+    return all;
+}
+
+std::string csv(const std::vector<Point>& points) {
+    std::string out = "point,set";
+    for (const auto& [key, value] : columns(points.front())) add(out, ",{}", key);
+    for (const Point& p : points) {
+        add(out, "\n{},\"{}\"", p.pick.point, fmt::join(p.sets, " "));
+        for (const auto& [key, value] : columns(p)) std::visit([&](const auto& v) { add(out, ",{}", v); }, value);
+    }
+    return out + "\n";
+}
+
+std::string json_text(const ConfirmOptions& options, const std::vector<Point>& points) {
+    std::string out;
+    add(out, "{{\"scan\": {}, \"seed\": {}, \"elements\": {}, \"noise\": {},\n\"points\": [", json(options.scan),
+        options.seed, options.choices.elements, json(options.choices.noise));
+    for (std::size_t i = 0; i < points.size(); ++i)
+        add(out, "{}\n{{\"point\": {}, \"set\": {}, \"values\": {}}}", i > 0 ? "," : "", points[i].pick.point,
+            json(points[i].sets), json(columns(points[i])));
+    return out + "\n]}\n";
 }
 
 // ---- the whole
@@ -239,65 +162,102 @@ void check(const ConfirmOptions& options) {
     if (options.points < 1) refuse(fmt::format("--points must be 1 or more, not {}", options.points));
     if (options.choices.elements < 1)
         refuse(fmt::format("--elements must be 1 or more, not {}", options.choices.elements));
-    if (!(options.choices.noise > 0 && options.choices.noise < confirm::large_wave))
-        refuse(
-            fmt::format("--noise must be above 0 and below {}, where a wave "
-                        "counts as large, not {}",
-                        confirm::large_wave, options.choices.noise));
+    if (!(options.choices.noise > 0 && options.choices.noise < 0.1))
+        refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
         refuse(fmt::format("--end must be above 0, not {}", *options.choices.end));
+    if (!is_scan(options.scan)) throw CaseError(options.scan + ": is no result of tubule scan");
+}
+
+// All cases are checked before anything is run.
+std::vector<Point> plan(const ConfirmOptions& options, const ScanResult& result) {
+    const auto around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
+    const auto common = static_cast<std::ptrdiff_t>(result.scan.sets.size());  // settings of all points
+    std::vector<Point> all;
+    for (const confirm::Pick& pick : confirm::pick_points(result.shape(), result.outcomes(), around,
+                                                          static_cast<std::size_t>(options.points), options.seed)) {
+        const auto sets = result.scan.sets_of(pick.point);
+        Point p;
+        p.pick = pick;
+        p.sets = {sets.begin() + common, sets.end()};
+        p.c = result.scan.case_of(pick.point);
+        p.axisymmetric = result.points[pick.point];
+        if (p.c.tier != Tier::axisym)
+            throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");
+        p.surface_case = confirm::surface_case(p.c, p.axisymmetric, options.choices);
+        all.push_back(std::move(p));
+    }
+    if (all.empty()) throw CaseError(options.scan + ": has no points to confirm: none was run without failing");
+    return all;
+}
+
+fs::path make_folder(const ConfirmOptions& options) {
+    const fs::path scan = options.scan, folder = options.folder.empty()
+                                                     ? scan.parent_path() / (scan.stem().string() + "_confirm")
+                                                     : fs::path(options.folder);
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw CaseError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+    return folder;
+}
+
+bool holds(const fs::path& result, const std::string& case_text) {
+    try {
+        return fs::exists(result) && read_result(result).case_text.text == case_text;
+    } catch (const std::runtime_error&) {  // killed before it was a result
+        return false;
+    }
+}
+
+// Runs the point, or goes on with it, or finds it done by an earlier call that asked the same. The exit status.
+int run_in_3d(Point& p, const fs::path& folder) {
+    const fs::path toml = folder / fmt::format("point_{:06}.toml", p.pick.point),
+                   hdf = fs::path(toml).replace_extension(".hdf");
+    RunOptions run{.cases = {toml.string()}, .sets = {}, .output = hdf.string()};
+    run.resume = holds(hdf, p.surface_case);
+    run.quiet = run.silent = true;
+    std::ofstream(toml, std::ios::binary) << p.surface_case;
+    p.file = hdf.string();
+    return run_cases(run);  // which says so if the case could not be written
 }
 
 int confirm_scan(const ConfirmOptions& options) {
     check(options);
-    if (!is_scan(options.scan)) throw CaseError(options.scan + ": is no result of tubule scan");
-    const ScanResult result = read_scan_result(options.scan);
-    std::vector<Planned> planned = plan(options, result);
-    std::filesystem::path folder = options.folder;
-    if (folder.empty()) {
-        const std::filesystem::path scan = options.scan;
-        folder = scan.parent_path() / (scan.stem().string() + "_confirm");
-    }
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) throw CaseError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
-    std::vector<Row> rows;
-    for (Planned& p : planned) {
+    std::vector<Point> points = plan(options, read_scan_result(options.scan));
+    const fs::path folder = make_folder(options);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        Point& p = points[i];
         if (!options.quiet)
-            fmt::print(stderr, "{} of {}: point {}, {}\n", rows.size() + 1, planned.size(), p.row.pick.point,
-                       fmt::join(p.row.sets, ", "));
+            fmt::print(stderr, "{} of {}: point {}, {}\n", i + 1, points.size(), p.pick.point, fmt::join(p.sets, ", "));
         const int status = run_in_3d(p, folder);
         if (status == exit_code(Stop::interrupted) || status == 2) return status;
         try {
-            p.row.answer = confirm::answer(p.c, p.row.axisymmetric, p.waves, read_result(p.row.file));
-        } catch (const std::runtime_error&) {  // the run was given up without a result, and has said why
-            p.row.answer.outcome = Outcome::failed;
+            p.answer = confirm::answer(p.axisymmetric, read_result(p.file));
+        } catch (const std::runtime_error& error) {  // given up without a result
+            fmt::print(stderr, "{}: {}\n", p.file, error.what());
         }
-        if (!agrees(p.row)) p.row.explanations = confirm::explain(p.c, p.row.axisymmetric);
-        rows.push_back(std::move(p.row));
     }
-    const std::string out = options.csv ? csv(rows) : options.json ? json_text(options, rows) : words(rows);
+    const std::string out = options.csv ? csv(points) : options.json ? json_text(options, points) : words(points);
     std::fputs(out.c_str(), stdout);
-    return std::all_of(rows.begin(), rows.end(), agrees) ? 0 : disagreement;
+    return std::all_of(points.begin(), points.end(), agrees) ? 0 : disagreement;
 }
 
 }  // namespace
 
 void add_confirm(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("confirm",
-                                           "Run some points of a scan in three dimensions, from starts "
-                                           "that are not quite "
-                                           "symmetric: exit status 1 if any comes out differently");
+                                           "Run some points of a scan in three dimensions, from starts that are not "
+                                           "quite symmetric: exit status 1 if any comes out differently");
     const auto o = std::make_shared<ConfirmOptions>();
     command->add_option("SCAN", o->scan, "result of tubule scan")->required();
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
     command->add_option("--seed", o->seed, "of the random choice (1)");
-    command->add_option("--elements", o->choices.elements, "about how many triangles (400)");
+    command->add_option("--elements", o->choices.elements, "about how many triangles (200)");
     command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)");
     command->add_option("--end", o->choices.end, "run until then instead of time.end of the case");
     command->add_option("-o,--output", o->folder, "folder of the results (default: beside the scan, NAME_confirm)");
     CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");
-    command->add_flag("--json", o->json, "the table and the rates that explain it")->excludes(csv);
+    command->add_flag("--json", o->json, "the same, as JSON")->excludes(csv);
     command->add_flag("--quiet", o->quiet, "no words about the progress");
     command->callback([o, &exit_status] { exit_status = confirm_scan(*o); });
 }

@@ -5,11 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
-#include <variant>
 
 #include "axisym/curve_frame.hpp"
 #include "axisym/profile_modes.hpp"
-#include "common/solve/sparse.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
 #include "surface3d/surface_modes.hpp"
@@ -73,32 +71,6 @@ Amplitudes amplitudes_of(const Result& result, WaveNumbers wave) {
     return out;
 }
 
-// The mean rate between two times by linear theory, if the case began as a tube with known tension.
-std::optional<double> linear_rate(const Case& c, WaveNumbers wave, double from, double to) {
-    const Tube* shape = std::get_if<Tube>(&c.shape);
-    if (!shape || c.equilibrium || !(to > from)) return std::nullopt;
-    theory::UniformTube tube{c.energy, shape->radius, 0};
-    std::vector<theory::Wave> waves;
-    std::optional<std::size_t> ours;
-    for (const TubeMode& mode : shape->modes) {
-        if (mode.n == 0 && mode.m == 0) {
-            tube.radius += mode.amplitude * std::cos(mode.phase);
-            continue;
-        }
-        if (mode.n == wave.n && std::abs(mode.m) == wave.m) ours = waves.size();
-        waves.push_back({mode.n, mode.m, mode.amplitude, 0});
-    }
-    const bool together = c.model.kind != ModelKind::gradient_flow && theory::keeps_volume(c.model);
-    if (!ours && together) return std::nullopt;  // its amplitude decides nothing, but is not known
-    if (!ours) ours = waves.size(), waves.push_back({wave.n, wave.m, 1, 0});
-    try {
-        const auto states = theory::waves_in_time(tube, c.model, shape->length, waves, {from, to});
-        return std::log(std::abs(states[1].amplitudes[*ours] / states[0].amplitudes[*ours])) / (to - from);
-    } catch (const std::invalid_argument&) {  // one wave twice, with two phases
-        return std::nullopt;
-    }
-}
-
 std::string words_of(WaveNumbers wave, const Amplitudes& a, const theory::GrowthFit& fit,
                      std::optional<double> linear) {
     const auto [low, high] = std::minmax_element(a.values.begin(), a.values.end());
@@ -120,7 +92,8 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
     const WaveNumbers wave = wave_of(options.fit);
     const Amplitudes a = amplitudes_of(*subject.result, wave);
     const theory::GrowthFit fit = theory::fit_growth(a.times, a.values, 0);
-    const auto linear = subject.case_is_known ? linear_rate(subject.c, wave, fit.from, fit.to) : std::nullopt;
+    const auto linear =
+        subject.case_is_known ? theory::mean_rate(subject.c, wave.n, wave.m, fit.from, fit.to) : std::nullopt;
     if (options.csv) {
         std::string out = "time,amplitude\n";
         for (std::size_t i = 0; i < a.times.size(); ++i)

@@ -27,7 +27,7 @@ COLOURS = {
     "failed": "#ff00ff",
     "undecided": "#9aa5ad",
 }
-THRESHOLD_DASHES = ("--", ":", "-.")
+THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
     "energy.H0": "spontaneous curvature " + formula("H_0"),
     "shape.length": "length L",

@@ -64,20 +64,30 @@ std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     return rest;
 }
 
-// What drives the waves of m = 0, of those that fit: -G of maths 5 of the one that is driven most. The models differ in
-// what they make of it, but not in its sign.
-std::optional<double> pearling(const Case& c) {
+// What drives the waves of one m, of those that fit: -G of maths 5 of the one that is driven most. The models differ in
+// what they make of it, but not in its sign. For m = 0 those that repeat the cells of the start, as tier 1 does.
+std::optional<double> driven_most(const Case& c, int m) {
     const auto tube = tube_at_rest(c);
     if (!tube) return std::nullopt;
     const auto& shape = std::get<Tube>(c.shape);
-    const theory::Stiffness G = theory::stiffness(*tube, 0);
+    const theory::Stiffness G = theory::stiffness(*tube, m);
     if (!(G.q4 > 0)) return std::nullopt;  // ill-posed: there is no such wave
-    const double longest = 2 * std::numbers::pi * std::max(repeats(shape), 1) / shape.length;
+    const double longest = 2 * std::numbers::pi * (m == 0 ? std::max(repeats(shape), 1) : 1) / shape.length;
     const double lowest = std::sqrt(std::max(-G.q2 / (2 * G.q4), 0.0)) / longest;  // G is a parabola in q^2
-    double most = -G(longest);
+    const double first = m < 2 ? 1 : 0;  // n = 0: another radius, or the whole tube moves
+    double most = -G(first * longest);
     for (const double n : {std::floor(lowest), std::ceil(lowest)})
-        if (n >= 1) most = std::max(most, -G(n * longest));
+        if (n >= first) most = std::max(most, -G(n * longest));
     return std::abs(most) > 1e-12 * std::abs(G.q0) ? most : 0;  // without k42 they are neutral at q R = 1, not beyond
+}
+std::optional<double> pearling(const Case& c) {
+    return driven_most(c, 0);
+}
+std::optional<double> buckling(const Case& c) {
+    return driven_most(c, 1);
+}
+std::optional<double> rings(const Case& c) {
+    return driven_most(c, 2);
 }
 
 std::vector<std::size_t> some_of(std::size_t size) {
@@ -93,7 +103,9 @@ const std::vector<Threshold>& thresholds() {
     static const std::vector<Threshold> all{
         {"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
         {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
-        {"pearling", "straight tube at rest, a wave with m = 0 neutral", pearling}};
+        {"pearling", "straight tube at rest, a wave with m = 0 neutral", pearling},
+        {"buckling", "the same, m = 1", buckling},
+        {"rings", "the same, m = 2", rings}};
     return all;
 }
 
