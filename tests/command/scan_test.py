@@ -206,6 +206,26 @@ class Boundary(ScanTest):
         self.scan("case.toml", *fine, "--boundary", "pinched", "--seeds", "4")
         self.assertEqual(self.edges(), around)
 
+    def test_refined(self):
+        """Between 0.38103 and 0.38104 (an independent spectral code, cases/nearly_pinched.toml) the neck opens again."""
+        asked = (CASES / "nearly_pinched.toml", "--over", f"{AMPLITUDE}=0.3:0.5:3", "--over", f"{K42}=0:1e-2:2")
+        self.scan(*asked, "--boundary", "pinched", "--refine", "8", "--set", "accuracy.energy=1e-4")
+        with h5py.File(self.result) as file:
+            edges, crossings = file["boundary"][()].tolist(), file["crossing"][()]
+            numbers, stop = file["between/point"][()], file["about"].attrs["stop"]
+        self.assertEqual(stop, "finished")
+        self.assertEqual(len(numbers), 8 * len(edges))
+        low, high = crossings[edges.index([0, 2])]  # k42 = 0, amplitudes 0.3 and 0.4
+        self.assertAlmostEqual(high - low, 0.1 / 2**8, places=12)
+        self.assertTrue(low < 0.38104 and high > 0.38103, (low, high))
+        # All that was found is known to whoever resumes.
+        out, _ = self.tubule("scan", *asked, "--boundary", "pinched", "--refine", "8", "--set", "accuracy.energy=1e-4",
+                             "--resume", "-o", self.result)
+        self.assertIn("nothing to resume", out)
+        picture = self.folder / "map.svg"
+        self.tubule("plot", self.result, "-o", picture)
+        self.assertIn("refined", picture.read_text())
+
 
 class Refusals(ScanTest):
     def assert_refused(self, words, *arguments):
@@ -229,6 +249,10 @@ class Refusals(ScanTest):
             ("boundary must be one of outcome, uniform-tube", "case.toml", *over, "--boundary", "pinch"),
             ("seeds must be absent", "case.toml", *over, "--seeds", "3"),
             ("seeds must be an integer >= 1", "case.toml", *over, "--boundary", "outcome", "--seeds", "0"),
+            ("refine must be absent", "case.toml", *over, "--refine", "3"),
+            ("refine must be an integer from 0 to 30", "case.toml", *over, "--boundary", "outcome", "--refine", "31"),
+            ("refine needs numbers: model.kind takes", "case.toml", "--over", 'model.kind="gradient-flow","overdamped"',
+             "--boundary", "outcome", "--refine", "3"),
             ("--jobs must be 1 or more", "case.toml", *over, "--jobs", "0"),
             ("points are too many", "case.toml", "--over", f"{K42}=0:1:100000", "--over", f"{AMPLITUDE}=0:0.1:1000"),
             ("below the smallest radius of the start", "case.toml", "--over", f"{AMPLITUDE}=0.1,0.99"),
@@ -253,6 +277,7 @@ class Refusals(ScanTest):
             ("over must be a list of strings", 'case = "case.toml"\nover = "energy.k42=0,1"\n'),
             ("until must be", 'case = "case.toml"\nover = ["energy.k42=0,1"]\nuntil = "dawn"\n'),
             ("seeds must be an integer", 'case = "case.toml"\nover = ["energy.k42=0,1"]\nseeds = 1.5\n'),
+            ("refine must be an integer", 'case = "case.toml"\nover = ["energy.k42=0,1"]\nrefine = 1.5\n'),
             ("not valid TOML", "case = \n"),
             ("gone.toml: cannot be opened", 'case = "gone.toml"\nover = ["energy.k42=0,1"]\n'),
         ):

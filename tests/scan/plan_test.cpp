@@ -114,5 +114,50 @@ TEST(Plan, BisectsALine) {
     EXPECT_LE(runs, 2u + 10u);
 }
 
+// Points between those of the grid at their true places, on a map that is known everywhere.
+TEST(Plan, HalvesTheEdgesThatALineCrosses) {
+    constexpr int halvings = 6;
+    constexpr std::size_t rows = 12, columns = 9, steps = std::size_t{1} << halvings;
+    const auto map = [](double x, double y) {  // crosses every edge at most once
+        return x + 1.7 * y < 14.31 ? Outcome::uniform_tube : Outcome::pinched;
+    };
+    const BetweenNumbers numbers{rows * columns, 2, halvings};
+    for (const unsigned seed : {1u, 2u}) {
+        Plan plan({rows, columns}, 4, std::nullopt, halvings);
+        std::vector<Outcome> known(rows * columns, Outcome::not_run);
+        std::vector<std::size_t> open;
+        std::mt19937 random(seed);
+        std::size_t between = 0;
+        while (true) {
+            while (const auto point = plan.next()) open.push_back(*point);
+            if (open.empty()) break;
+            std::swap(open[random() % open.size()], open.back());
+            const std::size_t point = open.back();
+            open.pop_back();
+            const Between at = point < known.size() ? Between{point, 0, 0} : numbers.of(point);
+            const double part = static_cast<double>(at.step) / steps;
+            const Outcome outcome = map(static_cast<double>(at.point / columns) + (at.axis == 0 ? part : 0),
+                                        static_cast<double>(at.point % columns) + (at.axis == 1 ? part : 0));
+            if (point < known.size())
+                known[point] = outcome;
+            else
+                ++between;
+            plan.done(point, outcome);
+        }
+        const auto edges = boundary_edges({rows, columns}, known);
+        ASSERT_GT(edges.size(), 8u);
+        EXPECT_EQ(between, halvings * edges.size());  // one a halving
+        EXPECT_EQ(plan.known(), plan.wanted());
+        for (const Edge& edge : edges) {
+            const auto [from, to] = plan.crossing(edge);
+            EXPECT_EQ(to - from, 1u);
+            const double x = static_cast<double>(edge.first / columns), y = static_cast<double>(edge.first % columns);
+            const double crossing = edge.second == edge.first + columns ? 14.31 - 1.7 * y - x : (14.31 - x) / 1.7 - y;
+            EXPECT_LE(static_cast<double>(from), crossing * steps);
+            EXPECT_GE(static_cast<double>(to), crossing * steps);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace tubule

@@ -131,6 +131,8 @@ void add_scan(CLI::App& app, int& exit_status) {
     command->add_option("--boundary", o->choices.boundary,
                         "only the line between outcomes is wanted: 'outcome', or the name of the one it surrounds");
     command->add_option("--seeds", o->choices.seeds, "intervals of the lattice on which lines are looked for (8)");
+    command->add_option("--refine", o->choices.refine,
+                        "halvings of each edge of the grid that a line crosses (0): where the line is, more precisely");
     command->add_flag("--to-the-end", o->choices.to_the_end,
                       "run each point to time.end even where its outcome is known before");
     command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");

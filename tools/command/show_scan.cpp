@@ -82,6 +82,7 @@ std::string scan_summary(const std::filesystem::path& file) {
     if (!scan.sets.empty()) line("set", fmt::format("{}", fmt::join(scan.sets, "  ")));
     for (const Axis& axis : scan.axes) line(fmt::format("{}", fmt::join(axis.keys, ", ")), ends_of(axis));
     if (scan.boundary) line("boundary", scan.boundary->around ? std::string(name(*scan.boundary->around)) : "outcome");
+    if (scan.boundary && scan.boundary->refine > 0) line("refine", fmt::format("{}", scan.boundary->refine));
     bool stopped = false;
     for (const auto& [key, value] : result.about) {
         line(key, words(value));

@@ -80,11 +80,12 @@ def read(path):
         names = list(file["points/outcome"].attrs["names"])
         title = file["scan"].attrs["title"]
         boundary = file["boundary"][()]
+        crossings = file["crossing"][()].mean(axis=1) if "crossing" in file else []
         thresholds = [
             (line.attrs["label"], line["first"][()], line["second"][()], line["values"][()])
             for line in file["thresholds"].values()
         ]
-    return axes, points, names, title, boundary, thresholds
+    return axes, points, names, title, boundary, crossings, thresholds
 
 
 def border_lines(axes, boundary, shape):
@@ -100,7 +101,16 @@ def border_lines(axes, boundary, shape):
     return lines
 
 
-def draw_map(axes, points, names, boundary, thresholds, panel):
+def refined(axes, boundary, crossings, shape):
+    """Where on the sides of the grid's cells the outcome changes."""
+    places = []
+    for (a, b), value in zip(boundary, crossings):
+        (i, j), (k, _) = np.unravel_index(a, shape), np.unravel_index(b, shape)
+        places.append((value, axes[1].values[j]) if k > i else (axes[0].values[i], value))
+    return np.transpose(places)
+
+
+def draw_map(axes, points, names, boundary, crossings, thresholds, panel):
     outcomes = points["outcome"].astype(float)
     shown = np.ma.masked_equal(outcomes, 0)
     colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in names])
@@ -108,6 +118,10 @@ def draw_map(axes, points, names, boundary, thresholds, panel):
     panel.pcolormesh(axes[0].borders(), axes[1].borders(), shown.T, cmap=colours, norm=norm, rasterized=True)
     panel.add_collection(LineCollection(border_lines(axes, boundary, outcomes.shape), colors="black", linewidths=0.8))
     handles = []
+    if len(crossings):
+        x, y = refined(axes, boundary, crossings, outcomes.shape)
+        panel.plot(x, y, ".", color="black", markersize=3)
+        handles.append(Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="refined"))
     for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, thresholds):
         panel.contour(axes[0].values[first], axes[1].values[second], values.T, [0], colors="#c0392b",
                       linestyles=[dashes], linewidths=1.2)
@@ -131,7 +145,7 @@ def draw_line(axes, points, names, panel):
 
 def draw(path, outputs):
     style.check_outputs(outputs)
-    axes, points, names, title, boundary, thresholds = read(path)
+    axes, points, names, title, boundary, crossings, thresholds = read(path)
     if len(axes) > 2:
         raise BadInput(f"{path}: a picture has one or two axes, this scan {len(axes)}: {', '.join(a.key for a in axes)}")
     if not points["outcome"].any():
@@ -139,7 +153,7 @@ def draw(path, outputs):
     figure = Figure(figsize=(style.WIDTH, HEIGHT))
     panel = figure.add_axes([0.09, 0.11, 0.62, 0.8])
     if len(axes) == 2:
-        handles = draw_map(axes, points, names, boundary, thresholds, panel)
+        handles = draw_map(axes, points, names, boundary, crossings, thresholds, panel)
     else:
         handles = draw_line(axes, points, names, panel)
     if axes[0].logarithmic:

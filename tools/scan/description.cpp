@@ -20,6 +20,7 @@ namespace tubule {
 namespace {
 
 constexpr std::size_t most_points = 1'000'000;  // all are kept in memory
+constexpr int most_halvings = 30;
 
 std::string read_text(const std::filesystem::path& path) {
     std::error_code none;
@@ -91,7 +92,8 @@ std::optional<Axis> parse_range(const std::string& text, const std::string& sour
 
 // ---- scan files
 
-const std::vector<std::string> file_keys{"title", "case", "set", "over", "points", "boundary", "seeds", "until"};
+const std::vector<std::string> file_keys{"title",    "case",  "set",    "over", "points",
+                                         "boundary", "seeds", "refine", "until"};
 
 [[noreturn]] void refuse(const std::string& path, const toml::source_region& where, const std::string& complaint) {
     throw CaseError(fmt::format("{}:{}:{}: {}", path, where.begin.line, where.begin.column, complaint));
@@ -119,9 +121,17 @@ std::vector<std::string> texts_in(const toml::table& root, const std::string& pa
 struct ScanFile {
     std::string title, case_path, points, boundary;
     std::vector<std::string> sets, over;
-    std::optional<int> seeds;
+    std::optional<int> seeds, refine;
     bool to_the_end = false;
 };
+
+std::optional<int> integer_in(const toml::table& root, const std::string& path, const char* key) {
+    const toml::node* node = root.get(key);
+    if (!node) return std::nullopt;
+    const auto value = node->value_exact<std::int64_t>();
+    if (!value) refuse(path, node->source(), fmt::format("{} must be an integer", key));
+    return static_cast<int>(std::clamp<std::int64_t>(*value, -1, 1'000'000));
+}
 
 ScanFile read_scan_file(const toml::table& root, const std::string& path) {
     for (const auto& [key, node] : root) {
@@ -140,11 +150,8 @@ ScanFile read_scan_file(const toml::table& root, const std::string& path) {
     file.boundary = text_in(root, path, "boundary");
     if (const std::string points = text_in(root, path, "points"); !points.empty())
         file.points = (folder / points).string();
-    if (const toml::node* node = root.get("seeds")) {
-        const auto seeds = node->value_exact<std::int64_t>();
-        if (!seeds) refuse(path, node->source(), "seeds must be an integer");
-        file.seeds = static_cast<int>(std::clamp<std::int64_t>(*seeds, -1, 1'000'000));
-    }
+    file.seeds = integer_in(root, path, "seeds");
+    file.refine = integer_in(root, path, "refine");
     const std::string until = text_in(root, path, "until");
     if (!until.empty() && until != "decided" && until != "end")
         refuse(path, root.get("until")->source(),
@@ -155,7 +162,8 @@ ScanFile read_scan_file(const toml::table& root, const std::string& path) {
 
 // ---- putting it together
 
-BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, const std::string& path) {
+BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, std::optional<int> refine,
+                           const std::string& path) {
     BoundaryChoice choice;
     if (name != "outcome") {
         choice.around = outcome_from_name(name);
@@ -168,7 +176,20 @@ BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, co
     }
     choice.seeds = seeds.value_or(choice.seeds);
     if (choice.seeds < 1) throw CaseError(fmt::format("{}: seeds must be an integer >= 1", path));
+    choice.refine = refine.value_or(choice.refine);
+    if (choice.refine < 0 || choice.refine > most_halvings)
+        throw CaseError(fmt::format("{}: refine must be an integer from 0 to {}", path, most_halvings));
     return choice;
+}
+
+// What lies between two words is nothing.
+void refuse_words_between(const Scan& scan) {
+    if (!scan.boundary || scan.boundary->refine == 0) return;
+    for (const Axis& axis : scan.axes)
+        for (const auto& setting : axis.values)
+            if (!number_of(setting.front()))
+                throw CaseError(fmt::format("{}: refine needs numbers: {} takes {}", scan.path, axis.keys.front(),
+                                            setting.front()));
 }
 
 void refuse_doubled_keys(const Scan& scan) {
@@ -209,7 +230,25 @@ std::vector<std::size_t> Scan::place(std::size_t point) const {
     return at;
 }
 
+BetweenNumbers Scan::between() const {
+    return {size(), axes.size(), boundary ? boundary->refine : 0};
+}
+
+double Scan::value(const Between& b) const {
+    const Axis& axis = axes[b.axis];
+    const std::size_t at = place(b.point)[b.axis];
+    const double part = static_cast<double>(b.step) / static_cast<double>(between().steps());
+    const double from = number_of(axis.values[at][0]).value(), to = number_of(axis.values[at + 1][0]).value();
+    return axis.logarithmic ? from * std::pow(to / from, part) : from + (to - from) * part;
+}
+
 std::vector<std::string> Scan::sets_of(std::size_t point) const {
+    if (point >= size()) {
+        const Between b = between().of(point);
+        std::vector<std::string> all = sets_of(b.point);
+        all[sets.size() + b.axis] = fmt::format("{}={}", axes[b.axis].keys[0], value(b));
+        return all;
+    }
     std::vector<std::string> all = sets;
     const auto at = place(point);
     for (std::size_t a = 0; a < axes.size(); ++a)
@@ -315,16 +354,19 @@ Scan read_scan(const ScanChoices& choices) {
 
     const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;
     const auto seeds = choices.seeds ? choices.seeds : file.seeds;
+    const auto refine = choices.refine ? choices.refine : file.refine;
     if (!boundary.empty()) {
         if (!points.empty())
             throw CaseError(scan.path +
                             ": boundary and points exclude each other: the rows of a table have no neighbours");
-        scan.boundary = boundary_of(boundary, seeds, scan.path);
-    } else if (seeds) {
-        throw CaseError(scan.path + ": seeds must be absent: it belongs to boundary");
+        scan.boundary = boundary_of(boundary, seeds, refine, scan.path);
+    } else if (seeds || refine) {
+        throw CaseError(
+            fmt::format("{}: {} must be absent: it belongs to boundary", scan.path, seeds ? "seeds" : "refine"));
     }
     scan.to_the_end = choices.to_the_end || file.to_the_end;
     refuse_doubled_keys(scan);
+    refuse_words_between(scan);
     check_points(scan);
     return scan;
 }

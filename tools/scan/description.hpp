@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "tools/scan/between.hpp"
 #include "tools/scan/outcome.hpp"
 
 namespace tubule {
@@ -24,7 +25,8 @@ struct Axis {
 // Where only the lines between outcomes are wanted: all of them, or those around one outcome.
 struct BoundaryChoice {
     std::optional<Outcome> around;
-    int seeds = 8;  // intervals of the coarse lattice, along each axis, on whose lines crossings are looked for
+    int seeds = 8;   // intervals of the coarse lattice, along each axis, on whose lines crossings are looked for
+    int refine = 0;  // halvings of each edge of the grid that a line crosses
 };
 
 struct Scan {
@@ -36,10 +38,12 @@ struct Scan {
     std::optional<BoundaryChoice> boundary;
     bool to_the_end = false;  // run every point to its own end, even where its outcome is known before
 
-    std::size_t size() const;
-    std::vector<std::size_t> place(std::size_t point) const;  // on each axis
-    std::vector<std::string> sets_of(std::size_t point) const;
-    Case case_of(std::size_t point) const;  // throws CaseError
+    std::size_t size() const;  // of the grid
+    BetweenNumbers between() const;
+    double value(const Between& between) const;                 // of the axis' key
+    std::vector<std::size_t> place(std::size_t point) const;    // on each axis
+    std::vector<std::string> sets_of(std::size_t point) const;  // also of points between those of the grid
+    Case case_of(std::size_t point) const;                      // throws CaseError
 };
 
 // What the command line adds; it wins over the file.
@@ -49,7 +53,7 @@ struct ScanChoices {
     std::vector<std::string> over;  // key=a,b,c   key=lo:hi:n   key=lo:hi:n:log
     std::string points;             // a table
     std::string boundary;           // "outcome", or the name of one
-    std::optional<int> seeds;
+    std::optional<int> seeds, refine;
     bool to_the_end = false;
 };
 

@@ -11,19 +11,9 @@
 #include "common/solve/interrupt.hpp"
 
 namespace tubule {
-namespace {
-
-Plan plan_of(const ScanResult& result) {
-    const auto& boundary = result.scan.boundary;
-    return boundary ? Plan(result.shape(), boundary->seeds, boundary->around) : Plan(result.shape());
-}
-
-}  // namespace
 
 Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
     : writer_(writer), plan_(plan_of(writer.result())), progress_({.quiet = quiet}) {
-    for (const PointResult& p : writer.result().points)
-        if (p.outcome != Outcome::not_run) plan_.done(p.point, p.outcome);
     progress_.begin(plan_.known());
 }
 

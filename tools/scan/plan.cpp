@@ -45,8 +45,12 @@ Plan::Plan(std::vector<std::size_t> shape) : shape_(std::move(shape)), stride_(s
     for (std::size_t i = 0; i < outcomes_.size(); ++i) want(i);
 }
 
-Plan::Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around)
-    : shape_(std::move(shape)), stride_(strides(shape_)), follows_(true), around_(around) {
+Plan::Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around, int halvings)
+    : shape_(std::move(shape)),
+      stride_(strides(shape_)),
+      follows_(true),
+      around_(around),
+      numbers_{product(shape_), shape_.size(), halvings} {
     outcomes_.assign(product(shape_), Outcome::not_run);
     wanted_.assign(outcomes_.size(), 0);
     waiting_.resize(outcomes_.size());
@@ -82,8 +86,12 @@ bool Plan::differ(std::size_t a, std::size_t b) const {
 }
 
 void Plan::want(std::size_t point) {
-    if (wanted_[point]) return;
-    wanted_[point] = 1;
+    const bool on_grid = point < wanted_.size();
+    if (on_grid ? wanted_[point] != 0 : between_.contains(point)) return;
+    if (on_grid)
+        wanted_[point] = 1;
+    else
+        between_[point] = Outcome::not_run;
     ++wanted_count_;
     queue_.push_back(point);
 }
@@ -129,23 +137,61 @@ void Plan::look_around(std::size_t point) {
         for (const bool up : {false, true}) {
             if (up ? at[a] + 1 == shape_[a] : at[a] == 0) continue;
             const std::size_t other = up ? point + stride_[a] : point - stride_[a];
-            if (outcomes_[other] != Outcome::not_run && differ(point, other)) want_cells_beside(point, other);
+            if (outcomes_[other] == Outcome::not_run || !differ(point, other)) continue;
+            want_cells_beside(point, other);
+            halve(std::minmax(point, other));
         }
+}
+
+Outcome Plan::outcome(std::size_t point) const {
+    if (point < outcomes_.size()) return outcomes_[point];
+    const auto known = between_.find(point);
+    return known == between_.end() ? Outcome::not_run : known->second;
+}
+
+// Neighbours on the grid are a stride apart, but where an axis has one value its stride is that of another.
+Between Plan::between(const Edge& edge, std::size_t step) const {
+    std::size_t axis = 0;
+    while (stride_[axis] != edge.second - edge.first || shape_[axis] == 1) ++axis;
+    return {edge.first, axis, step};
+}
+
+std::pair<std::size_t, std::size_t> Plan::crossing(const Edge& edge) const {
+    std::size_t low = 0, high = numbers_.steps();
+    while (high - low > 1) {
+        const std::size_t middle = (low + high) / 2;
+        const Outcome there = outcome(numbers_(between(edge, middle)));
+        if (there == Outcome::not_run) break;
+        (line_between(outcomes_[edge.first], there, around_) ? high : low) = middle;
+    }
+    return {low, high};
+}
+
+void Plan::halve(const Edge& edge) {
+    const auto [low, high] = crossing(edge);
+    if (high - low > 1) want(numbers_(between(edge, (low + high) / 2)));
 }
 
 std::optional<std::size_t> Plan::next() {
     while (!queue_.empty()) {
         const std::size_t point = queue_.front();
         queue_.pop_front();
-        if (outcomes_[point] == Outcome::not_run) return point;  // else it was done before a resume
+        if (outcome(point) == Outcome::not_run) return point;  // else it was done before a resume
     }
     return std::nullopt;
 }
 
 void Plan::done(std::size_t point, Outcome outcome) {
-    if (outcomes_[point] != Outcome::not_run) return;
-    outcomes_[point] = outcome;
+    if (this->outcome(point) != Outcome::not_run) return;
     ++outcomes_known_;
+    if (point >= outcomes_.size()) {
+        if (!between_.contains(point)) ++wanted_count_;  // was run before a resume
+        between_[point] = outcome;
+        const Between at = numbers_.of(point);
+        halve({at.point, at.point + stride_[at.axis]});
+        return;
+    }
+    outcomes_[point] = outcome;
     if (!follows_) return;
     const std::vector<std::size_t> intervals = waiting_[point];  // grows while it is worked off
     for (const std::size_t interval : intervals) try_bisect(interval);

@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <deque>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "tools/scan/between.hpp"
 #include "tools/scan/outcome.hpp"
 
 namespace tubule {
@@ -16,13 +18,14 @@ using Edge = std::pair<std::size_t, std::size_t>;
 
 // Following the lines: first the nodes of a coarse lattice; where two neighbours of it differ, the point halfway
 // between them, and so on down to neighbours on the grid; from each such crossing edge, all corners of the cells beside
-// it. What this comes to in the end does not depend on the order in which points are finished.
+// it. What this comes to in the end does not depend on the order in which points are finished. With `halvings`, each
+// crossing edge of the grid is bisected so many times more, by points between those of the grid.
 class Plan {
 public:
     // All points of a grid of this shape, row by row.
     explicit Plan(std::vector<std::size_t> shape);
     // Along the lines between all outcomes, or between one outcome and the others.
-    Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around);
+    Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around, int halvings = 0);
 
     std::optional<std::size_t> next();              // a point to run, if there is one by now
     void done(std::size_t point, Outcome outcome);  // also of points that were run before a resume
@@ -31,11 +34,17 @@ public:
     std::size_t wanted() const { return wanted_count_; }   // points asked for by now
     bool follows() const { return follows_; }
 
+    // Of a crossing edge of the grid, the steps (Between) from and to which it is known to cross.
+    std::pair<std::size_t, std::size_t> crossing(const Edge& edge) const;
+    Between between(const Edge& edge, std::size_t step) const;
+
 private:
     void want(std::size_t point);
     void bisect(std::size_t a, std::size_t b);
     void try_bisect(std::size_t interval);
     void look_around(std::size_t point);
+    void halve(const Edge& edge);
+    Outcome outcome(std::size_t point) const;  // of any
     void want_cells_beside(std::size_t a, std::size_t b);
     bool differ(std::size_t a, std::size_t b) const;
     std::vector<std::size_t> place(std::size_t point) const;
@@ -43,8 +52,10 @@ private:
     std::vector<std::size_t> shape_, stride_;
     bool follows_ = false;
     std::optional<Outcome> around_;
-    std::vector<Outcome> outcomes_;
+    std::vector<Outcome> outcomes_;  // on the grid
     std::vector<char> wanted_;
+    BetweenNumbers numbers_;
+    std::map<std::size_t, Outcome> between_;  // wanted ones
     std::deque<std::size_t> queue_;
     std::size_t outcomes_known_ = 0, wanted_count_ = 0;
     std::vector<Edge> intervals_;                    // of seed lines, to be bisected when both ends are known

@@ -11,12 +11,12 @@
 #include <limits>
 #include <random>
 #include <span>
+#include <tuple>
 
 #include "common/case/read.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/journal.hpp"
-#include "tools/scan/plan.hpp"
 #include "tools/scan/theory.hpp"
 
 namespace tubule {
@@ -145,6 +145,30 @@ void put_boundary(hid_t file, const ScanResult& result) {
     put_dataset(file, "boundary", H5T_NATIVE_INT64, space({ends.size() / 2, 2}), ends.data());
 }
 
+// Where on the edges of /boundary the outcome changes: between two values of what varies along each.
+void put_crossings(hid_t file, const ScanResult& result) {
+    const auto group = make_group(file, "between");
+    std::vector<std::int64_t> numbers;
+    std::vector<std::int8_t> outcomes;
+    for (const auto& [number, outcome] : result.between) {
+        numbers.push_back(static_cast<std::int64_t>(number));
+        outcomes.push_back(static_cast<std::int8_t>(outcome));
+    }
+    put_dataset(group, "point", H5T_NATIVE_INT64, space({numbers.size()}), numbers.data());
+    put_named(group, "outcome", {outcomes.size()}, outcomes, outcome_names());
+    const Plan plan = plan_of(result);
+    std::vector<double> ends;
+    for (const Edge& edge : boundary_edges(result.shape(), result.outcomes(), result.scan.boundary->around)) {
+        Between at = plan.between(edge, 0);
+        const auto [from, to] = plan.crossing(edge);
+        for (const std::size_t step : {from, to}) {
+            at.step = step;
+            ends.push_back(result.scan.value(at));
+        }
+    }
+    put_dataset(file, "crossing", H5T_NATIVE_DOUBLE, space({ends.size() / 2, 2}), ends.data());
+}
+
 void put_threshold(hid_t parent, const ThresholdMap& map) {
     const auto group = make_group(parent, map.name);
     put_attribute(group, "label", map.label);
@@ -169,6 +193,7 @@ std::vector<std::byte> image_of(const Stored& stored) {
         const auto around = scan.boundary->around;
         put_attribute(what, "boundary", around ? std::string(name(*around)) : std::string("outcome"));
         put_attribute(what, "seeds", std::int64_t{scan.boundary->seeds});
+        put_attribute(what, "refine", std::int64_t{scan.boundary->refine});
     }
     put_text(file, "case", scan.case_text);
     {
@@ -183,6 +208,7 @@ std::vector<std::byte> image_of(const Stored& stored) {
     for (std::size_t a = 0; a < scan.axes.size(); ++a) put_axis(axes, std::to_string(a), scan.axes[a]);
     put_points(file, result);
     put_boundary(file, result);
+    if (scan.boundary && scan.boundary->refine > 0) put_crossings(file, result);
     const auto lines = make_group(file, "thresholds");
     for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
     return bytes_of(file);
@@ -233,6 +259,7 @@ Scan get_scan(hid_t file) {
         scan.boundary.emplace();
         scan.boundary->around = outcome_from_name(get_text(what, "boundary"));
         scan.boundary->seeds = static_cast<int>(get_count(what, "seeds"));
+        scan.boundary->refine = static_cast<int>(get_count(what, "refine"));
     }
     scan.case_text = get_text_array(file, "case").at(0);
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
@@ -265,6 +292,15 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     return points;
 }
 
+std::map<std::size_t, Outcome> get_between(hid_t file) {
+    const auto group = open_group(file, "between");
+    const auto numbers = get_integers(group, "point"), outcomes = get_integers(group, "outcome");
+    std::map<std::size_t, Outcome> between;
+    for (std::size_t i = 0; i < std::min(numbers.size(), outcomes.size()); ++i)
+        between[static_cast<std::size_t>(numbers[i])] = static_cast<Outcome>(outcomes[i]);
+    return between;
+}
+
 Handle open_file(const fs::path& file) {
     const auto access = property_list(H5P_FILE_ACCESS);
     H5Pset_file_locking(access, false, true);  // as for results: a file never changes in place
@@ -283,7 +319,15 @@ Stored read_file(const fs::path& path) {
     for (const std::string& key : attribute_names(about))
         stored.result.about.emplace_back(key, get_value(open_attribute(about, key), key));
     stored.result.points = get_points(file, stored.result.scan.size());
+    if (has(file, "between")) stored.result.between = get_between(file);
     return stored;
+}
+
+void keep(ScanResult& result, const PointResult& p) {
+    if (p.point < result.points.size())
+        result.points[p.point] = p;
+    else
+        result.between[p.point] = p.outcome;
 }
 
 // The file with its journal.
@@ -293,8 +337,7 @@ Stored load(const fs::path& path) {
         Stored stored = read_file(path);
         replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
             if (kind != Entry::point) throw std::runtime_error("its journal is of a run, not of a scan");
-            PointResult p = from_bytes(payload);
-            stored.result.points.at(p.point) = std::move(p);
+            keep(stored.result, from_bytes(payload));
         });
         return stored;
     } catch (const std::exception& error) {
@@ -305,7 +348,8 @@ Stored load(const fs::path& path) {
 bool same_scan(const Scan& a, const Scan& b) {
     const auto same_axis = [](const Axis& x, const Axis& y) { return x.keys == y.keys && x.values == y.values; };
     const auto choice = [](const Scan& s) {
-        return s.boundary ? std::pair(s.boundary->around, s.boundary->seeds) : std::pair(std::optional<Outcome>(), 0);
+        return s.boundary ? std::tuple(s.boundary->around, s.boundary->seeds, s.boundary->refine)
+                          : std::tuple(std::optional<Outcome>(), 0, 0);
     };
     return a.case_text == b.case_text && a.sets == b.sets && a.to_the_end == b.to_the_end &&
            a.boundary.has_value() == b.boundary.has_value() && choice(a) == choice(b) &&
@@ -324,6 +368,16 @@ std::vector<Outcome> ScanResult::outcomes() const {
     std::vector<Outcome> all;
     for (const PointResult& p : points) all.push_back(p.outcome);
     return all;
+}
+
+Plan plan_of(const ScanResult& result) {
+    const auto& boundary = result.scan.boundary;
+    Plan plan =
+        boundary ? Plan(result.shape(), boundary->seeds, boundary->around, boundary->refine) : Plan(result.shape());
+    for (const PointResult& p : result.points)
+        if (p.outcome != Outcome::not_run) plan.done(p.point, p.outcome);
+    for (const auto& [number, outcome] : result.between) plan.done(number, outcome);
+    return plan;
 }
 
 struct ScanWriter::Impl {
@@ -400,7 +454,7 @@ void ScanWriter::point(const PointResult& p) {
     Stored& c = impl_->stored;
     impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
     ++c.sequence;
-    c.result.points.at(p.point) = p;
+    keep(c.result, p);
     // For those who look in meanwhile, as often as takes less than 2 % of the time.
     if (Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
         impl_->write();

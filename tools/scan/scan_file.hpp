@@ -3,11 +3,13 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <vector>
 
 #include "common/result/result.hpp"
 #include "tools/scan/description.hpp"
+#include "tools/scan/plan.hpp"
 #include "tools/scan/point.hpp"
 
 namespace tubule {
@@ -15,11 +17,15 @@ namespace tubule {
 struct ScanResult {
     Scan scan;
     About about;
-    std::vector<PointResult> points;  // of the whole grid, in order; Outcome::not_run where nothing is known
+    std::vector<PointResult> points;         // of the whole grid, in order; Outcome::not_run where nothing is known
+    std::map<std::size_t, Outcome> between;  // of points between those of the grid
 
     std::vector<std::size_t> shape() const;
     std::vector<Outcome> outcomes() const;
 };
+
+// Its plan, with all that is known.
+Plan plan_of(const ScanResult& result);
 
 // One writer a file. Throws std::runtime_error naming the file, for I/O errors, for a second writer, and for a file of
 // that name that is no scan.

@@ -103,9 +103,9 @@ const std::vector<Threshold>& thresholds() {
     static const std::vector<Threshold> all{
         {"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
         {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
-        {"pearling", "straight tube at rest, a wave with m = 0 neutral", pearling},
-        {"buckling", "the same, m = 1", buckling},
-        {"rings", "the same, m = 2", rings}};
+        {"pearling", "straight tube, m = 0 neutral", pearling},
+        {"buckling", "straight tube, m = 1 neutral", buckling},
+        {"rings", "straight tube, m = 2 neutral", rings}};
     return all;
 }
 
