@@ -17,7 +17,8 @@ namespace {
 
 constexpr int most_waves = 20;         // along a tube: shorter ones are not added
 constexpr int more_n = 2, most_m = 3;  // waves that are looked for beside those of the start
-constexpr int frames = 20;             // until tier 1's end; and as many after it
+constexpr int frames = 20;             // of the first part of the run, and of the rest
+constexpr double e_folds = 6;          // from the noise to what is large
 
 constexpr double rough = 0.05;          // accuracy of the energy: few triangles are not worth finer steps
 constexpr double thinnest_neck = 1e-2;  // that triangles are asked to follow
@@ -46,7 +47,12 @@ void add_waves(Case& c, double noise) {
         std::get<Tube>(c.shape).modes.push_back({noise * start->tube.radius, n, m, phase += 1});
 }
 
-std::vector<double> output_times(double first_end, double end) {
+// The first part lasts until tier 1's end or, where a wave with m >= 1 grows, as long as it grows by linear theory.
+std::vector<double> output_times(const Case& c, const PointResult& axisymmetric, double end) {
+    double fastest = 0;
+    for (const theory::FittingWave& wave : fastest_waves(c))
+        if (wave.m > 0) fastest = std::max(fastest, wave.rate);
+    const double first_end = fastest > 0 ? e_folds / fastest : axisymmetric[Measure::time];
     std::vector<double> times;
     for (int i = 1; i <= frames; ++i) times.push_back(std::min(first_end, end) * i / frames);
     for (int i = 1; i <= frames && first_end < end; ++i) times.push_back(first_end + (end - first_end) * i / frames);
@@ -144,7 +150,7 @@ std::string surface_case(const Case& c, const PointResult& axisymmetric, const C
     s.expect = {};
     s.time.stationary.reset();
     s.time.end = choices.end.value_or(c.time.end);
-    s.time.output = output_times(axisymmetric[Measure::time], s.time.end);
+    s.time.output = output_times(c, axisymmetric, s.time.end);
     add_waves(s, choices.noise);
     const std::string text = effective_toml(s);
     parse_case(text, {}, c.path);  // what is no case is refused before anything is run
