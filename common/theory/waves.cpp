@@ -223,7 +223,8 @@ std::optional<double> mean_rate(const Case& c, int n, int m, double from, double
     }
     const auto at = ours - waves.begin();
     const auto states = waves_in_time(start->tube, c.model, start->length, waves, {from, to});
-    return std::log(std::abs(states[1].amplitudes[at] / states[0].amplitudes[at])) / (to - from);
+    const double rate = std::log(std::abs(states[1].amplitudes[at] / states[0].amplitudes[at])) / (to - from);
+    return std::isfinite(rate) ? std::optional(rate) : std::nullopt;  // else it has decayed below all numbers
 } catch (const std::invalid_argument&) {  // a wave without meaning, such as one that is infinitely fast
     return std::nullopt;
 }

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -76,23 +77,28 @@ void add_spectrum(std::string& out, const Point& p) {
 }
 
 void add_fit(std::string& out, const confirm::Answer& a) {
-    if (!(a.fit.rate == a.fit.rate)) return;
+    if (std::isnan(a.fit.rate)) return;
     add(out, "    wave {},{}: rate {:.4g} +- {:.2g} for t = {:.4g} to {:.4g}", a.n, a.m, a.fit.rate, a.fit.error,
         a.fit.from, a.fit.to);
-    if (a.linear_rate == a.linear_rate) add(out, "; {:.4g} by linear theory of the case", a.linear_rate);
+    if (!std::isnan(a.linear_rate)) add(out, "; {:.4g} by linear theory of the case", a.linear_rate);
     add(out, "\n");
+}
+
+std::string shown(double value) {
+    return std::isnan(value) ? "-" : fmt::format("{:.3g}", value);
 }
 
 std::string words(const std::vector<Point>& points) {
     std::string out;
-    add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>7}  {:>7}  {:>18}  {:>8}  {}\n", "point", "why",
+    add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>8}  {:>8}  {:>16}  {:>8}  {}\n", "point", "why",
         "tier 1", "surface3d", "t", "dE/E_ref", "wave", "size", "growth", "rate", "linear", "verdict");
     for (const Point& p : points) {
         const confirm::Answer& a = p.answer;
-        add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8.3g}  {:>8.1e}  {:>5}  {:>7.2g}  {:>7.3g}  {:>18}  {:>8.3g}  {}\n",
-            p.pick.point, name(p.pick.why), name(p.axisymmetric.outcome), outcome_words(p), a.time, a.energy_difference,
-            fmt::format("{},{}", a.n, a.m), a.amplitude, a.amplitude / a.noise,
-            fmt::format("{:.3g} +- {:.1g}", a.fit.rate, a.fit.error), a.linear_rate, name(a.verdict));
+        add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>8}  {:>8}  {:>16}  {:>8}  {}\n", p.pick.point,
+            name(p.pick.why), name(p.axisymmetric.outcome), outcome_words(p), shown(a.time), shown(a.energy_difference),
+            fmt::format("{},{}", a.n, a.m), shown(a.amplitude), shown(a.amplitude / a.noise),
+            std::isnan(a.fit.rate) ? "-" : fmt::format("{:.3g} +- {:.1g}", a.fit.rate, a.fit.error),
+            shown(a.linear_rate), name(a.verdict));
     }
     for (const Point& p : points) {
         if (agrees(p)) continue;
@@ -181,6 +187,7 @@ std::vector<Point> plan(const ConfirmOptions& options, const ScanResult& result)
         p.pick = pick;
         p.sets = {sets.begin() + common, sets.end()};
         p.c = result.scan.case_of(pick.point);
+        p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
         if (p.c.tier != Tier::axisym)
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");

@@ -18,6 +18,7 @@ namespace {
 constexpr int most_waves = 20;         // along a tube: shorter ones are not added
 constexpr int more_n = 2, most_m = 3;  // waves that are looked for beside those of the start
 constexpr int frames = 20;             // of the first part of the run, and of the rest
+constexpr double rounding = 0.01;      // of the noise: what is left of waves below says nothing of their rates
 constexpr double e_folds = 6;          // from the noise to what is large
 
 constexpr double rough = 0.05;          // accuracy of the energy: few triangles are not worth finer steps
@@ -98,9 +99,9 @@ void fit_largest_wave(Answer& a, const Case& c, const Result& result) {
         amplitudes.push_back(amplitude(result, frame, {a.n, a.m}));
     }
     try {
-        a.fit = theory::fit_growth(times, amplitudes);
+        a.fit = theory::fit_growth(times, amplitudes, rounding * a.noise);
         a.linear_rate = theory::mean_rate(c, a.n, a.m, a.fit.from, a.fit.to).value_or(not_known);
-    } catch (const std::invalid_argument&) {  // it ended after a few frames
+    } catch (const std::invalid_argument&) {  // it ended, or decayed, within a few frames
     }
 }
 
