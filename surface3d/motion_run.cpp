@@ -32,6 +32,7 @@ constexpr double growth = 1.6, safety = 0.85;   // of steps
 constexpr double shortest_step = 1e-9;          // of the relaxation time: shorter ones are a failure
 constexpr double creep = 10;                    // increase since its lowest, of the asked accuracy
 constexpr double climb = 0.25;                  // increase of the energy in a step, of the asked accuracy
+constexpr double most_drift = 0.1;              // of the volume, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
 // A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5;
@@ -375,6 +376,14 @@ std::optional<StopReport> MotionAttempt::check_shape() const {
                           fmt::format("the energy has risen by {:.3g} of E_ref, little by little, which it cannot",
                                       (total() - memory_.lowest_total) / memory_.reference_energy),
                           "use more elements"};
+    const double drift = std::abs(now_.bending.volume / memory_.volume - 1);
+    if (!paper_ && stepper_->law().keeps_volume && drift > most_drift * case_.accuracy.energy)
+        return StopReport{
+            Stop::resolution_lost, t,
+            fmt::format("the volume has drifted by {:.3g} of itself: on so few triangles it cannot be told "
+                        "from the area, which is kept",
+                        drift),
+            "use more elements"};
     if (now_.turn > sharpest_turn)
         return StopReport{
             now_.neck ? Stop::pinch_off : Stop::resolution_lost, t,
