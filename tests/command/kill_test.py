@@ -165,7 +165,7 @@ elements = 80
 order = 2
 step = 1e-3
 [accuracy]
-energy = 1e-2
+energy = 1e-1
 [time]
 end = 0.2
 output = %s
