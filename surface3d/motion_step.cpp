@@ -146,9 +146,10 @@ Eigen::VectorXd MotionStepper::solve(const StepBase& base, bool with_lambda, dou
     if (law_.inextensible && control_.area)
         system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
     make_symmetric(base);
-    const Eigen::MatrixXd rigid = rigid_motions(base);
-    Eigen::MatrixXd border(unknowns_.size(), rigid.cols() + with_lambda);
-    border.leftCols(rigid.cols()) = rigid;
+    Eigen::MatrixXd rigid(0, 0);
+    if (holds_rigid_motions_) rigid = momenta(*base.mesh, rigid_motions(*base.mesh));
+    Eigen::MatrixXd border = Eigen::MatrixXd::Zero(unknowns_.size(), rigid.cols() + with_lambda);
+    border.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
     Eigen::VectorXd rate = Eigen::VectorXd::Zero(border.cols());
     if (with_lambda) {
         border.rightCols<1>() = system_.flux;
@@ -159,28 +160,48 @@ Eigen::VectorXd MotionStepper::solve(const StepBase& base, bool with_lambda, dou
     return x;
 }
 
-// (r, v) of the motions r that nothing resists, where there are any: translations, and rotations that the surface
-// allows.
-Eigen::MatrixXd MotionStepper::rigid_motions(const StepBase& base) const {
+// Velocities of rigid motions at the nodes, a column each, component by component: translations, and rotations that the
+// surface allows.
+Eigen::MatrixXd MotionStepper::rigid_motions(const CurvedMesh& mesh) const {
     const int n = unknowns_.nodes();
-    if (!holds_rigid_motions_) return Eigen::MatrixXd(unknowns_.size(), 0);
-    const bool tube = mesh_.period > 0;
-    const Eigen::SparseMatrix<double> mass = mass_matrix(space_, *base.mesh);
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(unknowns_.size(), tube ? 4 : 6);
-    const VectorField x = node_positions(*base.mesh);
+    const bool tube = mesh.period > 0;
+    const VectorField x = node_positions(mesh);
+    Eigen::MatrixXd out(3 * n, tube ? 4 : 6);
     for (int motion = 0; motion < out.cols(); ++motion) {
         const int axis = tube && motion == 3 ? 2 : motion % 3;
         const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
         for (int d = 0; d < 3; ++d) {
-            Eigen::VectorXd r = Eigen::VectorXd::Constant(n, e[d]);
-            if (motion >= 3) {
-                const int j = (d + 1) % 3, k = (d + 2) % 3;
-                r = (e[j] * x.row(k) - e[k] * x.row(j)).transpose();
-            }
-            out.col(motion).segment(d * n, n) = mass * r;
+            const int j = (d + 1) % 3, k = (d + 2) % 3;
+            out.col(motion).segment(d * n, n) = motion < 3 ? Eigen::VectorXd::Constant(n, e[d])
+                                                           : (e[j] * x.row(k) - e[k] * x.row(j)).transpose().eval();
         }
     }
     return out;
+}
+
+// (r, v) of these motions r: momentum and angular momentum of a velocity v, but for the density.
+Eigen::MatrixXd MotionStepper::momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const {
+    const Eigen::SparseMatrix<double> mass = mass_matrix(space_, mesh);
+    const int n = unknowns_.nodes();
+    Eigen::MatrixXd out(motions.rows(), motions.cols());
+    for (int d = 0; d < 3; ++d) out.middleRows(d * n, n) = mass * motions.middleRows(d * n, n);
+    return out;
+}
+
+// Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,
+// which would move a surface at rest ever faster: a rigid motion takes it back. It changes no shape.
+void MotionStepper::keep_momenta(const MotionState& from, double te, MotionState& to) const {
+    if (!law_.flows || law_.inertia == 0) return;
+    const CurvedMesh before = mesh(from.X), after = mesh(to.X);
+    const Eigen::MatrixXd motions = rigid_motions(after), of = momenta(after, motions);
+    const double left = std::exp(-law_.friction / law_.inertia * (to.time - from.time));
+    const Eigen::VectorXd lack =
+        left * (momenta(before, rigid_motions(before)).transpose() * from.u) - of.transpose() * to.u;
+    const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
+    to.u += back;
+    const VectorField nodal = back.reshaped(unknowns_.nodes(), 3).transpose();
+    to.w += nodal;
+    to.X += te * nodal;
 }
 
 Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const {
@@ -255,6 +276,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     to.w = mesh_motion_.velocity(space_, at, mesh(Xbar), base.fields.normal, flux(to.u, at, base.fields),
                                  control_.relaxation, te);
     to.X = Xbar + te * to.w;
+    keep_momenta(from, te, to);
     if (past) {
         // Adams-Bashforth of second order for comparison; the constants of both errors are known (Milne).
         const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
@@ -269,6 +291,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     const VectorField kept_extent = correction(to.X, base.fields, keeps_volume);
     out.correction = work(kept_extent, base.fields);
     to.X += kept_extent;
+    keep_momenta(from, 0, to);  // on the surface as it is now
     to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;
     return out;
 }

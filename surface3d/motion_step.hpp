@@ -70,7 +70,9 @@ private:
     bool area_is_volume(const StepBase& base) const;
     Eigen::VectorXd solve(const StepBase& base, bool with_lambda, double& lambda);
     void make_symmetric(const StepBase& base);
-    Eigen::MatrixXd rigid_motions(const StepBase& base) const;
+    Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
+    Eigen::MatrixXd momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const;
+    void keep_momenta(const MotionState& from, double te, MotionState& to) const;
     VectorField correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;
 

@@ -95,6 +95,18 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
+TEST(MotionRun, FluidsKeepTheirMomenta) {
+    // maths 3: they fall as exp(-gamma t). From rest they stay zero, however coarse and uneven the mesh.
+    for (const double gamma : {0.0, 2.0}) {
+        const Outcome o = run_case(wavy, {"model.kind=fluid", "model.gamma=" + std::to_string(gamma)});
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        for (const char* name : {"momentum_x", "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y",
+                                 "angular_momentum_z"})
+            EXPECT_NEAR(o.last(name), 0, 1e-10) << name;
+        EXPECT_GT(o.last("speed"), 1e-2);
+    }
+}
+
 TEST(MotionRun, TheBalanceHoldsFromTheStart) {
     // Gradient flow of a sphere: E = 4 pi (2 + H0 R)^2, and 4 pi R^2 dR/dt = -dE/dR = -8 pi H0 (2 + H0 R), so that
     // 16 pi dissipate at R = 1, H0 = -1.

@@ -167,11 +167,11 @@ TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
 }
 
 TEST(Models, MomentumDecaysByFriction) {
-    // maths 3: momentum and angular momentum fall as exp(-gamma t), whatever the membrane does. First order in the
-    // step: the velocity of the mesh is unknown when a moving membrane begins, and taken as zero. From rest it is.
+    // maths 3: momentum and angular momentum fall as exp(-gamma t), whatever the membrane does. They are kept so, step
+    // by step; the speed in between, which nothing prescribes, agrees with steps half as long.
     const double gamma = 0.8, end = 0.1;
-    Eigen::Matrix<double, 6, 1> left[3];
-    for (int i : {0, 1, 2}) {
+    double speed[2];
+    for (int i : {0, 1}) {
         Motion motion(mesh_of(wavy, icosphere(2), 4),
                       {.kind = ModelKind::fluid, .Re = 1, .gamma = gamma, .keeps_volume = {}}, {.k = {0.1, 0, 0.05}});
         const int n = motion.mesh().size();
@@ -182,14 +182,15 @@ TEST(Models, MomentumDecaysByFriction) {
         }
         motion.state.u_past = motion.state.u;
         const MotionMeasures start = motion.measures();
-        motion.until(end, 8 << i);
+        motion.until(end, 16 << i);
         const MotionMeasures now = motion.measures();
         const double factor = std::exp(-gamma * end);
-        left[i] << (now.momentum - factor * start.momentum) / start.momentum.norm(),
-            (now.angular_momentum - factor * start.angular_momentum) / start.angular_momentum.norm();
+        EXPECT_LT((now.momentum - factor * start.momentum).norm(), 1e-10 * start.momentum.norm());
+        EXPECT_LT((now.angular_momentum - factor * start.angular_momentum).norm(),
+                  1e-10 * start.angular_momentum.norm());
+        speed[i] = std::sqrt(now.kinetic);
     }
-    EXPECT_GT((left[0] - left[1]).norm() / (left[1] - left[2]).norm(), 1.8);
-    EXPECT_LT(left[2].norm(), 1e-3);
+    EXPECT_NEAR(speed[0] / speed[1], 1, 1e-2);
 }
 
 TEST(Models, RotatingTubeStaysStraight) {
