@@ -264,12 +264,17 @@ void MotionAttempt::begin() {
     write_frame();
 }
 
-// Without inertia the surface is not at rest at the start: the velocity of a very short step.
+// Without inertia the surface is not at rest at the start: the velocity of a very short step. Where there is none, the
+// first step says why.
 void MotionAttempt::set_moving() {
-    const MotionState soon = stepper_->step(state_, moment * memory_.next_step).state;
-    state_.u = state_.u_past = soon.u;
-    state_.w = state_.w_past = soon.w;
-    state_.p = soon.p, state_.lambda = soon.lambda;
+    try {
+        const MotionState soon = stepper_->step(state_, moment * memory_.next_step).state;
+        if (!soon.X.allFinite() || !soon.u.allFinite()) return;
+        state_.u = state_.u_past = soon.u;
+        state_.w = state_.w_past = soon.w;
+        state_.p = soon.p, state_.lambda = soon.lambda;
+    } catch (const SolveError&) {
+    }
 }
 
 void MotionAttempt::resume(const Restart& restart) {
