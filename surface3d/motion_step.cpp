@@ -68,8 +68,11 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
     law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
 }
 
-MotionState MotionStepper::start(const CurvedMesh& mesh) const {
-    return at_rest(mesh, law_.components(), unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
+MotionState MotionStepper::start(const CurvedMesh& mesh) {
+    MotionState s = at_rest(mesh, law_.components(), unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
+    s.X += correction(s.X, fields(mesh), law_.keeps_volume);
+    s.X_past = s.X;
+    return s;
 }
 
 MotionFields MotionStepper::fields(const CurvedMesh& mesh) {

@@ -50,8 +50,9 @@ public:
     // SolveError where a system cannot be solved.
     MotionStep step(const MotionState& from, double tau);
 
-    // At rest.
-    MotionState start(const CurvedMesh& mesh) const;
+    // At rest, with the area and volume that are kept: what a new mesh lacks of them, a short step would make up for
+    // at great speed.
+    MotionState start(const CurvedMesh& mesh);
     CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
     // Velocities of the surface at the nodes.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
