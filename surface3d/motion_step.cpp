@@ -70,7 +70,8 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
 
 MotionState MotionStepper::start(const CurvedMesh& mesh) {
     MotionState s = at_rest(mesh, law_.components(), unknowns_.p < 0 ? 0 : unknowns_.size() - unknowns_.p);
-    s.X += correction(s.X, fields(mesh), law_.keeps_volume);
+    const MotionFields f = fields(mesh);
+    s.X += correction(s.X, f, law_.keeps_volume && !area_is_volume(mesh, f));
     s.X_past = s.X;
     return s;
 }
@@ -136,10 +137,10 @@ void MotionStepper::make_symmetric(const StepBase& base) {
     system_.b.array() *= scale.array();
 }
 
-bool MotionStepper::area_is_volume(const StepBase& base) const {
+bool MotionStepper::area_is_volume(const CurvedMesh& mesh, const MotionFields& f) const {
     if (!law_.inextensible) return false;
-    const Extent rate = extent_rate(space_, *base.mesh, base.fields.normal);  // -INT H, A
-    const Extent by_H = extent_rate(space_, *base.mesh, base.fields.normal * base.fields.H.asDiagonal());
+    const Extent rate = extent_rate(space_, mesh, f.normal);  // -INT H, A
+    const Extent by_H = extent_rate(space_, mesh, f.normal * f.H.asDiagonal());
     return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
 }
 
@@ -271,7 +272,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         te};
     MotionStep out;
     MotionState& to = out.state;
-    const bool keeps_volume = law_.keeps_volume && !area_is_volume(base);
+    const bool keeps_volume = law_.keeps_volume && !area_is_volume(at, base.fields);
     const Eigen::VectorXd x = solve(base, keeps_volume, to.lambda);
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());

@@ -68,7 +68,7 @@ public:
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
 
 private:
-    bool area_is_volume(const StepBase& base) const;
+    bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
     Eigen::VectorXd solve(const StepBase& base, bool with_lambda, double& lambda);
     void make_symmetric(const StepBase& base);
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
