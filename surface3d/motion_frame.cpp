@@ -63,6 +63,8 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     out.numbers = {{"energy", m.bending.energy},
                    {"restart_lambda", s.lambda},
                    {"restart_step", s.step},
+                   {"restart_missed_area", s.missed.area},
+                   {"restart_missed_volume", s.missed.volume},
                    {"restart_elements", static_cast<double>(memory.elements)}};
     for_each_number(memory, [&](const char* name, double value) { out.numbers.emplace_back(name, value); });
     Eigen::VectorXd density_at(s.X.cols());
@@ -75,6 +77,10 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
                               array("restart_w_past", s.w_past), column("restart_u_past", s.u_past)})
         out.arrays.push_back(more);
     if (s.p.size() > 0) out.arrays.push_back(column("restart_p", s.p));
+    if (s.u_rate.size() > 0) {
+        out.arrays.push_back(array("restart_X_rate", s.X_rate));
+        out.arrays.push_back(column("restart_u_rate", s.u_rate));
+    }
     return out;
 }
 
@@ -87,8 +93,13 @@ MotionRestart motion_restart(const Record& record) {
     s.X = field_of(record, "points"), s.w = field_of(record, "restart_w"), s.u = vector_of(record, "restart_u");
     s.X_past = field_of(record, "restart_X_past"), s.w_past = field_of(record, "restart_w_past");
     s.u_past = vector_of(record, "restart_u_past");
-    if (std::any_of(record.arrays.begin(), record.arrays.end(), [](const Array& a) { return a.name == "restart_p"; }))
-        s.p = vector_of(record, "restart_p");
+    s.missed = {number_of(record, "restart_missed_area"), number_of(record, "restart_missed_volume")};
+    const auto has = [&](const char* name) {
+        return std::any_of(record.arrays.begin(), record.arrays.end(), [&](const Array& a) { return a.name == name; });
+    };
+    if (has("restart_p")) s.p = vector_of(record, "restart_p");
+    if (has("restart_u_rate"))
+        s.X_rate = field_of(record, "restart_X_rate"), s.u_rate = vector_of(record, "restart_u_rate");
     for_each_number(out.memory, [&](const char* name, double& value) { value = number_of(record, name); });
     out.memory.elements = static_cast<int>(number_of(record, "restart_elements"));
     return out;

@@ -212,7 +212,7 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
 
 void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     MotionLaw law = motion_law(case_.model);
-    if (case_.surface.scheme == Scheme::paper) {
+    if (time_scheme(case_) == Scheme::paper) {
         law.flows = true;  // it has all components of u in all models
         paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);
     }
@@ -220,7 +220,7 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
                                 .least_variation = memory_.least_variation,
-                                .second_order = case_.surface.scheme == Scheme::bdf2};
+                                .scheme = time_scheme(case_)};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
     if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
     summary.elements = mesh.triangles();

@@ -9,6 +9,8 @@ namespace {
 constexpr int most_corrections = 5;
 constexpr double kept = 1e-12;            // area and volume, relative
 constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
+constexpr double damping = 0.8;           // of scheme alpha: the factor by which a step damps the fastest waves
+constexpr double learns = 0.5;            // from what the linear system of a step missed of area and volume
 
 template <class AtPoint>
 Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
@@ -144,22 +146,21 @@ bool MotionStepper::area_is_volume(const CurvedMesh& mesh, const MotionFields& f
     return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
 }
 
-Eigen::VectorXd MotionStepper::solve(const StepBase& base, bool with_lambda, double& lambda) {
+// With the given rates of area and volume, where they are kept.
+Eigen::VectorXd MotionStepper::solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda) {
     assemble(space_, unknowns_, law_, bending_, base, system_);
-    const Extent now = extent(space_, *base.mesh), back = extent_rate(space_, *base.mesh, base.displacement);
-    if (law_.inextensible && control_.area)
-        system_.b -= (*control_.area - now.area + back.area) / (base.te * now.area) * system_.pressure_load;
+    if (law_.inextensible && control_.area) system_.b -= rate.area / *control_.area * system_.pressure_load;
     make_symmetric(base);
     Eigen::MatrixXd rigid(0, 0);
     if (holds_rigid_motions_) rigid = momenta(*base.mesh, rigid_motions(*base.mesh));
     Eigen::MatrixXd border = Eigen::MatrixXd::Zero(unknowns_.size(), rigid.cols() + with_lambda);
     border.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
-    Eigen::VectorXd rate = Eigen::VectorXd::Zero(border.cols());
+    Eigen::VectorXd held = Eigen::VectorXd::Zero(border.cols());
     if (with_lambda) {
         border.rightCols<1>() = system_.flux;
-        if (control_.volume) rate.tail<1>()[0] = (*control_.volume - now.volume + back.volume) / base.te;
+        if (control_.volume) held.tail<1>()[0] = rate.volume;
     }
-    const auto [x, y] = solver_.solve(system_.A, system_.b, border, rate);
+    const auto [x, y] = solver_.solve(system_.A, system_.b, border, held);
     lambda = with_lambda ? y.tail<1>()[0] : 0;
     return x;
 }
@@ -225,6 +226,12 @@ Eigen::VectorXd MotionStepper::pressure_at_nodes(const MotionState& state) const
     return out;
 }
 
+// Of what is kept; zero where nothing is.
+Extent MotionStepper::lack(const CurvedMesh& mesh) const {
+    const Extent now = extent(space_, mesh);
+    return {control_.area ? *control_.area - now.area : 0, control_.volume ? *control_.volume - now.volume : 0};
+}
+
 // Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
 VectorField MotionStepper::correction(const VectorField& X, const MotionFields& f, bool with_volume) const {
     const bool area = law_.inextensible && control_.area, volume = with_volume && control_.volume;
@@ -258,35 +265,97 @@ double MotionStepper::work(const VectorField& d, const MotionFields& fields) con
     return sum;
 }
 
-MotionStep MotionStepper::step(const MotionState& from, double tau) {
-    const bool past = from.step > 0 && control_.second_order;
-    const double r = past ? tau / from.step : 0, rate = (1 + 2 * r) / ((1 + r) * tau), te = 1 / rate;
+// What a step solves for: at `level` of the way through it, X = Xbar + te w and u_t = (u - ubar)/te. Its end lies on
+// the line from its beginning to there.
+struct MotionStepper::Formula {
+    double level, te;
+    VectorField Xbar;
+    Eigen::VectorXd ubar;
+    double error;         // of the positions in a step, in units of their third derivative * tau^3
+    double renewing = 1;  // of scheme alpha: the part of the carried rates that a step makes anew
+};
+
+MotionStepper::Formula MotionStepper::euler(const MotionState& from, double tau) {
+    return {1, tau, from.X, from.u, 0};
+}
+
+MotionStepper::Formula MotionStepper::bdf2(const MotionState& from, double tau) {
+    const double r = tau / from.step, te = (1 + r) * tau / (1 + 2 * r);
     const auto bar = [&](const auto& now, const auto& before) {
         return ((1 + r) * now - r * r / (1 + r) * before) * (te / tau);
     };
-    const auto ahead = [&](const auto& now, const auto& before) { return (1 + r) * now - r * before; };
-    const VectorField Xbar = bar(from.X, from.X_past), Xstar = ahead(from.X, from.X_past);
+    return {1, te, bar(from.X, from.X_past), bar(from.u, from.u_past), -(1 + r) * (1 + r) / (6 * r * (1 + 2 * r))};
+}
+
+// Jansen, Whiting and Hulbert (2000). The rates belong to a time just before that of the state, by .06 of the step that
+// made them; where steps differ, an error of .003 tau (change of tau) u_tt is left.
+MotionStepper::Formula MotionStepper::alpha(const MotionState& from, double tau) {
+    const double level = 1 / (1 + damping), mass = (3 - damping) / (2 * (1 + damping)), gamma = 0.5 + mass - level;
+    const double kept = level * tau * (1 - gamma / mass);
+    return {level,   level * gamma * tau / mass, from.X + kept * from.X_rate, from.u + kept * from.u_rate, 1.0 / 12,
+            1 / mass};
+}
+
+// Such that area and volume at the end of the step are those that are kept: linear about the surface that is expected
+// there, but for what a step like this is expected to miss.
+Extent MotionStepper::wanted_rate(const MotionState& from, const Formula& f, double tau, const CurvedMesh& at) const {
+    const bool past = from.step > 0 && control_.scheme != Scheme::euler;
+    const double r = past ? tau / from.step : 0;
+    const VectorField end = (1 + r) * from.X - r * from.X_past, begin = from.X + (f.Xbar - from.X) / f.level;
+    const Extent lacks = lack(mesh(end)), back = extent_rate(space_, at, end - begin);
+    const double again = r * r * r, span = f.te / f.level;
+    return {(lacks.area + back.area + again * from.missed.area) / span,
+            (lacks.volume + back.volume + again * from.missed.volume) / span};
+}
+
+// From the level at which the step was solved to its end.
+void MotionStepper::finish(const MotionState& from, const Formula& f, MotionState& to) const {
+    if (control_.scheme == Scheme::alpha) {
+        const bool first = from.step == 0;
+        const VectorField X_rate = to.w;
+        const Eigen::VectorXd u_rate = (to.u - f.ubar) / f.te;
+        to.X_rate = first ? X_rate : VectorField(from.X_rate + f.renewing * (X_rate - from.X_rate));
+        to.u_rate = first ? u_rate : Eigen::VectorXd(from.u_rate + f.renewing * (u_rate - from.u_rate));
+    }
+    if (f.level == 1) return;
+    to.X = from.X + (to.X - from.X) / f.level;
+    to.w = from.w + (to.w - from.w) / f.level;
+    to.u = from.u + (to.u - from.u) / f.level;
+}
+
+MotionStep MotionStepper::step(const MotionState& from, double tau) {
+    const bool past = from.step > 0 && control_.scheme != Scheme::euler;
+    const Formula f = !past ? euler(from, tau) : control_.scheme == Scheme::alpha ? alpha(from, tau) : bdf2(from, tau);
+    const double r = past ? tau / from.step : 0;
+    const auto ahead = [&](const auto& now, const auto& before) {
+        return ((1 + f.level * r) * now - f.level * r * before).eval();
+    };
+    const VectorField Xstar = ahead(from.X, from.X_past);
     const CurvedMesh at = mesh(Xstar);
-    StepBase base{
-        &at, fields(at), Xstar - Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past), bar(from.u, from.u_past),
-        te};
+    const StepBase base{&at,    fields(at), Xstar - f.Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past),
+                        f.ubar, f.te};
     MotionStep out;
     MotionState& to = out.state;
     const bool keeps_volume = law_.keeps_volume && !area_is_volume(at, base.fields);
-    const Eigen::VectorXd x = solve(base, keeps_volume, to.lambda);
+    const Eigen::VectorXd x = solve(base, wanted_rate(from, f, tau, at), keeps_volume, to.lambda);
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
-    to.w = mesh_motion_.velocity(space_, at, mesh(Xbar), base.fields.normal, flux(to.u, at, base.fields),
-                                 control_.relaxation, te);
-    to.X = Xbar + te * to.w;
-    keep_momenta(from, te, to);
+    to.w = mesh_motion_.velocity(space_, at, mesh(f.Xbar), base.fields.normal, flux(to.u, at, base.fields),
+                                 control_.relaxation, f.te);
+    to.X = f.Xbar + f.te * to.w;
+    finish(from, f, to);
+    keep_momenta(from, f.te / f.level, to);
     if (past) {
         // Adams-Bashforth of second order for comparison; the constants of both errors are known (Milne).
         const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
-        const double ours = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r)), theirs = (2 * r + 3) / (12 * r);
+        const double theirs = (2 * r + 3) / (12 * r);
         const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(base.fields.normal).colwise().sum();
-        out.error = ours / (ours + theirs) * along.cwiseAbs().maxCoeff();
+        out.error = std::abs(f.error / (theirs - f.error)) * along.cwiseAbs().maxCoeff();
+        const Extent lacks = lack(mesh(to.X));
+        const double again = r * r * r;
+        to.missed = {again * from.missed.area + learns * lacks.area,
+                     again * from.missed.volume + learns * lacks.volume};
     } else {
         const Eigen::RowVectorXd along =
             (to.X - from.X - tau * from.w).cwiseProduct(base.fields.normal).colwise().sum();

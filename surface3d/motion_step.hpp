@@ -1,16 +1,22 @@
-// One step in time of a moving surface: backward differences of second order on the surface that is expected at the end
-// of the step, linearly implicit.
+// One step in time of a moving surface, linearly implicit: solved on the surface that is expected in it, by backward
+// differences or the generalised alpha method, both of second order.
 #pragma once
 
 #include <memory>
 #include <optional>
 
+#include "common/case/surface_choices.hpp"
 #include "surface3d/curved_mesh.hpp"
 #include "surface3d/mesh_motion.hpp"
 #include "surface3d/motion_forms.hpp"
 #include "surface3d/projection.hpp"
 
 namespace tubule::surface3d {
+
+// Area and volume (of one period), or changes of them.
+struct Extent {
+    double area = 0, volume = 0;
+};
 
 // Nodal values at a time, and what the next step needs of the one before.
 struct MotionState {
@@ -20,8 +26,13 @@ struct MotionState {
     Eigen::VectorXd u;           // velocity as in MotionUnknowns, component by component
     VectorField X_past, w_past;  // at time - step
     Eigen::VectorXd u_past;
-    Eigen::VectorXd p;  // pressure, at the nodes of its own order
+    VectorField X_rate;  // of scheme alpha: the rates that it carries on
+    Eigen::VectorXd u_rate;
+    // Pressure, at the nodes of its own order, and the volume's multiplier, where the step was solved: at its end, or
+    // with scheme alpha .44 of the step before.
+    Eigen::VectorXd p;
     double lambda = 0;
+    Extent missed;  // what the linear system of a step is expected to miss of area and volume
 };
 
 // With so many components of the velocity at a node, and so many pressures.
@@ -34,7 +45,7 @@ struct MotionControl {
     // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition as far as the mesh can tell: lambda is
     // left out, as the pressure stands for it, and the area alone is kept to rounding.
     double least_variation = 1e-8;
-    bool second_order = true;  // else Euler steps on the surface of their beginning
+    Scheme scheme = Scheme::bdf2;
 };
 
 struct MotionStep {
@@ -69,11 +80,18 @@ public:
 
 private:
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
-    Eigen::VectorXd solve(const StepBase& base, bool with_lambda, double& lambda);
+    struct Formula;
+    static Formula euler(const MotionState& from, double tau);
+    static Formula bdf2(const MotionState& from, double tau);
+    static Formula alpha(const MotionState& from, double tau);
+    Extent wanted_rate(const MotionState& from, const Formula& f, double tau, const CurvedMesh& at) const;
+    Eigen::VectorXd solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda);
+    void finish(const MotionState& from, const Formula& f, MotionState& to) const;
     void make_symmetric(const StepBase& base);
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
     Eigen::MatrixXd momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const;
     void keep_momenta(const MotionState& from, double te, MotionState& to) const;
+    Extent lack(const CurvedMesh& mesh) const;
     VectorField correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;
 
@@ -90,12 +108,8 @@ private:
     std::optional<Projection> projection_;
 };
 
-// Area and volume (of one period), and their change with displacements d of the nodes:
-// (div_P d, 1) and (d.nu, 1).
-struct Extent {
-    double area = 0, volume = 0;
-};
 Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh);
+// Its change with displacements d of the nodes: (div_P d, 1) and (d.nu, 1).
 Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d);
 
 }  // namespace tubule::surface3d

@@ -188,7 +188,9 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
              {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
     if (moves) {
         k.absent("recovery", "must be absent: a surface that moves has its own curvatures");
-        k.choice("scheme", d.scheme, {{"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
+        k.choice(
+            "scheme", d.scheme,
+            {{"alpha", Scheme::alpha}, {"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
         k.number("step", d.step, {.above = 0});
         if (d.scheme == Scheme::paper) {
             k.number("smoothing", d.smoothing, {.from = 0});

@@ -23,7 +23,8 @@ enum class MeshKind {
 
 // How a surface is moved.
 enum class Scheme {
-    bdf2,   // H and K implicit, backward differences of second order
+    alpha,  // H and K implicit, the generalised alpha method of second order, which hardly damps waves
+    bdf2,   // the same, backward differences of second order
     euler,  // the same of first order
     paper   // the paper's: Euler steps with K explicit and smoothed
 };
