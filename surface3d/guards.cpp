@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 
 #include "common/geometry/profile_point.hpp"
@@ -69,30 +70,44 @@ std::vector<std::array<int, 3>> lattice_triangles(int order) {
     return out;
 }
 
-// The flat triangles between the nodes; a periodic tube is cut open.
-TriangleMesh flattened(const CurvedMesh& mesh) {
-    TriangleMesh flat;
-    std::map<std::array<int, 2>, int> number;  // of a node, as a cell sees it
-    const auto small = lattice_triangles(mesh.order);
+// How many images of a tube, one above the other, it takes for all that may meet to be among them.
+int images(const CurvedMesh& mesh) {
+    if (mesh.period == 0) return 1;
+    double low = HUGE_VAL, high = -HUGE_VAL;
     for (int cell = 0; cell < mesh.triangles(); ++cell)
-        for (const auto& corners : small) {
-            std::array<int, 3> triangle;
-            for (int c = 0; c < 3; ++c) {
-                const int shift = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
-                const auto [found, is_new] =
-                    number.try_emplace({mesh.node(cell, corners[c]), shift}, static_cast<int>(flat.points.size()));
-                if (is_new) flat.points.push_back(mesh.position(cell, corners[c]));
-                triangle[c] = found->second;
-            }
-            flat.triangles.push_back(triangle);
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a) {
+            const double z = mesh.position(cell, a).z();
+            low = std::min(low, z), high = std::max(high, z);
         }
+    return 1 + static_cast<int>((high - low) / mesh.period);
+}
+
+// The flat triangles between the nodes; of a tube, which is cut open, so many images.
+TriangleMesh flattened(const CurvedMesh& mesh, int images) {
+    TriangleMesh flat;
+    std::map<std::array<int, 2>, int> number;  // of a node, in the period where a cell sees it
+    const auto small = lattice_triangles(mesh.order);
+    for (int image = 0; image < images; ++image)
+        for (int cell = 0; cell < mesh.triangles(); ++cell)
+            for (const auto& corners : small) {
+                std::array<int, 3> triangle;
+                for (int c = 0; c < 3; ++c) {
+                    const int seen = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
+                    const auto [found, is_new] = number.try_emplace({mesh.node(cell, corners[c]), seen + image},
+                                                                    static_cast<int>(flat.points.size()));
+                    const Eigen::Vector3d up = image * mesh.period * Eigen::Vector3d::UnitZ();
+                    if (is_new) flat.points.push_back(mesh.position(cell, corners[c]) + up);
+                    triangle[c] = found->second;
+                }
+                flat.triangles.push_back(triangle);
+            }
     return flat;
 }
 
 }  // namespace
 
 std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
-    const TriangleMesh flat = flattened(mesh);
+    const TriangleMesh flat = flattened(mesh, images(mesh));
     const auto pair = first_intersection(flat);
     if (!pair) return std::nullopt;
     const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);

@@ -15,7 +15,8 @@ std::optional<StopReport> find_fold(const SurfaceSpace& space, const CurvedMesh&
 // a report where one of them is missed by more than 1 % of 16 pi or 4 pi.
 std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh);
 
-// Triangles that meet where they should not; the curved ones are taken as the flat ones between their nodes.
+// Triangles that meet where they should not, those of the next periods of a tube included; the curved ones are taken as
+// the flat ones between their nodes.
 std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh);
 
 }  // namespace tubule::surface3d

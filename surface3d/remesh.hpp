@@ -29,9 +29,9 @@ struct Remeshed {
 // many columns as nodes, any number of rows) are interpolated by P_k: an error of order k + 1.
 //
 // Instead of a mesh that is not good, a report of why there is none: mesh-lost if the old mesh folds, if the new one
-// has not the quality asked for, or is not near the old one; resolution-lost if curvature would need more than four
-// times the triangles, or if the graphs do not belong to the surface. Throws std::invalid_argument for options out of
-// range, fields of another size, and tubes of fewer than three rings.
+// has not the quality asked for, or is not near the old one, or a tube has fewer than three rings; resolution-lost if
+// curvature would need more than four times the triangles, or if the graphs do not belong to the surface. Throws
+// std::invalid_argument for options out of range and fields of another size.
 std::variant<Remeshed, StopReport> remesh(const CurvedMesh& mesh, const Eigen::MatrixXd& fields,
                                           const RemeshOptions& options);
 

@@ -372,6 +372,11 @@ TEST(Remesh, SaysWhereItCannot) {
     const StopReport twisted = refusal(sheared_ellipsoid(5, 3, 6));
     EXPECT_TRUE(twisted.reason == Stop::mesh_lost || twisted.reason == Stop::resolution_lost);
 
+    // Above and below are the same ring.
+    const StopReport flat = refusal(mapped_mesh(tube_rings(0.5, 1, 2, 8), 2, map_of(Tube{.radius = 0.5, .length = 1})));
+    EXPECT_EQ(flat.reason, Stop::mesh_lost);
+    EXPECT_NE(flat.message.find("fewer than three rings"), std::string::npos) << flat.message;
+
     const CurvedMesh mesh = sheared_ellipsoid(2, 2, 0);
     EXPECT_THROW(remesh(mesh, Eigen::MatrixXd::Zero(1, 3), {}), std::invalid_argument);
     EXPECT_THROW(remesh(mesh, {}, {.triangles = -1}), std::invalid_argument);

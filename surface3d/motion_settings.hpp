@@ -1,0 +1,29 @@
+// How fine a run in motion is, and the pairs of runs that tell their error.
+#pragma once
+
+#include "common/case/case.hpp"
+
+namespace tubule::surface3d {
+
+constexpr int least_triangles = 80;  // fewer tell nothing
+
+struct MotionSettings {
+    int elements = 0;
+    double tolerance = 0;   // of the positions in a step, relative to the root of the area
+    double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
+};
+
+// What the case gives, or what its accuracy asks for.
+MotionSettings first_settings(const Case& c);
+bool settings_given(const Case& c);
+
+// Of the coarser run of a pair.
+MotionSettings coarser(const MotionSettings& s);
+
+// After a pair whose energies differ so much and whose balance is off so much, where less is asked; all absolute.
+MotionSettings finer(const MotionSettings& s, double asked, double difference, double defect);
+
+// Whether more triangles are worth a try.
+bool can_be_finer(const MotionSettings& s);
+
+}  // namespace tubule::surface3d

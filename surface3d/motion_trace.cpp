@@ -1,0 +1,39 @@
+#include "surface3d/motion_trace.hpp"
+
+#include <algorithm>
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr const char* array_name = "restart_coarser_run";
+
+}  // namespace
+
+MotionTrace::MotionTrace(const Record& record) {
+    for (const Array& a : record.arrays)
+        if (a.name == array_name)
+            for (std::size_t i = 0; i + 1 < a.data.size(); i += 2) add(a.data[i], a.data[i + 1]);
+}
+
+double MotionTrace::operator()(double t) const {
+    const int n = static_cast<int>(points_.size());
+    const auto after =
+        std::lower_bound(points_.begin(), points_.end(), t, [](const auto& p, double x) { return p[0] < x; });
+    const int first = std::clamp(static_cast<int>(after - points_.begin()) - 2, 0, std::max(n - 4, 0));
+    double sum = 0;
+    for (int i = first; i < std::min(first + 4, n); ++i) {
+        double weight = 1;
+        for (int j = first; j < std::min(first + 4, n); ++j)
+            if (j != i) weight *= (t - points_[j][0]) / (points_[i][0] - points_[j][0]);
+        sum += weight * points_[i][1];
+    }
+    return sum;
+}
+
+Array MotionTrace::array() const {
+    Array out{array_name, {points_.size(), 2}, {}};
+    for (const auto& p : points_) out.data.insert(out.data.end(), p.begin(), p.end());
+    return out;
+}
+
+}  // namespace tubule::surface3d
