@@ -191,6 +191,17 @@ TEST(MotionGuards, StepsThatAreTooLarge) {
     EXPECT_LE(o.last("energy"), o.series("energy").front());  // the step that rose was not taken
 }
 
+TEST(MotionGuards, ThePaperSchemeIsGuardedToo) {
+    // Its explicit K limits the step to about h^2 for k42 > 0 (docs/decisions.md): .02 on 80 triangles of the unit
+    // sphere, as h = .4 and half of that between nodes.
+    const Outcome o = run_case(wavy, {"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=0.2",
+                                      "energy.k42=1", "time.end=20"});
+    EXPECT_TRUE(o.summary.stop.reason == Stop::resolution_lost || o.summary.stop.reason == Stop::mesh_lost)
+        << o.summary.stop.message;
+    EXPECT_LT(o.summary.stop.time, 20);
+    EXPECT_LE(o.last("energy"), o.series("energy").front());  // the step that was wrong was not taken
+}
+
 TEST(MotionGuards, StartsThatCannotMove) {
     // cases/surface_folded.toml, and an ellipsoid whose ends turn by far more than a mesh of so few triangles follows.
     const std::string moves = "[energy]\nk20 = 1\n[time]\nend = 1\n[discretisation]\nelements = 80\n[shape]\n";
