@@ -192,8 +192,8 @@ TEST(MotionGuards, StepsThatAreTooLarge) {
 }
 
 TEST(MotionGuards, ThePaperSchemeIsGuardedToo) {
-    // Its explicit K limits the step to about h^2 for k42 > 0 (docs/decisions.md): .02 on 80 triangles of the unit
-    // sphere, as h = .4 and half of that between nodes.
+    // Its explicit K limits the step to about h^2 for k42 > 0 (docs/surface_motion.md): far less than .2 on 80
+    // triangles of order 3.
     const Outcome o = run_case(wavy, {"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=0.2",
                                       "energy.k42=1", "time.end=20"});
     EXPECT_TRUE(o.summary.stop.reason == Stop::resolution_lost || o.summary.stop.reason == Stop::mesh_lost)
