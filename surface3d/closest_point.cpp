@@ -3,14 +3,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tubule::surface3d {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t leaf = 2;
 constexpr int most_iterations = 30;
 constexpr double converged = 1e-14;  // in xi, eta
 
@@ -50,40 +48,18 @@ double room(const Eigen::Vector2d& at, const Eigen::Vector2d& step) {
 
 }  // namespace
 
-ClosestPoint::ClosestPoint(const CurvedMesh& mesh)
-    : order_(mesh.order),
-      period_(mesh.period),
-      cell_(mesh.triangles()),
-      box_(mesh.triangles()),
-      cells_(mesh.triangles()) {
+ClosestPoint::ClosestPoint(const CurvedMesh& mesh) : order_(mesh.order), period_(mesh.period), cell_(mesh.triangles()) {
     const Eigen::MatrixXd to_bernstein = bernstein_from_nodes(order_);
     for (const auto& [i, j, m] : lattice(order_)) start_.push_back(Eigen::Vector2d(j, m) / order_);
     const int n = mesh.nodes_per_cell();
+    std::vector<BoxTree<3>::Box> boxes(mesh.triangles());
     for (int cell = 0; cell < mesh.triangles(); ++cell)
         for (int i = 0; i < n; ++i) {
             Eigen::Vector3d& b = cell_[cell][i] = Eigen::Vector3d::Zero();
             for (int a = 0; a < n; ++a) b += to_bernstein(i, a) * mesh.position(cell, a);
-            box_[cell].extend(b);
+            boxes[cell].extend(b);
         }
-    std::iota(cells_.begin(), cells_.end(), 0);
-    build(0, 0, cells_.size());
-}
-
-void ClosestPoint::build(std::size_t node, std::size_t begin, std::size_t end) {
-    if (node >= node_.size()) node_.resize(node + 1);
-    Box all;
-    for (std::size_t i = begin; i < end; ++i) all.extend(box_[cells_[i]]);
-    node_[node] = all;
-    if (end - begin <= leaf) return;
-    Eigen::Index axis;
-    all.sizes().maxCoeff(&axis);
-    const std::size_t middle = (begin + end) / 2;
-    const auto first = cells_.begin();
-    std::nth_element(first + static_cast<std::ptrdiff_t>(begin), first + static_cast<std::ptrdiff_t>(middle),
-                     first + static_cast<std::ptrdiff_t>(end),
-                     [&](int a, int b) { return box_[a].center()[axis] < box_[b].center()[axis]; });
-    build(2 * node + 1, begin, middle);
-    build(2 * node + 2, middle, end);
+    tree_ = BoxTree<3>(std::move(boxes));
 }
 
 // De Casteljau; the last levels but one and two hold the derivatives.
@@ -168,37 +144,14 @@ void ClosestPoint::look_at(int cell, const Query& query, MeshPoint& best) const 
     accept(cell, at, query, best);
 }
 
-void ClosestPoint::descend(std::size_t node, std::size_t begin, std::size_t end, const Query& query,
-                           MeshPoint& best) const {
-    const auto near = [&](const Box& box) {
-        return box.squaredExteriorDistance(query.x) < best.distance * best.distance;
-    };
-    if (end - begin <= leaf) {
-        for (std::size_t i = begin; i < end; ++i)
-            if (near(box_[cells_[i]])) look_at(cells_[i], query, best);
-        return;
-    }
-    const std::size_t middle = (begin + end) / 2, left = 2 * node + 1, right = left + 1;
-    const auto distance = [&](std::size_t child) { return (node_[child].center() - query.x).squaredNorm(); };
-    const bool left_first = distance(left) <= distance(right);
-    if (left_first && near(node_[left])) descend(left, begin, middle, query, best);
-    if (near(node_[right])) descend(right, middle, end, query, best);
-    if (!left_first && near(node_[left])) descend(left, begin, middle, query, best);
-}
-
 MeshPoint ClosestPoint::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const {
     MeshPoint best;
-    if (period_ == 0) {
-        descend(0, 0, cells_.size(), {x, normal, 0}, best);
-        return best;
-    }
-    // The mesh is a period long or a little more: of its images at most the next ones can be nearer.
-    const int home = static_cast<int>(std::round((x.z() - node_[0].center().z()) / period_));
-    for (const int periods : {home, home - 1, home + 1}) {
-        const Query query{x - periods * period_ * Eigen::Vector3d::UnitZ(), normal, periods};
-        if (node_[0].squaredExteriorDistance(query.x) < best.distance * best.distance)
-            descend(0, 0, cells_.size(), query, best);
-    }
+    double square = std::numeric_limits<double>::infinity();
+    tree_.nearest(x, period_, square, [&](std::size_t cell, const Vector3d& image) {
+        const int periods = period_ > 0 ? static_cast<int>(std::round((x.z() - image.z()) / period_)) : 0;
+        look_at(static_cast<int>(cell), {image, normal, periods}, best);
+        square = best.distance * best.distance;
+    });
     return best;
 }
 

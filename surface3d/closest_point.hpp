@@ -1,11 +1,12 @@
 // The point of a curved mesh that is nearest to a point of space.
 #pragma once
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <array>
 #include <limits>
 #include <vector>
 
+#include "surface3d/box_tree.hpp"
 #include "surface3d/curved_mesh.hpp"
 #include "surface3d/reference_triangle.hpp"
 
@@ -34,7 +35,6 @@ private:
     // Bernstein coefficients, that of l0^i l1^j l2^m at number (j+m)(j+m+1)/2 + m; l0 = 1 - xi - eta, l1 = xi, l2 =
     // eta. Their convex hull holds the cell.
     using Coefficients = std::array<Eigen::Vector3d, max_cell_nodes>;
-    using Box = Eigen::AlignedBox3d;
     struct Point {
         Eigen::Vector3d x, u, v, uu, uv, vv;  // position and derivatives
     };
@@ -47,16 +47,12 @@ private:
     void look_at(int cell, const Query& query, MeshPoint& best) const;
     Eigen::Vector2d approach(int cell, Eigen::Vector2d at, const Eigen::Vector2d* line, const Eigen::Vector3d& x) const;
     void accept(int cell, const Eigen::Vector2d& at, const Query& query, MeshPoint& best) const;
-    void build(std::size_t node, std::size_t begin, std::size_t end);
-    void descend(std::size_t node, std::size_t begin, std::size_t end, const Query& query, MeshPoint& best) const;
 
     int order_;
     double period_;
     std::vector<Coefficients> cell_;
     std::vector<Eigen::Vector2d> start_;  // (xi, eta) of the nodes
-    // Halves of halves of the cells: node n has the children 2n+1 and 2n+2.
-    std::vector<Box> box_, node_;
-    std::vector<int> cells_;
+    BoxTree<3> tree_;
 };
 
 }  // namespace tubule::surface3d

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "surface3d/box_tree.hpp"
 #include "surface3d/import_check.hpp"
 
 namespace tubule::surface3d {
@@ -101,79 +101,21 @@ bool meet(const TriangleMesh& mesh, std::array<int, 3> a, std::array<int, 3> b) 
     return false;
 }
 
-struct Box {
-    Vector3d low = Vector3d::Constant(HUGE_VAL), high = Vector3d::Constant(-HUGE_VAL);
-    void add(const Box& other) { low = low.cwiseMin(other.low), high = high.cwiseMax(other.high); }
-    bool meets(const Box& other) const {
-        return (low.array() <= other.high.array()).all() && (other.low.array() <= high.array()).all();
-    }
-};
-
-// Boxes over halves of halves of the triangles: node n has the children 2n+1 and 2n+2.
-class BoxTree {
-public:
-    explicit BoxTree(const TriangleMesh& mesh) : order_(mesh.triangles.size()), box_(mesh.triangles.size()) {
-        std::iota(order_.begin(), order_.end(), 0);
-        for (std::size_t t = 0; t < box_.size(); ++t) {
-            for (const int v : mesh.triangles[t]) box_[t].add({mesh.points[v], mesh.points[v]});
-        }
-        build(0, 0, order_.size());
-    }
-
-    const Box& box(std::size_t triangle) const { return box_[triangle]; }
-
-    // Calls visit(triangle) for each whose box meets `box`.
-    template <class Visit>
-    void visit(const Box& box, const Visit& visit) const {
-        descend(0, 0, order_.size(), box, visit);
-    }
-
-private:
-    static constexpr std::size_t leaf = 4;
-
-    void build(std::size_t node, std::size_t begin, std::size_t end) {
-        if (node >= node_.size()) node_.resize(node + 1);
-        Box all;
-        for (std::size_t i = begin; i < end; ++i) all.add(box_[order_[i]]);
-        node_[node] = all;
-        if (end - begin <= leaf) return;
-        Eigen::Index axis;
-        (all.high - all.low).maxCoeff(&axis);
-        const std::size_t middle = (begin + end) / 2;
-        const auto centre = [&](std::size_t t) { return box_[t].low[axis] + box_[t].high[axis]; };
-        std::nth_element(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(middle),
-                         order_.begin() + std::ptrdiff_t(end),
-                         [&](std::size_t a, std::size_t b) { return centre(a) < centre(b); });
-        build(2 * node + 1, begin, middle);
-        build(2 * node + 2, middle, end);
-    }
-
-    template <class Visit>
-    void descend(std::size_t node, std::size_t begin, std::size_t end, const Box& box, const Visit& visit) const {
-        if (!node_[node].meets(box)) return;
-        if (end - begin > leaf) {
-            const std::size_t middle = (begin + end) / 2;
-            descend(2 * node + 1, begin, middle, box, visit);
-            descend(2 * node + 2, middle, end, box, visit);
-            return;
-        }
-        for (std::size_t i = begin; i < end; ++i) {
-            if (box_[order_[i]].meets(box)) visit(order_[i]);
-        }
-    }
-
-    std::vector<std::size_t> order_;
-    std::vector<Box> box_, node_;
-};
+BoxTree<3> boxes(const TriangleMesh& mesh) {
+    std::vector<BoxTree<3>::Box> out(mesh.triangles.size());
+    for (std::size_t t = 0; t < out.size(); ++t)
+        for (const int v : mesh.triangles[t]) out[t].extend(mesh.points[v]);
+    return BoxTree<3>(std::move(out));
+}
 
 }  // namespace
 
 std::optional<std::pair<std::size_t, std::size_t>> first_intersection(const TriangleMesh& mesh) {
-    const BoxTree tree(mesh);
+    const BoxTree<3> tree = boxes(mesh);
     const std::size_t none = mesh.triangles.size();
     for (std::size_t t = 0; t < none; ++t) {
         std::size_t first = none;
-        tree.visit(tree.box(t), [&](std::size_t s) {
+        tree.meeting(tree.item(t), [&](std::size_t s) {
             if (s > t && s < first && meet(mesh, mesh.triangles[t], mesh.triangles[s])) first = s;
         });
         if (first < none) return std::pair{t, first};

@@ -73,13 +73,13 @@ RevolutionSurface::CurvePoint RevolutionSurface::evaluate(double s) const {
 }
 
 void RevolutionSurface::build(const std::vector<double>& breaks) {
-    std::vector<BoxTree<2>::Box> boxes;
+    std::vector<surface3d::BoxTree<2>::Box> boxes;
     for (std::size_t i = 0; i + 1 < breaks.size(); ++i) add_part(breaks[i], breaks[i + 1], 0, boxes);
     breaks_.push_back(1);
-    tree_ = BoxTree<2>(std::move(boxes));
+    tree_ = surface3d::BoxTree<2>(std::move(boxes));
 }
 
-void RevolutionSurface::add_part(double from, double to, int depth, std::vector<BoxTree<2>::Box>& boxes) {
+void RevolutionSurface::add_part(double from, double to, int depth, std::vector<surface3d::BoxTree<2>::Box>& boxes) {
     double second = 0;
     for (int i = 0; i <= looks; ++i) second = std::max(second, evaluate(from + (to - from) * i / looks).dd.norm());
     const double bulge = between_looks * second * (to - from) * (to - from) / 8;
@@ -90,7 +90,8 @@ void RevolutionSurface::add_part(double from, double to, int depth, std::vector<
         return;
     }
     breaks_.push_back(from), bulge_.push_back(bulge);
-    BoxTree<2>::Box box(a.cwiseMin(b) - Vector2d::Constant(bulge), a.cwiseMax(b) + Vector2d::Constant(bulge));
+    surface3d::BoxTree<2>::Box box(a.cwiseMin(b) - Vector2d::Constant(bulge),
+                                   a.cwiseMax(b) + Vector2d::Constant(bulge));
     boxes.push_back(box);
 }
 

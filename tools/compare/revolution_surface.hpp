@@ -5,7 +5,7 @@
 
 #include "common/shapes/profile_curve.hpp"
 #include "common/shapes/revolution.hpp"
-#include "tools/compare/box_tree.hpp"
+#include "surface3d/box_tree.hpp"
 #include "tools/compare/surface.hpp"
 
 namespace tubule::compare {
@@ -34,7 +34,7 @@ private:
 
     CurvePoint evaluate(double s) const;
     void build(const std::vector<double>& breaks);
-    void add_part(double from, double to, int depth, std::vector<BoxTree<2>::Box>& boxes);
+    void add_part(double from, double to, int depth, std::vector<surface3d::BoxTree<2>::Box>& boxes);
     void look_at(double from, double to, const Eigen::Vector2d& x, Nearest& nearest) const;
     std::vector<double> panels(double width) const;
 
@@ -42,7 +42,7 @@ private:
     double period_;
     std::vector<double> breaks_;  // of the parts, ascending
     std::vector<double> bulge_;   // how far each part is off its chord, at most
-    BoxTree<2> tree_;
+    surface3d::BoxTree<2> tree_;
 };
 
 }  // namespace tubule::compare

@@ -125,7 +125,7 @@ TriangleSurface::TriangleSurface(const SurfaceCells& cells, const std::vector<do
         throw std::invalid_argument("the points of the surface do not fit its triangles");
     to_bernstein_ = bernstein_from_nodes(order_, lattice);
     for (const auto& [i, j, l] : lattice) node_place_.emplace_back(double(j) / order_, double(l) / order_);
-    std::vector<BoxTree<3>::Box> boxes;
+    std::vector<surface3d::BoxTree<3>::Box> boxes;
     cell_.resize(cells.cells.size() / width);
     for (std::size_t cell = 0; cell < cell_.size(); ++cell) {
         Eigen::MatrixX3d nodes(width, 3);
@@ -140,11 +140,11 @@ TriangleSurface::TriangleSurface(const SurfaceCells& cells, const std::vector<do
         grain_ += (nodes.row(1) - nodes.row(0)).cross(nodes.row(2) - nodes.row(0)).norm() / 2;
     }
     grain_ = std::sqrt(grain_ / static_cast<double>(cell_.size()));
-    tree_ = BoxTree<3>(std::move(boxes));
+    tree_ = surface3d::BoxTree<3>(std::move(boxes));
 }
 
 void TriangleSurface::add_parts(int cell, const std::array<Vector2d, 3>& corner, int depth,
-                                std::vector<BoxTree<3>::Box>& boxes) {
+                                std::vector<surface3d::BoxTree<3>::Box>& boxes) {
     const auto place = [&](const Vector2d& at) {
         return Vector2d(corner[0] + at[0] * (corner[1] - corner[0]) + at[1] * (corner[2] - corner[0]));
     };
@@ -154,7 +154,7 @@ void TriangleSurface::add_parts(int cell, const std::array<Vector2d, 3>& corner,
     const Eigen::MatrixX3d control = to_bernstein_ * nodes;
     Part part{cell, corner, {}, 0};
     for (int c = 0; c < 3; ++c) part.x[c] = nodes.row(c).transpose();
-    BoxTree<3>::Box box;
+    surface3d::BoxTree<3>::Box box;
     for (int a = 0; a <= order_; ++a)
         for (int b = 0; b <= order_ - a; ++b) {
             const Vector3d point = control.row(number_of(order_, a, b)).transpose();

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "common/result/result.hpp"
-#include "tools/compare/box_tree.hpp"
+#include "surface3d/box_tree.hpp"
 #include "tools/compare/surface.hpp"
 
 namespace tubule::compare {
@@ -41,7 +41,7 @@ private:
     struct Nearest;
 
     void add_parts(int cell, const std::array<Eigen::Vector2d, 3>& corner, int depth,
-                   std::vector<BoxTree<3>::Box>& boxes);
+                   std::vector<surface3d::BoxTree<3>::Box>& boxes);
     void look_at(const Part& part, const Eigen::Vector3d& x, Nearest& nearest) const;
     void look_inside(int cell, Eigen::Vector2d at, const Eigen::Vector3d& x, Nearest& nearest) const;
     void look_along(int cell, int edge, const Eigen::Vector2d& from, const Eigen::Vector3d& x, Nearest& nearest) const;
@@ -52,7 +52,7 @@ private:
     Eigen::MatrixXd to_bernstein_;             // from nodes in VTK's order
     std::vector<Eigen::Vector2d> node_place_;  // of those nodes
     std::vector<Part> part_;
-    BoxTree<3> tree_;
+    surface3d::BoxTree<3> tree_;
 };
 
 }  // namespace tubule::compare

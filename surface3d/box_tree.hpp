@@ -1,4 +1,4 @@
-// Boxes over halves of halves of items, to find those nearest to a point.
+// Boxes over halves of halves of items, to find those nearest to a point or those that meet a box.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-namespace tubule::compare {
+namespace tubule::surface3d {
 
 // In D dimensions. A surface that is periodic in its last coordinate stands for all its images.
 template <int D>
@@ -23,8 +23,17 @@ public:
         build(0, 0, order_.size());
     }
 
+    const Box& item(std::size_t i) const { return item_[i]; }
+
+    // Calls visit(item) for those whose boxes meet `box`.
+    template <class Visit>
+    void meeting(const Box& box, const Visit& visit) const {
+        descend(0, 0, order_.size(), box, visit);
+    }
+
     // Calls visit(item, x) for the items whose boxes are nearer than the square root of `best`, which visit may lower;
-    // the nearer ones early. With period > 0 also visit(item, x moved by whole periods), which sees the images.
+    // the nearer ones early. With period > 0 also visit(item, x moved by whole periods), which sees the images: the
+    // next ones, and more while `best` is finite and farther than they are.
     template <class Visit>
     void nearest(Point x, double period, const double& best, const Visit& visit) const {
         double& z = x[D - 1];
@@ -39,7 +48,7 @@ public:
                 within = true;
                 descend(0, 0, order_.size(), x, best, visit);
             }
-            if (!within) return;
+            if (!within || (step > 0 && std::isinf(best))) return;
         }
     }
 
@@ -64,6 +73,19 @@ private:
     }
 
     template <class Visit>
+    void descend(std::size_t node, std::size_t begin, std::size_t end, const Box& box, const Visit& visit) const {
+        if (!node_[node].intersects(box)) return;
+        if (end - begin <= leaf) {
+            for (std::size_t i = begin; i < end; ++i)
+                if (item_[order_[i]].intersects(box)) visit(order_[i]);
+            return;
+        }
+        const std::size_t middle = (begin + end) / 2;
+        descend(2 * node + 1, begin, middle, box, visit);
+        descend(2 * node + 2, middle, end, box, visit);
+    }
+
+    template <class Visit>
     void descend(std::size_t node, std::size_t begin, std::size_t end, const Point& x, const double& best,
                  const Visit& visit) const {
         if (end - begin <= leaf) {
@@ -84,4 +106,4 @@ private:
     std::vector<std::size_t> order_;
 };
 
-}  // namespace tubule::compare
+}  // namespace tubule::surface3d
