@@ -60,7 +60,7 @@ double MotionAttempt::length() const {
 
 void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     MotionLaw law = motion_law(case_.model);
-    if (time_scheme(case_) == Scheme::paper) {
+    if (case_.surface.scheme == Scheme::paper) {
         law.flows = true;  // it has all components of u in all models
         paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);
     }
@@ -68,7 +68,7 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
                                 .least_variation = memory_.least_variation,
-                                .scheme = time_scheme(case_)};
+                                .scheme = case_.surface.scheme};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
     if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
     summary.elements = mesh.triangles();

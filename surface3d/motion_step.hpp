@@ -32,7 +32,7 @@ struct MotionState {
     // with scheme alpha .44 of the step before.
     Eigen::VectorXd p;
     double lambda = 0;
-    Extent missed;  // what the linear system of a step is expected to miss of area and volume
+    Extent missed;  // of scheme alpha: what the linear system of a step is expected to miss of area and volume
 };
 
 // With so many components of the velocity at a node, and so many pressures.
@@ -86,6 +86,7 @@ private:
     static Formula alpha(const MotionState& from, double tau);
     Extent wanted_rate(const MotionState& from, const Formula& f, double tau, const CurvedMesh& at) const;
     Eigen::VectorXd solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda);
+    Extent expected_miss(const MotionState& from, const MotionState& to) const;
     void finish(const MotionState& from, const Formula& f, MotionState& to) const;
     void make_symmetric(const StepBase& base);
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;

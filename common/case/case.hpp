@@ -73,7 +73,7 @@ struct SurfaceDiscretisation {
     Recovery recovery = Recovery::patch;
     double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none. Of its scheme, too
     // Of a motion:
-    std::optional<Scheme> scheme;          // time_scheme() tells the default
+    Scheme scheme = Scheme::bdf2;
     std::optional<double> step;            // the same for all steps; switches their control off
     std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
     std::optional<double> relaxation;      // time in which the mesh becomes even
@@ -138,12 +138,6 @@ struct Case {
 // Of curved triangles: fourth order follows motion better, third is enough to look at a shape (docs/decisions.md).
 inline int element_order(const Case& c) {
     return c.surface.order.value_or(c.moves() ? 4 : 3);
-}
-
-// In time: what has inertia makes waves, which should keep their energy; what has none should come to rest at once
-// (docs/decisions.md).
-inline Scheme time_scheme(const Case& c) {
-    return c.surface.scheme.value_or(c.model.kind == ModelKind::fluid ? Scheme::alpha : Scheme::bdf2);
 }
 
 }  // namespace tubule

@@ -190,7 +190,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
         k.absent("recovery", "must be absent: a surface that moves has its own curvatures");
         k.choice(
             "scheme", d.scheme,
-            {{"alpha", Scheme::alpha}, {"bdf2", Scheme::bdf2}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
+            {{"bdf2", Scheme::bdf2}, {"alpha", Scheme::alpha}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
         k.number("step", d.step, {.above = 0});
         if (d.scheme == Scheme::paper) {
             k.number("smoothing", d.smoothing, {.from = 0});

@@ -23,8 +23,8 @@ enum class MeshKind {
 
 // How a surface is moved.
 enum class Scheme {
-    alpha,  // H and K implicit, the generalised alpha method of second order, which hardly damps waves
-    bdf2,   // the same, backward differences of second order
+    bdf2,   // H and K implicit, backward differences of second order
+    alpha,  // the same, the generalised alpha method, which hardly damps waves
     euler,  // the same of first order
     paper   // the paper's: Euler steps with K explicit and smoothed
 };

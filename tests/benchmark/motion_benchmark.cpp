@@ -1,0 +1,92 @@
+// A step of a moving surface and its parts: the paper's perturbed sphere as a fluid, k42 = 0.12, on finer and finer
+// meshes. `solve` is factors and GMRES with the border; `lu` the same by UMFPACK's LU factors. Milliseconds of wall
+// time; threads by OMP_NUM_THREADS, with OPENBLAS_NUM_THREADS=1.
+#include <benchmark/benchmark.h>
+#include <fmt/core.h>
+
+#include <functional>
+
+#include "common/solve/bordered.hpp"
+#include "surface3d/base_meshes.hpp"
+#include "surface3d/motion_measures.hpp"
+#include "tests/surface3d/errors.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+const Bending energy{.k = {0.125, 0, 0.12}, .H0 = 0};
+const MotionLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}});
+constexpr double tau = 1e-3;
+
+MotionControl control_of(const CurvedMesh& mesh) {
+    const Extent e = extent(SurfaceSpace(mesh), mesh);
+    return {.area = e.area, .volume = e.volume, .scheme = Scheme::alpha};
+}
+
+// The surface after a few steps, and the system of the next one.
+struct Scene {
+    CurvedMesh mesh;
+    MotionStepper stepper;
+    MotionState state;
+    MotionFields fields;
+    StepBase base;
+    StepSystem system;
+
+    Scene(int n, int order)
+        : mesh(mapped_mesh(icosphere(n), order, map_of(perturbed_sphere()))),
+          stepper(mesh, fluid, energy, control_of(mesh)),
+          state(stepper.start(mesh)) {
+        for (int i = 0; i < 3; ++i) state = stepper.step(state, tau).state;
+        mesh = stepper.mesh(state.X);
+        fields = stepper.fields(mesh);
+        base = {&mesh, fields, state.X - state.X_past, state.w, state.u, state.u, tau};
+        assemble(stepper.space(), stepper.unknowns(), fluid, energy, base, system);
+    }
+};
+
+using Prepare = std::function<std::function<void()>(Scene&)>;
+
+void add(const char* name, const Prepare& prepare) {
+    for (const int k : {3, 4})
+        for (const int n : {4, 6, 8})
+            benchmark::RegisterBenchmark(fmt::format("{}/k{}/T{}", name, k, 20 * n * n).c_str(),
+                                         [=](benchmark::State& state) {
+                                             Scene scene(n, k);
+                                             const auto work = prepare(scene);
+                                             for (auto _ : state) work();
+                                         })
+                ->UseRealTime()
+                ->Unit(benchmark::kMillisecond);
+}
+
+void add_all() {
+    add("step", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.stepper.step(s.state, tau)); }; });
+    add("fields", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.stepper.fields(s.mesh)); }; });
+    add("assemble", [](Scene& s) {
+        return [&s] { assemble(s.stepper.space(), s.stepper.unknowns(), fluid, energy, s.base, s.system); };
+    });
+    add("solve", [](Scene& s) {
+        const MotionUnknowns& u = s.stepper.unknowns();
+        auto solver = std::make_shared<BorderedSolver>(u.pattern(), u.node_of_unknown());
+        return [&s, solver] { solver->solve(s.system.A, s.system.b, s.system.flux, Eigen::VectorXd::Zero(1)); };
+    });
+    add("lu", [](Scene& s) {
+        const MotionUnknowns& u = s.stepper.unknowns();
+        auto solver = std::make_shared<SparseLuLarge>(nested_dissection(u.pattern(), u.node_of_unknown()));
+        return [&s, solver] {
+            solver->factor(s.system.A);
+            benchmark::DoNotOptimize(solver->solve(s.system.b, 1));
+        };
+    });
+    add("measure", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(measure(s.stepper, s.state, energy)); }; });
+}
+
+}  // namespace
+}  // namespace tubule::surface3d
+
+int main(int argc, char** argv) {
+    benchmark::Initialize(&argc, argv);
+    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+    tubule::surface3d::add_all();
+    benchmark::RunSpecifiedBenchmarks();
+}
