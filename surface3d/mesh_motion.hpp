@@ -1,28 +1,31 @@
 // How the nodes move: with the surface in the direction of its normal, along it so that the triangles stay good.
 #pragma once
 
-#include "common/solve/bordered.hpp"
-#include "surface3d/field_unknowns.hpp"
+#include "common/solve/sparse.hpp"
+#include "surface3d/motion_fields.hpp"
+#include "surface3d/projection.hpp"
+#include "surface3d/surface_space.hpp"
 
 namespace tubule::surface3d {
 
-// Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to one of equal
-// triangles: (grad w, grad Z) + (m nu, Z) = -(grad X, grad Z)/(relaxation + te), with a multiplier m. In the limit of
-// no relaxation time this is the motion of Barrett, Garcke and Nuernberg, whose positions do not converge with the
-// step.
+// Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to a good one:
+// (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/(relaxation + te), with a multiplier m. With a = 1, in the limit
+// of no relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose positions do not converge with the
+// step. To follow the curvature, a is what a triangle has of INT |B|^2, bounded, over the mean of all: triangles with
+// more than their share contract.
 class MeshMotion {
 public:
-    explicit MeshMotion(const CurvedMesh& mesh);
+    explicit MeshMotion(bool follows_curvature) : follows_curvature_(follows_curvature) {}
 
-    // `mesh`: where the matrices are taken; `from`: X of the right-hand side; `normal`: nodal; `flux`: (u.nu, phi)
-    // of every node. SolveError.
+    // `mesh`: where the matrices are taken, which `fields` and `project` belong to; `from`: X of the right-hand side;
+    // `flux`: (u.nu, phi) of every node. SolveError.
     VectorField velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedMesh& from,
-                         const VectorField& normal, const Eigen::VectorXd& flux, double relaxation, double te);
+                         const MotionFields& fields, const Projection& project, const Eigen::VectorXd& flux,
+                         double relaxation, double te);
 
 private:
-    FieldUnknowns unknowns_;
-    Eigen::SparseMatrix<double> A_;
-    BorderedSolver solver_;
+    bool follows_curvature_;
+    SparseCholesky laplacian_;
 };
 
 }  // namespace tubule::surface3d

@@ -67,6 +67,7 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     const MotionControl control{.area = memory_.area,
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
+                                .follow_curvature = case_.surface.follow_curvature,
                                 .least_variation = memory_.least_variation,
                                 .scheme = case_.surface.scheme};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);

@@ -63,7 +63,7 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
       bending_(bending),
       control_(control),
       unknowns_(mesh, law, bending),
-      mesh_motion_(mesh),
+      mesh_motion_(control.follow_curvature),
       solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {
     if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
     holds_rigid_motions_ = true;
@@ -349,7 +349,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
-    to.w = mesh_motion_.velocity(space_, at, mesh(f.Xbar), base.fields.normal, flux(to.u, at, base.fields),
+    to.w = mesh_motion_.velocity(space_, at, mesh(f.Xbar), base.fields, *projection_, flux(to.u, at, base.fields),
                                  control_.relaxation, f.te);
     to.X = f.Xbar + f.te * to.w;
     finish(from, f, to);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "common/case/surface_choices.hpp"
+#include "common/solve/bordered.hpp"
 #include "surface3d/curved_mesh.hpp"
 #include "surface3d/mesh_motion.hpp"
 #include "surface3d/motion_forms.hpp"
@@ -42,6 +43,7 @@ MotionState at_rest(const CurvedMesh& mesh, int components, int pressures);
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier
     double relaxation = 0.1;             // time in which the mesh becomes even
+    bool follow_curvature = false;       // or one whose triangles are small where the surface is curved
     // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition as far as the mesh can tell: lambda is
     // left out, as the pressure stands for it, and the area alone is kept to rounding.
     double least_variation = 1e-8;

@@ -77,6 +77,7 @@ struct SurfaceDiscretisation {
     std::optional<double> step;            // the same for all steps; switches their control off
     std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
     std::optional<double> relaxation;      // time in which the mesh becomes even
+    bool follow_curvature = false;         // or finer where the surface is more curved
 };
 
 struct TimeSpan {

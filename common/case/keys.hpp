@@ -194,13 +194,14 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
         k.number("step", d.step, {.above = 0});
         if (d.scheme == Scheme::paper) {
             k.number("smoothing", d.smoothing, {.from = 0});
-            for (const char* key : {"time_tolerance", "relaxation"})
+            for (const char* key : {"time_tolerance", "relaxation", "follow_curvature"})
                 k.absent(key, "must be absent: scheme \"paper\" controls neither its step nor its mesh");
             return;
         }
         k.absent("smoothing", "must be absent: it belongs to scheme \"paper\"");
         k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
         k.number("relaxation", d.relaxation, {.above = 0});
+        k.flag("follow_curvature", d.follow_curvature);
         return;
     }
     k.choice("recovery", d.recovery,
@@ -212,7 +213,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
               {"patch", Recovery::patch},
               {"exact", Recovery::exact}});
     k.number("smoothing", d.smoothing, {.from = 0});
-    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation"})
+    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation", "follow_curvature"})
         k.absent(key, "must be absent: it belongs to a motion, which has a table [time]");
 }
 
