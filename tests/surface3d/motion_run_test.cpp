@@ -238,9 +238,11 @@ TEST(MotionGuards, TimeLimit) {
 }
 
 TEST(MotionRun, ResumedRunsEndAsUndisturbedOnes) {
-    for (const std::string kind : {"gradient-flow", "fluid"}) {
-        SCOPED_TRACE(kind);
-        const std::vector<std::string> sets{"model.kind=" + kind, "time.output=[0.02]"};
+    for (const auto& [kind, scheme] :
+         {std::pair<std::string, std::string>{"gradient-flow", "bdf2"}, {"fluid", "bdf2"}, {"fluid", "alpha"}}) {
+        SCOPED_TRACE(kind + ", " + scheme);
+        const std::vector<std::string> sets{"model.kind=" + kind, "discretisation.scheme=" + scheme,
+                                            "time.output=[0.02]"};
         const Outcome whole = run_case(wavy, sets);
         Outcome first = begin(wavy, sets);
         first.watch.most_rows = whole.watch.rows.size() / 2;

@@ -138,6 +138,32 @@ TEST(TubeWaves, FollowTheAmplitudeEquations) {
 
 const Sphere wavy{.radius = 1, .modes = {{0.2, 2, 1}, {0.1, 3, 2}}};
 
+// Bending and kinetic energy at the end, in steps of one size; area and volume are kept.
+Eigen::Vector2d fluid_at(double end, int steps, Scheme scheme) {
+    MotionControl control;
+    control.scheme = scheme;
+    Motion motion(mesh_of(wavy, icosphere(3), 4), {.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}},
+                  {.k = {0.125, 0, 0.05}, .H0 = 0}, control);
+    const Extent start = extent(motion.stepper.space(), motion.mesh());
+    motion.until(end, steps);
+    const MotionMeasures m = motion.measures();
+    EXPECT_NEAR(m.bending.area / start.area, 1, 1e-8);
+    EXPECT_NEAR(m.bending.volume / start.volume, 1, 1e-8);
+    return {m.bending.energy, m.kinetic};
+}
+
+TEST(Models, FluidsByAlphaConvergeWithSecondOrder) {
+    // Against itself on half the steps, and against backward differences, which have the same limit.
+    const auto at = [](int steps, Scheme scheme) { return fluid_at(0.2, steps, scheme); };
+    const Eigen::Vector2d coarse = at(6, Scheme::alpha), fine = at(12, Scheme::alpha), finest = at(24, Scheme::alpha);
+    const Eigen::Vector2d other = at(24, Scheme::bdf2);
+    for (int i : {0, 1}) {
+        EXPECT_GT((coarse[i] - fine[i]) / (fine[i] - finest[i]), 3) << i;
+        EXPECT_LT(std::abs(fine[i] - finest[i]), 5e-5) << i;
+        EXPECT_NEAR(finest[i], other[i], 5e-5) << i;
+    }
+}
+
 TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
     // maths 3: with u = 0 the fluid's equation for d_t u is the overdamped one for u. One has Taylor-Hood elements and
     // the other a scalar: integrals against a smooth field agree the better the finer the mesh (the force itself, as a
