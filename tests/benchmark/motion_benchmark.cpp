@@ -1,12 +1,12 @@
 // A step of a moving surface and its parts: the paper's perturbed sphere as a fluid, k42 = 0.12, on finer and finer
-// meshes. `solve` is factors and GMRES with the border; `lu` the same by UMFPACK's LU factors. Milliseconds of wall
-// time; threads by OMP_NUM_THREADS, with OPENBLAS_NUM_THREADS=1.
+// meshes. `lu` is what its system would take with UMFPACK's LU factors, which stand in where our own fail (those are in
+// `step`). Milliseconds of wall time; threads by OMP_NUM_THREADS, with OPENBLAS_NUM_THREADS=1.
 #include <benchmark/benchmark.h>
 #include <fmt/core.h>
 
 #include <functional>
 
-#include "common/solve/bordered.hpp"
+#include "common/solve/sparse.hpp"
 #include "surface3d/base_meshes.hpp"
 #include "surface3d/motion_measures.hpp"
 #include "tests/surface3d/errors.hpp"
@@ -64,11 +64,6 @@ void add_all() {
     add("fields", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.stepper.fields(s.mesh)); }; });
     add("assemble", [](Scene& s) {
         return [&s] { assemble(s.stepper.space(), s.stepper.unknowns(), fluid, energy, s.base, s.system); };
-    });
-    add("solve", [](Scene& s) {
-        const MotionUnknowns& u = s.stepper.unknowns();
-        auto solver = std::make_shared<BorderedSolver>(u.pattern(), u.node_of_unknown());
-        return [&s, solver] { solver->solve(s.system.A, s.system.b, s.system.flux, Eigen::VectorXd::Zero(1)); };
     });
     add("lu", [](Scene& s) {
         const MotionUnknowns& u = s.stepper.unknowns();
