@@ -18,22 +18,13 @@ constexpr double tolerance = 0.01;
 
 }  // namespace
 
-std::optional<StopReport> find_fold(const SurfaceSpace& space, const CurvedMesh& mesh) {
-    const Tabulation& table = space.tabulation();
-    const Tabulation centre(space.order(), {{1.0 / 3, 1.0 / 3, 0.5}});
-    for (int cell = 0; cell < space.cells(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        const Eigen::Vector3d normal = tangent_point(X, centre, 0).normal;
-        for (int q = 0; q < table.points(); ++q) {
-            const SurfacePoint<double> p = tangent_point(X, table, q);
-            if (p.normal.dot(normal) > 0) continue;  // also false for a cell without area
-            return StopReport{
-                Stop::mesh_lost, 0,
-                fmt::format("triangle {} folds at ({:.6g}, {:.6g}, {:.6g})", cell, p.x[0], p.x[1], p.x[2]),
-                "use more elements, or discretisation.mesh = \"graded\""};
-        }
-    }
-    return std::nullopt;
+std::optional<StopReport> find_fold(const MeshQuality& quality) {
+    if (quality.worst > 0) return std::nullopt;
+    const Eigen::Vector3d& x = quality.where;
+    return StopReport{
+        Stop::mesh_lost, 0,
+        fmt::format("triangle {} folds at ({:.6g}, {:.6g}, {:.6g})", quality.worst_cell, x[0], x[1], x[2]),
+        "use more elements, or discretisation.mesh = \"graded\""};
 }
 
 std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh) {

@@ -5,11 +5,12 @@
 
 #include "common/solve/stop.hpp"
 #include "surface3d/bending_force.hpp"
+#include "surface3d/mesh_quality.hpp"
 
 namespace tubule::surface3d {
 
-// A cell that folds: at a quadrature point its normal is turned by 90 degrees or more from that at its centre.
-std::optional<StopReport> find_fold(const SurfaceSpace& space, const CurvedMesh& mesh);
+// A cell that folds (mesh_quality).
+std::optional<StopReport> find_fold(const MeshQuality& quality);
 
 // Closed surfaces have INT H^2 >= 16 pi (Willmore), and INT K is 2 pi times the Euler characteristic (Gauss-Bonnet):
 // a report where one of them is missed by more than 1 % of 16 pi or 4 pi.

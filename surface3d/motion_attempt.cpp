@@ -79,7 +79,7 @@ void MotionAttempt::begin() {
     const StartMesh start = start_mesh(case_, memory_.elements);
     summary.warnings = start.notes;
     const SurfaceSpace space(start.mesh);
-    if (const auto fold = find_fold(space, start.mesh)) {
+    if (const auto fold = find_fold(mesh_quality(start.mesh))) {
         early_ = *fold;
         return;
     }
@@ -152,7 +152,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
                             "ask for less accuracy, or use more elements"}};
         const CurvedMesh mesh = stepper_->mesh(next.state.X);
-        if (auto fold = find_fold(stepper_->space(), mesh)) {
+        if (auto fold = find_fold(mesh_quality(mesh))) {
             fold->time = t;
             return Refusal{0.25, *fold};
         }
@@ -187,7 +187,7 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 
 bool MotionAttempt::wants_new_mesh() const {
     if (paper_ || steps_ < mesh_since_ + steps_between_meshes) return false;
-    return now_.quality < quality_to_remesh || (now_.neck && now_.turn > turn_to_remesh);
+    return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > turn_to_remesh);
 }
 
 // The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.
@@ -199,7 +199,7 @@ void MotionAttempt::make_new_mesh() {
     const int n = static_cast<int>(state_.X.cols()), d = law.components();
     const auto found = remesh(stepper_->mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
-    if (!better || better->quality.worst < now_.quality) return;
+    if (!better || better->quality.worst < now_.quality.worst) return;
     const double time = state_.time, energy = now_.bending.energy, before = total();
     make_stepper(better->mesh);
     ++meshes_;

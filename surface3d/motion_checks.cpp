@@ -36,16 +36,17 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
                           "lower accuracy.r_min to follow the neck further"};
-    if (m.turn > sharpest_turn)
-        return StopReport{m.neck ? Stop::pinch_off : Stop::resolution_lost, time,
+    if (m.turn.angle > sharpest_turn)
+        return StopReport{m.turn.saddle ? Stop::pinch_off : Stop::resolution_lost, time,
                           fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
-                                      m.neck ? "a neck closes" : "the surface is too sharp", where(m.sharpest), m.turn),
-                          m.neck ? "more elements follow the neck further" : "use more elements"};
-    if (!(m.quality > worst_quality))
-        return StopReport{
-            Stop::mesh_lost, time,
-            fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.worst), m.quality),
-            "use more elements or a shorter discretisation.relaxation"};
+                                      m.turn.saddle ? "a neck closes" : "the surface is too sharp", where(m.turn.where),
+                                      m.turn.angle),
+                          m.turn.saddle ? "more elements follow the neck further" : "use more elements"};
+    if (!(m.quality.worst > worst_quality))
+        return StopReport{Stop::mesh_lost, time,
+                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),
+                                      m.quality.worst),
+                          "use more elements or a shorter discretisation.relaxation"};
     return std::nullopt;
 }
 

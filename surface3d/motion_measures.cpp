@@ -36,30 +36,17 @@ Sums integrals(const MotionStepper& stepper, const MotionState& s, const CurvedM
     return of_cell.rowwise().sum();
 }
 
-void measure_mesh(const SurfaceSpace& space, const CurvedMesh& mesh, MotionMeasures& m) {
-    const Tabulation& table = space.tabulation();
-    m.quality = m.neck_radius = std::numeric_limits<double>::infinity();
-    for (int cell = 0; cell < space.cells(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        double widest = 0;  // squared
-        for (int q = 0; q < table.points(); ++q) {
-            const SurfacePoint<double> p = tangent_point(X, table, q);
-            const double mean = p.metric[0] + p.metric[2] - p.metric[1];  // of the squares of the sides
-            const double quality = std::sqrt(3.0) * p.area / mean;
-            if (!(quality >= m.quality)) m.quality = quality, m.worst = p.x;
-            widest = std::max(widest, 2 * mean / 3);
-        }
-        // Curvature around a neck: that which all nodes of a cell have, as single ones may be off.
+// Of the narrowest place: the curvature around a neck is that which all nodes of a cell have, as single ones may be
+// off.
+void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
+    m.neck_radius = std::numeric_limits<double>::infinity();
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
         double hoop = std::numeric_limits<double>::infinity();
-        for (int a = 0; a < space.width(); ++a) {
-            const int i = space.node(cell, a);
-            const double H = m.fields.H[i], K = m.fields.K[i];
-            const double half = std::sqrt(std::max(H * H / 4 - K, 0.0)), sharp = std::abs(H) / 2 + half;
-            hoop = std::min(hoop, K < 0 ? half - H / 2 : 0);
-            const double turn = sharp * std::sqrt(widest) / space.order();
-            if (!(turn <= m.turn)) m.turn = turn, m.sharpest = mesh.nodes[i], m.neck = K < 0;
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a) {
+            const double H = m.fields.H[mesh.node(cell, a)], K = m.fields.K[mesh.node(cell, a)];
+            hoop = std::min(hoop, K < 0 ? std::sqrt(H * H / 4 - K) - H / 2 : 0);
         }
-        if (hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.nodes[space.node(cell, 0)];
+        if (hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.position(cell, 0);
     }
 }
 
@@ -107,7 +94,9 @@ MotionMeasures measure(MotionStepper& stepper, const MotionState& s, const Bendi
         const double r = mesh.period > 0 ? x.head<2>().norm() : (x - m.centre).norm();
         m.r_min = std::min(m.r_min, r), m.r_max = std::max(m.r_max, r);
     }
-    measure_mesh(space, mesh, m);
+    m.quality = mesh_quality(mesh);
+    m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
+    measure_neck(mesh, m);
     measure_symbol(mesh, bending, m);
     return m;
 }

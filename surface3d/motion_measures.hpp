@@ -2,6 +2,7 @@
 #pragma once
 
 #include "surface3d/bending_force.hpp"
+#include "surface3d/mesh_quality.hpp"
 #include "surface3d/motion_step.hpp"
 
 namespace tubule::surface3d {
@@ -16,12 +17,9 @@ struct MotionMeasures {
     double speed = 0;         // largest |u|
     double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
     Eigen::Vector3d momentum, angular_momentum, centre;
-    double r_min = 0, r_max = 0;   // distances from the axis of a tube; from the centre of a closed surface
-    double quality = 0;            // of the worst triangle: 1 if equilateral, 0 if without area
-    Eigen::Vector3d worst;         // where it is
-    double turn = 0;               // largest angle by which the normal turns between neighbouring nodes
-    Eigen::Vector3d sharpest;      // where that is
-    bool neck = false;             // and whether the surface is a saddle there
+    double r_min = 0, r_max = 0;  // distances from the axis of a tube; from the centre of a closed surface
+    MeshQuality quality;
+    MeshTurn turn;
     double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
     Eigen::Vector3d narrowest;     // where that is
     double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)

@@ -24,6 +24,7 @@ constexpr double given_mesh_margin = 2;
 // A shape on one mesh. Where `stop` is set, what comes after the mesh may be missing.
 struct Measured {
     StartMesh start;
+    MeshQuality quality;
     CurvatureField curvature;
     Observables o;
     std::optional<StopReport> stop;
@@ -32,10 +33,11 @@ struct Measured {
 };
 
 Measured measure(const Case& c, StartMesh start, Recovery recovery) {
-    Measured out{std::move(start), {}, {}, {}};
+    Measured out{std::move(start), {}, {}, {}, {}};
     const CurvedMesh& mesh = out.start.mesh;
+    out.quality = mesh_quality(mesh);
+    if ((out.stop = find_fold(out.quality))) return out;
     const SurfaceSpace space(mesh);
-    if ((out.stop = find_fold(space, mesh))) return out;
     try {
         out.curvature = out.start.exact ? *out.start.exact : recover(space, mesh, recovery);
         if (c.surface.smoothing > 0) smooth(space, mesh, c.surface.smoothing, out.curvature);
@@ -142,8 +144,9 @@ std::vector<double> row(const Answer& answer, double seconds) {
     std::vector<double> out{0, o.energy};
     out.insert(out.end(), o.energy_term.begin(), o.energy_term.end());
     const double width = std::sqrt(o.area / mesh.triangles() * 4 / std::sqrt(3.0));
-    for (const double value : {o.area, o.volume, o.integral_H2, o.integral_K, gauss_bonnet_defect(o, mesh),
-                               answer.error, static_cast<double>(mesh.triangles()), width, seconds})
+    for (const double value :
+         {o.area, o.volume, o.integral_H2, o.integral_K, gauss_bonnet_defect(o, mesh), answer.measured.quality.worst,
+          answer.error, static_cast<double>(mesh.triangles()), width, seconds})
         out.push_back(value);
     return out;
 }
@@ -185,8 +188,8 @@ std::vector<std::string> series_names(const Case& c) {
     if (c.moves()) return motion_series_names(c);
     std::vector<std::string> names{"time", "energy"};
     for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"area", "volume", "integral_H2", "integral_K", "gauss_bonnet_defect", "energy_error",
-                             "elements", "mesh_width", "wall_seconds"})
+    for (const char* name : {"area", "volume", "integral_H2", "integral_K", "gauss_bonnet_defect", "quality",
+                             "energy_error", "elements", "mesh_width", "wall_seconds"})
         names.push_back(name);
     return names;
 }

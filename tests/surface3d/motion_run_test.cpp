@@ -95,6 +95,13 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
+TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
+    const std::string shape = wavy.substr(0, wavy.find("[time]"));
+    const Outcome rest = run_case(shape), moving = run_case(shape + "[time]\nend = 1e-6\n");
+    EXPECT_DOUBLE_EQ(moving.series("quality").front(), rest.last("quality"));
+    EXPECT_EQ(rest.last("elements"), moving.last("elements"));
+}
+
 TEST(MotionRun, FluidsKeepTheirMomenta) {
     // maths 3: they fall as exp(-gamma t). From rest they stay zero, however coarse and uneven the mesh.
     for (const double gamma : {0.0, 2.0}) {

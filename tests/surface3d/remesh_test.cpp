@@ -119,14 +119,15 @@ TEST(MeshQuality, IsOneForEquilateralTrianglesAndNoneWhereTheyFold) {
         EXPECT_NEAR(mesh_quality(one_triangle(o, x, y, k)).worst, std::sqrt(0.75), 1e-12);
         EXPECT_NEAR(mesh_quality(one_triangle(o, x, 1e-3 * y, k)).worst, 2e-3 * std::sqrt(0.75), 1e-6);
     }
-    // The Jacobian of a quarter-point element vanishes at the corner; beyond it, the element folds.
-    CurvedMesh quarter = one_triangle(o, x, y, 2);
-    quarter.nodes[3] = x / 4, quarter.nodes[5] = y / 4;
-    EXPECT_NEAR(mesh_quality(quarter).worst, 0, 1e-12);
-    quarter.nodes[3] = x / 8, quarter.nodes[5] = y / 3;
-    EXPECT_LT(mesh_quality(quarter).worst, -0.05);
-    quarter.nodes[3].x() = NAN;
-    EXPECT_EQ(mesh_quality(quarter).worst, -1);
+    // An edge whose middle is nearer than a quarter to its end folds there.
+    CurvedMesh bent = one_triangle(o, x, y, 2);
+    bent.nodes[3] = 0.3 * x;
+    EXPECT_GT(mesh_quality(bent).worst, 0);
+    bent.nodes[3] = 0.1 * x;
+    EXPECT_LT(mesh_quality(bent).worst, -0.05);
+    bent.nodes[3].x() = NAN;
+    EXPECT_EQ(mesh_quality(bent).worst, -1);
+    EXPECT_EQ(mesh_quality(one_triangle(o, x, x / 2, 3)).worst, -1);
 
     CurvedMesh sphere = mapped_mesh(icosphere(3), 3, map_of(Sphere{}));
     EXPECT_GT(mesh_quality(sphere).worst, 0.6);
@@ -138,16 +139,22 @@ TEST(MeshQuality, IsOneForEquilateralTrianglesAndNoneWhereTheyFold) {
     EXPECT_LT((spoilt.where - centre).norm(), 0.3);
 }
 
-TEST(MeshQuality, ResolutionIsCurvatureTimesWidth) {
+TEST(MeshQuality, TurnIsCurvatureTimesSpacing) {
     // Principal curvatures of a sphere and a tube of radius 1/2: 2 and 2; 2 and 0.
     EXPECT_DOUBLE_EQ(largest_curvature(-4, 4), 2);
     EXPECT_DOUBLE_EQ(largest_curvature(-2, 0), 2);
     EXPECT_DOUBLE_EQ(largest_curvature(0, -9), 3);
-    const CurvedMesh sphere = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 0.5, .modes = {}}));
-    const int n = sphere.size();
-    const MeshResolution r = mesh_resolution(sphere, Eigen::VectorXd::Constant(n, -4), Eigen::VectorXd::Constant(n, 4));
-    // The edge of an icosahedron of circumradius 1.
-    EXPECT_NEAR(r.angle, 1 / std::sin(2 * pi / 5), 1e-12);
+    // Sides of 2, nodes 2/k apart.
+    for (int k = 2; k <= 4; ++k) {
+        const CurvedMesh mesh = one_triangle({0, 0, 0}, {2, 0, 0}, {1, std::sqrt(3.0), 0}, k);
+        Eigen::VectorXd H = Eigen::VectorXd::Constant(mesh.size(), -2), K = Eigen::VectorXd::Zero(mesh.size());
+        EXPECT_NEAR(mesh_turn(mesh, mesh_quality(mesh), H, K).angle, 2 * 2.0 / k, 1e-12);
+        H[1] = 0, K[1] = -9;
+        const MeshTurn turn = mesh_turn(mesh, mesh_quality(mesh), H, K);
+        EXPECT_NEAR(turn.angle, 3 * 2.0 / k, 1e-12);
+        EXPECT_EQ(turn.where, mesh.nodes[1]);
+        EXPECT_TRUE(turn.saddle);
+    }
 }
 
 TEST(ClosestPoint, IsTheFootOfTheNormal) {
@@ -340,7 +347,7 @@ TEST(Remesh, SizesFollowCurvatureAndNumber) {
     const CurvedMesh mesh = tube_mesh({.radius = 0.5, .length = 2, .modes = {{0.3, 1, 0, 0}}}, 20, 3);
     const auto angle = [](const CurvedMesh& m) {
         const CurvatureField f = PatchRecovery(m).nodal(m);
-        return mesh_resolution(m, f.H, f.K).angle;
+        return m.order * mesh_turn(m, mesh_quality(m), f.H, f.K).angle;
     };
     for (const int triangles : {800, 1200}) {
         const Remeshed even = remeshed(mesh, {.triangles = triangles, .angle = 10});

@@ -17,7 +17,8 @@ constexpr double halved = 4;         // by this at least the error falls if rows
 // How the run went, not what it computed.
 const std::set<std::string> of_the_run{"time",         "step_size",           "order",      "newton_iterations",
                                        "elements",     "wall_seconds",        "mesh_width", "identity_defect",
-                                       "energy_error", "gauss_bonnet_defect", "tier"};
+                                       "energy_error", "gauss_bonnet_defect", "quality",    "turn",
+                                       "tier"};
 
 bool same(double s, double t) {
     return std::abs(s - t) <= same_time * std::max(std::abs(s), std::abs(t));
