@@ -10,7 +10,6 @@ namespace {
 // Measured choices: docs/decisions.md, "Surfaces in motion".
 constexpr double most = 4;          // density of triangles, wanted: so many times the mean, or its inverse
 constexpr double tolerance = 1e-5;  // of the velocity along the surface
-constexpr double rounding = 1e-9;   // what pulls along it, over what pulls at all: nothing but rounding
 constexpr int most_iterations = 300;
 constexpr int sweeps = 3;     // nodal normals for their integrals: each leaves a twentieth on 320 triangles
 constexpr double shift = 12;  // of the Laplacian, over the number of nodes: about 1/R^2 times the mass
@@ -83,6 +82,23 @@ VectorField tangential(const VectorField& v, const VectorField& normal) {
     return v - normal * along(v, normal).asDiagonal();
 }
 
+// Motions of the nodes along the surface. A tube's mesh does not run along the tube as a whole: on a straight one
+// nothing resists that, and on one that is nearly straight noise decides it, divided by the square of noise.
+struct AlongSurface {
+    const VectorField& normal;
+    VectorField running;  // of norm 1; zero on a closed surface
+
+    AlongSurface(const VectorField& normal, bool tube) : normal(normal), running(VectorField::Zero(3, normal.cols())) {
+        if (!tube) return;
+        running.row(2).setOnes();
+        running = tangential(running, normal).normalized();
+    }
+    VectorField operator()(const VectorField& v) const {
+        const VectorField out = tangential(v, normal);
+        return out - running * out.cwiseProduct(running).sum();
+    }
+};
+
 // Changes w along the nodal normals until (w.nu, phi) = flux.
 void meet_flux(const System& system, const Projection& project, const VectorField& normal, const Eigen::VectorXd& flux,
                VectorField& w) {
@@ -97,28 +113,27 @@ void meet_flux(const System& system, const Projection& project, const VectorFiel
 // m, and testing with nodal tangents alone, would let the curvature vector of the mesh, which is not quite normal, pull
 // nodes for ever: a cell at rest deforms.
 VectorField without_multiplier(const System& system, const Projection& project, const VectorField& normal,
-                               VectorField r) {
+                               const AlongSurface& along_surface, VectorField r) {
     for (int sweep = 0; sweep < sweeps; ++sweep) {
         const Eigen::VectorXd m = project(along(r, normal)).transpose();
         for (int d = 0; d < 3; ++d) r.row(d) -= (system.flux[d] * m).transpose();
     }
-    return tangential(r, normal);
+    return along_surface(r);
 }
 
-// Conjugate gradients for the tangential s with (grad s, grad Z) = (r, Z) for tangential Z, preconditioned by the
-// Laplacian of each component. Nothing resists a translation along a straight tube: what is less than `negligible` in
-// the norm of the preconditioner is left as it is.
-VectorField along_surface(const Eigen::SparseMatrix<double>& L, const SparseCholesky& laplacian,
-                          const VectorField& normal, VectorField r, double negligible) {
+// Conjugate gradients for the s along the surface with (grad s, grad Z) = (r, Z) for all such Z, preconditioned by the
+// Laplacian of each component.
+VectorField solve_along(const AlongSurface& along_surface, const Eigen::SparseMatrix<double>& L,
+                        const SparseCholesky& laplacian, VectorField r) {
     const auto precondition = [&](const VectorField& v) {
-        return tangential(laplacian.solve(v.transpose().eval()).transpose(), normal);
+        return along_surface(laplacian.solve(v.transpose().eval()).transpose());
     };
     VectorField s = VectorField::Zero(3, r.cols()), z = precondition(r), direction = z;
     double size = r.cwiseProduct(z).sum();
-    const double enough = std::max(tolerance * tolerance * size, negligible);
+    const double enough = tolerance * tolerance * size;
     for (int k = 0; size > enough; ++k) {
         if (k == most_iterations) throw SolveError("the motion of the mesh along the surface does not converge");
-        const VectorField image = tangential(times(L, direction), normal);
+        const VectorField image = along_surface(times(L, direction));
         const double step = size / direction.cwiseProduct(image).sum();
         s += step * direction;
         r -= step * image;
@@ -146,9 +161,9 @@ VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& me
     VectorField w = VectorField::Zero(3, space.size());
     meet_flux(system, project, normal, flux, w);
     const VectorField left = system.pull / (relaxation + te) - times(system.L, w);
-    const double negligible =
-        rounding * rounding * left.cwiseProduct(laplacian_.solve(left.transpose().eval()).transpose()).sum();
-    w += along_surface(system.L, laplacian_, normal, without_multiplier(system, project, normal, left), negligible);
+    const AlongSurface along_surface(normal, mesh.period > 0);
+    w += solve_along(along_surface, system.L, laplacian_,
+                     without_multiplier(system, project, normal, along_surface, left));
     meet_flux(system, project, normal, flux, w);
     return w;
 }
