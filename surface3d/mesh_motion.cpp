@@ -41,7 +41,7 @@ struct System {
     VectorField pull;                                 // -(a grad X, grad Z)
 };
 
-System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedMesh& from, const VectorField& normal,
+System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& normal,
                 const Eigen::VectorXd& weight) {
     const Tabulation& table = space.tabulation();
     const int n = space.width(), points = table.points();
@@ -50,7 +50,7 @@ System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedM
     Eigen::MatrixXd products(n * n, points);
     for (int q = 0; q < points; ++q) products.col(q) = (table.value.col(q) * table.value.col(q).transpose()).reshaped();
     space.for_each_cell([&](int cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell), Y = cell_nodes(from, cell);
+        const CellColumns<3> X = cell_nodes(mesh, cell);
         const CellColumns<3> nu = space.gather(normal, cell);
         Eigen::MatrixX3d dS_nu(points, 3);
         Eigen::MatrixXd grad(n, 3 * points);  // times the root of dS
@@ -64,7 +64,7 @@ System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedM
         space.add(out.L, cell, stiffness);
         const Eigen::MatrixX3d blocks = products * dS_nu;
         for (int d = 0; d < 3; ++d) space.add(out.flux[d], cell, blocks.col(d).reshaped(n, n));
-        const CellColumns<3> pull = Y * stiffness * -weight[cell];
+        const CellColumns<3> pull = X * stiffness * -weight[cell];
         for (int a = 0; a < n; ++a) out.pull.col(space.node(cell, a)) += pull.col(a);
     });
     return out;
@@ -147,13 +147,11 @@ VectorField solve_along(const AlongSurface& along_surface, const Eigen::SparseMa
 
 }  // namespace
 
-VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvedMesh& from,
-                                 const MotionFields& fields, const Projection& project, const Eigen::VectorXd& flux,
-                                 double relaxation, double te) {
+VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields,
+                                 const Projection& project, const Eigen::VectorXd& flux, double relaxation, double te) {
     const VectorField& normal = fields.normal;
-    const System system =
-        assemble(space, mesh, from, normal,
-                 follows_curvature_ ? weights(space, mesh, fields) : Eigen::VectorXd::Ones(space.cells()));
+    const System system = assemble(
+        space, mesh, normal, follows_curvature_ ? weights(space, mesh, fields) : Eigen::VectorXd::Ones(space.cells()));
     Eigen::SparseMatrix<double> shifted = system.L;
     shifted.diagonal().array() += shift / space.size();
     laplacian_.factor(shifted);

@@ -349,7 +349,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
-    to.w = mesh_motion_.velocity(space_, at, mesh(f.Xbar), base.fields, *projection_, flux(to.u, at, base.fields),
+    to.w = mesh_motion_.velocity(space_, at, base.fields, *projection_, flux(to.u, at, base.fields),
                                  control_.relaxation, f.te);
     to.X = f.Xbar + f.te * to.w;
     finish(from, f, to);
