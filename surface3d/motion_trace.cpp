@@ -6,6 +6,7 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr const char* array_name = "restart_coarser_run";
+constexpr double shortest_neighbour = 0.1;  // of a step: shorter ones beside it, as on a new mesh, say nothing of it
 
 }  // namespace
 
@@ -19,11 +20,15 @@ double MotionTrace::operator()(double t) const {
     const int n = static_cast<int>(points_.size());
     const auto after =
         std::lower_bound(points_.begin(), points_.end(), t, [](const auto& p, double x) { return p[0] < x; });
-    const int first = std::clamp(static_cast<int>(after - points_.begin()) - 2, 0, std::max(n - 4, 0));
+    int last = std::clamp(static_cast<int>(after - points_.begin()), std::min(1, n - 1), n - 1);
+    int first = std::max(last - 1, 0);
+    const double least = shortest_neighbour * (points_[last][0] - points_[first][0]);
+    if (first > 0 && points_[first][0] - points_[first - 1][0] > least) --first;
+    if (last + 1 < n && points_[last + 1][0] - points_[last][0] > least) ++last;
     double sum = 0;
-    for (int i = first; i < std::min(first + 4, n); ++i) {
+    for (int i = first; i <= last; ++i) {
         double weight = 1;
-        for (int j = first; j < std::min(first + 4, n); ++j)
+        for (int j = first; j <= last; ++j)
             if (j != i) weight *= (t - points_[j][0]) / (points_[i][0] - points_[j][0]);
         sum += weight * points_[i][1];
     }

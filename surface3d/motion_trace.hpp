@@ -17,7 +17,7 @@ public:
     void add(double t, double energy) { points_.push_back({t, energy}); }
     bool empty() const { return points_.empty(); }
     double end() const { return points_.back()[0]; }
-    // Cubic through the four nearest steps.
+    // Between two points, the polynomial through them and their neighbours that are not too near to them.
     double operator()(double t) const;
     Array array() const;
 

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "common/case/read.hpp"
 #include "surface3d/motion_frame.hpp"
+#include "surface3d/motion_trace.hpp"
 #include "surface3d/run.hpp"
 
 namespace tubule::surface3d {
@@ -93,6 +95,41 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
         for (const char* kept : {"area", "volume"})
             for (const double value : o.series(kept)) EXPECT_NEAR(value / o.series(kept).front(), 1, 1e-8) << kept;
     }
+}
+
+TEST(MotionTrace, InterpolatesStepsOfAnyLength) {
+    MotionTrace trace;
+    for (const double t : {0.0, 1.0, 2.5, 3.0}) trace.add(t, t * t * t);
+    EXPECT_NEAR(trace(2), 8, 1e-12);  // a cubic is its own
+    EXPECT_NEAR(trace(2.5), 2.5 * 2.5 * 2.5, 1e-12);
+    // A new mesh: a short step, in which the energy jumps. Between the long ones before it, nothing changes.
+    for (const auto& [t, energy] : {std::pair{4.0, 64.0}, {4 + 1e-5, 64.1}, {4 + 3e-5, 64.1}}) trace.add(t, energy);
+    EXPECT_NEAR(trace(3.5), 3.5 * 3.5 * 3.5, 0.3);  // the parabola through 2.5, 3, 4 is .25 off
+    EXPECT_NEAR(trace(4 + 2e-5), 64.1, 0.05);
+}
+
+TEST(MotionRun, ATubeGrowsOnNewMeshes) {
+    // maths 7: R^4 = 1 + 4 t. Long steps, on triangles that become long and thin, and a new mesh at R = 7.
+    const Outcome o = run_case(R"(
+[energy]
+k20 = 1.0
+[shape]
+kind = "tube"
+radius = 1.0
+length = 2.0
+[discretisation]
+elements = 80
+[accuracy]
+energy = 1e-2
+[time]
+end = 1000.0
+)");
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_EQ(o.watch.meshes.size(), 2u);
+    const double R = std::pow(4001.0, 0.25);
+    EXPECT_NEAR(o.last("r_min"), R, 1e-3 * R);
+    EXPECT_NEAR(o.last("r_max"), R, 1e-3 * R);
+    EXPECT_TRUE(o.summary.as_accurate_as_asked) << o.summary.estimated_error;
 }
 
 TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
