@@ -9,14 +9,13 @@ namespace tubule::surface3d {
 namespace {
 
 struct PointQuality {
-    double quality, mean_square;  // of the sides
+    double quality, width;
 };
 
 PointQuality quality_at(const SurfacePoint<double>& p, const Eigen::Vector3d& middle) {
-    const double square = (p.metric[0] + p.metric[2] - p.metric[1]) * 2 / 3;
-    const double shape = 2 / std::sqrt(3.0) * p.area / square;
-    if (!std::isfinite(shape)) return {-1, square};  // a point, or no numbers
-    return {p.normal.dot(middle) > 0 ? shape : -shape, square};
+    const double width = triangle_width(p), shape = 2 / std::sqrt(3.0) * p.area / (width * width);
+    if (!std::isfinite(shape)) return {-1, width};  // a point, or no numbers
+    return {p.normal.dot(middle) > 0 ? shape : -shape, width};
 }
 
 }  // namespace
@@ -30,16 +29,16 @@ MeshQuality mesh_quality(const CurvedMesh& mesh) {
     for (int cell = 0; cell < mesh.triangles(); ++cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
         const Eigen::Vector3d middle = tangent_point(X, centre, 0).normal;
-        double least = HUGE_VAL, widest = 0;  // squared
+        double least = HUGE_VAL, widest = 0;
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
-            const auto [quality, mean_square] = quality_at(p, middle);
-            least = std::min(least, quality), widest = std::max(widest, mean_square);
+            const auto [quality, width] = quality_at(p, middle);
+            least = std::min(least, quality), widest = std::max(widest, width);
             if (out.worst_cell >= 0 && quality >= out.worst) continue;
             out.worst = quality, out.worst_cell = cell, out.where = p.x;
         }
         sum += least;
-        out.width[cell] = std::sqrt(widest);
+        out.width[cell] = widest;
     }
     if (mesh.triangles() > 0) out.mean = sum / mesh.triangles();
     return out;

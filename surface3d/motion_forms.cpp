@@ -46,6 +46,7 @@ struct CellTables {
 
 struct CellWork {
     CellTables t;
+    CellMatrix advection;                  // (c.grad phi_b, phi_a), c = u* - w* along the surface
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
     Eigen::VectorXd rhs, flux, load, force;
@@ -73,7 +74,7 @@ public:
 private:
     // The state at a point.
     struct Point {
-        double dS, H, K, B2, trace;
+        double dS, width, H, K, B2, trace;
         Eigen::Vector3d normal;         // continuous
         Frame e;                        // orthonormal, tangential
         Eigen::Matrix<double, 2, 3> B;  // e^T B
@@ -85,6 +86,7 @@ private:
     Point point(const SurfacePoint<double>& p, const CellColumns<3>& gradient, const CellColumns<3>& normals, int cell,
                 int q) const;
     void fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const;
+    void add_advection(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
@@ -119,6 +121,7 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     Point at;
     const auto phi = table_.value.col(q);
     at.dS = table_.weight[q] * p.area;
+    at.width = triangle_width(p);
     at.H = at.K = 0;
     for (int a = 0; a < n_; ++a) {
         at.H += phi[a] * base_.fields.H[space_.node(cell, a)];
@@ -163,6 +166,23 @@ void Assembler::fill_tables(const Point& at, const CellColumns<3>& gradient, int
     }
 }
 
+void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& work) const {
+    work.advection.setZero(n_, n_);
+    if (law_.inertia == 0) return;
+    const CellTables& t = work.t;
+    CellColumns<3> across(3, n_);
+    for (int a = 0; a < n_; ++a) {
+        const int i = space_.node(cell, a);
+        for (int d = 0; d < 3; ++d)
+            across(d, a) = base_.velocity[d * unknowns_.nodes() + i] - base_.mesh_velocity(d, i);
+    }
+    for (int q = 0; q < table_.points(); ++q) {
+        const Eigen::Vector2d c = at[q].e.transpose() * (across * table_.value.col(q));
+        work.advection.noalias() +=
+            (at[q].dS * t.phi.row(q).transpose()) * (c.transpose() * t.grad.middleRows<2>(2 * q));
+    }
+}
+
 // inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (sigma(u), sigma(v))
 void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
@@ -172,19 +192,12 @@ void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& w
     for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
     if (drag != 0) scalar.noalias() += drag * (t.phi.transpose() * work.weighted1);
     if (law_.inertia != 0) {
-        CellColumns<3> across(3, n_), past(3, n_);
-        for (int a = 0; a < n_; ++a) {
-            const int i = space_.node(cell, a);
-            for (int d = 0; d < 3; ++d) {
-                across(d, a) = base_.velocity[d * unknowns_.nodes() + i] - base_.mesh_velocity(d, i);
-                past(d, a) = base_.past[d * unknowns_.nodes() + i];
-            }
-        }
+        scalar += law_.inertia * work.advection;
+        CellColumns<3> past(3, n_);
+        for (int a = 0; a < n_; ++a)
+            for (int d = 0; d < 3; ++d) past(d, a) = base_.past[d * unknowns_.nodes() + space_.node(cell, a)];
         for (int q = 0; q < Q; ++q) {
-            const Eigen::Vector2d u = at[q].e.transpose() * (across * table_.value.col(q));
             const Eigen::Vector3d bar = past * table_.value.col(q);
-            scalar.noalias() +=
-                (law_.inertia * work.weighted1.row(q).transpose()) * (u.transpose() * t.grad.middleRows<2>(2 * q));
             for (int d = 0; d < 3; ++d)
                 work.rhs.segment(d * n_, n_) += (rate * bar[d]) * work.weighted1.row(q).transpose();
         }
@@ -248,7 +261,8 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
     work.block.block(p_, p_, n_p, n_p).noalias() += t.psi_grad.transpose() * slope;
 }
 
-// (H, phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with what a velocity makes of them:
+// (H, phi) + te (c.grad (H - H*), phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with
+// c = u* - w* along the surface if there is inertia, else 0, and what a velocity makes of them:
 //   L_H(v) = (grad(v.nu), grad phi) - (|B|^2 v.nu, phi)
 //   L_K(v) = ((HP-B) grad(v.nu), grad phi) - (H K v.nu, phi)
 // div(HP-B) = 0 makes the second the transpose of K's force, as the first is of H's.
@@ -267,7 +281,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
         else
             along[a] = base_.te * base_.velocity[i];
     }
-    const auto add = [&](int rows, const auto& gradient, const auto& value, const auto& known) {
+    const auto add = [&](int rows, const Eigen::VectorXd& known, const auto& gradient, const auto& value) {
         if (rows < 0) return;
         for (int q = 0; q < Q; ++q) {
             const Point& s = at[q];
@@ -277,7 +291,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
             const Eigen::Vector3d d = moved * phi;
             const Eigen::Vector2d slope = g * (moved.transpose() * s.normal + along.transpose()) - s.B * d;
             const double height = s.normal.dot(d) + along.dot(phi);
-            work.rhs.segment(rows, n_) += s.dS * (Sg.transpose() * slope + (known(s) - value(s) * height) * phi);
+            work.rhs.segment(rows, n_) += s.dS * (Sg.transpose() * slope - value(s) * height * phi);
             work.weighted2.middleRows<2>(2 * q) = (base_.te * s.dS) * Sg;
             work.weighted1.row(q) = (base_.te * s.dS * value(s)) * t.phi.row(q);
         }
@@ -285,14 +299,20 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
         block.noalias() += work.weighted2.transpose() * t.normal_grad;
         block.noalias() -= work.weighted1.transpose() * t.normal;
         for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
-        work.block.block(rows, rows, n_, n_).noalias() += t.phi.transpose() * work.weighted1;
+        CellMatrix own = base_.te * work.advection;
+        own.noalias() += t.phi.transpose() * work.weighted1;
+        work.block.block(rows, rows, n_, n_) += own;
+        work.rhs.segment(rows, n_).noalias() += own * space_.gather(known, cell);
     };
     add(
-        H_, [](const Point&) { return Eigen::Matrix2d(Eigen::Matrix2d::Identity()); },
-        [](const Point& s) { return s.B2; }, [](const Point& s) { return s.H; });
+        H_, base_.fields.H,
+        [&](const Point& s) {
+            const double more = base_.stiffer * std::sqrt(s.B2) * s.width;
+            return Eigen::Matrix2d((1 + more) * Eigen::Matrix2d::Identity());
+        },
+        [](const Point& s) { return s.B2; });
     add(
-        K_, [](const Point& s) { return s.S; }, [](const Point& s) { return s.trace * s.K; },
-        [](const Point& s) { return s.K; });
+        K_, base_.fields.K, [](const Point& s) { return s.S; }, [](const Point& s) { return s.trace * s.K; });
 }
 
 void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
@@ -306,6 +326,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
         at.push_back(point(p, gradient, normals, cell, q));
         fill_tables(at.back(), gradient, q, work.t);
     }
+    add_advection(at, cell, work);
     add_momentum(at, cell, work);
     add_bending(at, cell, work);
     add_pressure(at, work);

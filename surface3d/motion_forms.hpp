@@ -27,6 +27,7 @@ struct StepBase {
     Eigen::VectorXd velocity;   // u*, expected, as numbered in MotionUnknowns; of one or three components
     Eigen::VectorXd past;       // ubar
     double te = 0;              // the step, effectively
+    double stiffer = 0;         // L_H is taken by this * |B| (width of a triangle) of itself more than it is
 };
 
 struct StepSystem {

@@ -9,8 +9,13 @@ namespace {
 constexpr int most_corrections = 5;
 constexpr double kept = 1e-12;            // area and volume, relative
 constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
-constexpr double damping = 0.8;           // of scheme alpha: the factor by which a step damps the fastest waves
+constexpr double fastest_waves = 0.9;     // of scheme alpha: the factor by which a short step damps them
 constexpr double learns = 0.5;            // from what the linear system of a step missed of area and volume
+// H of a mesh answers to waves of its own size by up to .06, .07, .08 |B| (width of a triangle) more than L_H for k =
+// 2, 3, 4; what little damps would grow in long steps.
+constexpr double stiffer = 0.08;
+constexpr double follows = 1e-7;     // how well the mesh follows the surface, relative
+constexpr int most_iterations = 20;  // of that, before it is factored
 
 template <class AtPoint>
 Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
@@ -64,7 +69,8 @@ MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const
       control_(control),
       unknowns_(mesh, law, bending),
       mesh_motion_(control.follow_curvature),
-      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()) {
+      solver_(unknowns_.pattern(), unknowns_.node_of_unknown()),
+      gmres_(unknowns_.nodes()) {
     if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
     holds_rigid_motions_ = true;
     law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
@@ -287,10 +293,23 @@ MotionStepper::Formula MotionStepper::bdf2(const MotionState& from, double tau) 
     return {1, te, bar(from.X, from.X_past), bar(from.u, from.u_past), -(1 + r) * (1 + r) / (6 * r * (1 + 2 * r))};
 }
 
-// Jansen, Whiting and Hulbert (2000). The rates belong to a time just before that of the state, by .06 of the step that
-// made them; where steps differ, an error of .003 tau (change of tau) u_tt is left.
-MotionStepper::Formula MotionStepper::alpha(const MotionState& from, double tau) {
-    const double level = 1 / (1 + damping), mass = (3 - damping) / (2 * (1 + damping)), gamma = 0.5 + mass - level;
+// A wave of bending, of no tangential flow but what its stretching takes, is damped by 2 viscosity k^2/inertia, k the
+// curvature across it, and by half of the friction. So this is what a step may damp the fastest waves by, in addition:
+// long steps, which do not follow them, need it.
+double MotionStepper::wave_factor(const MotionState& from, double tau) const {
+    if (law_.inertia == 0) return 0;
+    const CurvedMesh m = mesh(from.X);
+    const Extent e = extent(space_, m);
+    const double curvature = e.area / ((m.period > 0 ? 2 : 3) * e.volume);
+    const double rate = (2 * law_.viscosity * curvature * curvature + law_.friction / 2) / law_.inertia;
+    return fastest_waves * std::exp(-rate * tau);
+}
+
+// Jansen, Whiting and Hulbert (2000), with a spectral radius at infinity. The rates belong to a time just before that
+// of the state, by .06 of the step that made them; where steps differ, an error of .003 tau (change of tau) u_tt is
+// left.
+MotionStepper::Formula MotionStepper::alpha(const MotionState& from, double tau, double radius) {
+    const double level = 1 / (1 + radius), mass = (3 - radius) / (2 * (1 + radius)), gamma = 0.5 + mass - level;
     const double kept = level * tau * (1 - gamma / mass);
     return {level,   level * gamma * tau / mass, from.X + kept * from.X_rate, from.u + kept * from.u_rate, 1.0 / 12,
             1 / mass};
@@ -306,6 +325,45 @@ Extent MotionStepper::wanted_rate(const MotionState& from, const Formula& f, dou
     const double again = r * r * r, span = f.te / f.level;
     return {(lacks.area + back.area + again * from.missed.area) / span,
             (lacks.volume + back.volume + again * from.missed.volume) / span};
+}
+
+// (w.nu, phi) of the mesh. At the end of the step (w - u).nu = 0: with what the surface has moved since X* along the
+// normal, xi = (Xbar - X*).nu + te w.nu, and c = u* - w* along the surface, w.nu + c.grad xi = u.nu. To take u.nu on X*
+// alone would carry waves along the surface explicitly, by which those that little damps grow. Without inertia there
+// are none, and xi, where motions fade within a step, is not small.
+Eigen::VectorXd MotionStepper::mesh_flux(const StepBase& base, const Eigen::VectorXd& u) {
+    if (law_.inertia == 0) return flux(u, *base.mesh, base.fields);
+    using Row = Eigen::Matrix<double, 1, Eigen::Dynamic>;
+    const Tabulation& table = space_.tabulation();
+    const VectorField c = VectorField(base.velocity.reshaped(unknowns_.nodes(), 3).transpose()) - base.mesh_velocity;
+    Eigen::SparseMatrix<double> along = space_.pattern();  // (c.grad phi_b, phi_a)
+    space_.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(*base.mesh, cell), C = space_.gather(c, cell);
+        CellMatrix block = CellMatrix::Zero(space_.width(), space_.width());
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const auto phi = table.value.col(q);
+            const Eigen::Vector3d by = table.weight[q] * p.area * (C * phi);
+            block.noalias() += phi * (by.transpose() * gradients(p, table, q));
+        }
+        space_.add(along, cell, block);
+    });
+    const Row back = base.displacement.cwiseProduct(base.fields.normal).colwise().sum();
+    const Eigen::VectorXd b = flux(u, *base.mesh, base.fields) + along * back.transpose();
+    Eigen::VectorXd out = b;
+    const auto carried = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {
+        y = x + base.te * (along * (*projection_)(Row(x.transpose())).transpose());
+    };
+    const auto as_it_is = [](const Eigen::VectorXd& x, Eigen::VectorXd& y) { y = x; };
+    try {
+        gmres_.solve(carried, as_it_is, b, out, follows, most_iterations);
+    } catch (const SolveError&) {  // far along the surface in a step
+        const Eigen::SparseMatrix<double> mass = mass_matrix(space_, *base.mesh);
+        SparseLuLarge lu;
+        lu.factor(mass + base.te * along);
+        out = mass * lu.solve(b);
+    }
+    return out;
 }
 
 // Of area and volume, by the linear system of a step: it is of third order in the step. Backward differences do
@@ -333,7 +391,9 @@ void MotionStepper::finish(const MotionState& from, const Formula& f, MotionStat
 
 MotionStep MotionStepper::step(const MotionState& from, double tau) {
     const bool past = from.step > 0 && control_.scheme != Scheme::euler;
-    const Formula f = !past ? euler(from, tau) : control_.scheme == Scheme::alpha ? alpha(from, tau) : bdf2(from, tau);
+    const Formula f = !past                              ? euler(from, tau)
+                      : control_.scheme == Scheme::alpha ? alpha(from, tau, wave_factor(from, tau))
+                                                         : bdf2(from, tau);
     const double r = past ? tau / from.step : 0;
     const auto ahead = [&](const auto& now, const auto& before) {
         return ((1 + f.level * r) * now - f.level * r * before).eval();
@@ -341,7 +401,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     const VectorField Xstar = ahead(from.X, from.X_past);
     const CurvedMesh at = mesh(Xstar);
     const StepBase base{&at,    fields(at), Xstar - f.Xbar, ahead(from.w, from.w_past), ahead(from.u, from.u_past),
-                        f.ubar, f.te};
+                        f.ubar, f.te,       stiffer};
     MotionStep out;
     MotionState& to = out.state;
     const bool keeps_volume = law_.keeps_volume && !area_is_volume(at, base.fields);
@@ -349,8 +409,8 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(from.u.size());
     if (unknowns_.p >= 0) to.p = x.tail(unknowns_.size() - unknowns_.p);
-    to.w = mesh_motion_.velocity(space_, at, base.fields, *projection_, flux(to.u, at, base.fields),
-                                 control_.relaxation, f.te);
+    to.w =
+        mesh_motion_.velocity(space_, at, base.fields, *projection_, mesh_flux(base, to.u), control_.relaxation, f.te);
     to.X = f.Xbar + f.te * to.w;
     finish(from, f, to);
     keep_momenta(from, f.te / f.level, to);

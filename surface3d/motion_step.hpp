@@ -7,6 +7,7 @@
 
 #include "common/case/surface_choices.hpp"
 #include "common/solve/bordered.hpp"
+#include "common/solve/gmres.hpp"
 #include "surface3d/curved_mesh.hpp"
 #include "surface3d/mesh_motion.hpp"
 #include "surface3d/motion_forms.hpp"
@@ -30,7 +31,7 @@ struct MotionState {
     VectorField X_rate;  // of scheme alpha: the rates that it carries on
     Eigen::VectorXd u_rate;
     // Pressure, at the nodes of its own order, and the volume's multiplier, where the step was solved: at its end, or
-    // with scheme alpha .44 of the step before.
+    // with scheme alpha up to .44 of the step before.
     Eigen::VectorXd p;
     double lambda = 0;
     Extent missed;  // of scheme alpha: what the linear system of a step is expected to miss of area and volume
@@ -85,9 +86,11 @@ private:
     struct Formula;
     static Formula euler(const MotionState& from, double tau);
     static Formula bdf2(const MotionState& from, double tau);
-    static Formula alpha(const MotionState& from, double tau);
+    static Formula alpha(const MotionState& from, double tau, double radius);
+    double wave_factor(const MotionState& from, double tau) const;
     Extent wanted_rate(const MotionState& from, const Formula& f, double tau, const CurvedMesh& at) const;
     Eigen::VectorXd solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda);
+    Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     Extent expected_miss(const MotionState& from, const MotionState& to) const;
     void finish(const MotionState& from, const Formula& f, MotionState& to) const;
     void make_symmetric(const StepBase& base);
@@ -107,6 +110,7 @@ private:
     MeshMotion mesh_motion_;
     StepSystem system_;
     BorderedSolver solver_;
+    Gmres gmres_;
     bool holds_rigid_motions_ = false;
     std::optional<Projection> projection_;
 };

@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCore>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
@@ -121,6 +122,11 @@ inline SurfacePoint<double> curved_point(const CellColumns<3>& X, const Tabulati
     SurfacePoint<double> p = tangent_point(X, table, q);
     set_curvature<double>(p, X * table.dd[0].col(q), X * table.dd[1].col(q), X * table.dd[2].col(q));
     return p;
+}
+
+// Root of the mean square of the sides that the cell would have if it were flat and like this all over.
+inline double triangle_width(const SurfacePoint<double>& p) {
+    return std::sqrt(2 * (p.metric[0] + p.metric[2] - p.metric[1]) / 3);
 }
 
 // Surface gradients of all functions of the cell at a point, one column each.

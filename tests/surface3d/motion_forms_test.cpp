@@ -12,6 +12,7 @@
 #include "surface3d/base_meshes.hpp"
 #include "surface3d/bending_force.hpp"
 #include "surface3d/mapped_mesh.hpp"
+#include "surface3d/mesh_quality.hpp"
 #include "surface3d/projection.hpp"
 
 namespace tubule::surface3d {
@@ -205,6 +206,7 @@ TEST(CurvatureEvolution, FollowsTheDisplacementThatIsExpected) {
     rest.base.displacement = 0.1 * smooth_at(rest.mesh);
     rest.base.mesh_velocity = smooth_at(rest.mesh);
     rest.base.velocity.setZero();
+    rest.base.stiffer = 0.3;
     rest.assembled();
     Eigen::VectorXd x = Eigen::VectorXd::Zero(rest.unknowns.size());
     x.segment(rest.unknowns.H, n) = rest.base.fields.H;
@@ -212,6 +214,25 @@ TEST(CurvatureEvolution, FollowsTheDisplacementThatIsExpected) {
     const Eigen::VectorXd left = rest.system.A * x - rest.system.b;
     for (const int rows : {rest.unknowns.H, rest.unknowns.K})
         EXPECT_LT(left.segment(rows, n).norm(), 1e-12 * rest.system.b.segment(rows, n).norm());
+}
+
+TEST(CurvatureEvolution, IsStifferByTheWidthOfTriangles) {
+    // On a sphere of radius 2 |B| = sqrt(2)/2; w = u.nu is tested with itself: te (grad w, grad w) stiffer |B| width
+    // more.
+    const double te = 0.1, stiffer = 0.3;
+    Eigen::MatrixXd block[2];
+    for (int i : {0, 1}) {
+        AtRest rest(mesh_of(Sphere{.radius = 2, .modes = {}}, icosphere(2), 3), gradient_flow, energies.back(), te);
+        rest.base.stiffer = i * stiffer;
+        rest.assembled();
+        block[i] = rest.block(rest.unknowns.H, rest.mesh.size(), 0, rest.mesh.size());
+    }
+    const CurvedMesh mesh = mesh_of(Sphere{.radius = 2, .modes = {}}, icosphere(2), 3);
+    const Eigen::VectorXd width = mesh_quality(mesh).width, w = smooth_at(mesh).row(0).transpose();
+    const double slopes = w.dot(stiffness_matrix(SurfaceSpace(mesh), mesh) * w);
+    const double more = w.dot((block[1] - block[0]) * w) / (te * slopes * stiffer * std::sqrt(0.5));
+    EXPECT_GT(more, 0.95 * width.minCoeff());  // the widths are the largest within each triangle
+    EXPECT_LT(more, width.maxCoeff());
 }
 
 // |M - N^T| relative to |M|.
@@ -346,7 +367,9 @@ TEST(StepSolve, AgreesWithLu) {
             const Eigen::Index nv = law.components() * rest.mesh.size();
             // GMRES stops at a residual of 1e-11; what it leaves is larger by the condition of the matrix.
             EXPECT_LT((mine - exact).head(nv).norm(), 1e-6 * exact.head(nv).norm());
-            if (bordered) { EXPECT_NEAR(mine.tail(1)[0], exact.tail(1)[0], 1e-6 * std::abs(exact.tail(1)[0])); }
+            if (bordered) {
+                EXPECT_NEAR(mine.tail(1)[0], exact.tail(1)[0], 1e-6 * std::abs(exact.tail(1)[0]));
+            }
             EXPECT_EQ(solver.fallbacks(), 0);
         }
     }
