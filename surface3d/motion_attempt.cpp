@@ -69,7 +69,7 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
                                 .relaxation = memory_.relaxation,
                                 .follow_curvature = case_.surface.follow_curvature,
                                 .least_variation = memory_.least_variation,
-                                .scheme = case_.surface.scheme};
+                                .scheme = time_scheme(case_)};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
     if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
     summary.elements = mesh.triangles();

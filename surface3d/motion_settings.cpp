@@ -19,6 +19,10 @@ double tolerance_for(double accuracy) {
 
 }  // namespace
 
+Scheme time_scheme(const Case& c) {
+    return c.surface.scheme.value_or(c.model.kind == ModelKind::fluid ? Scheme::alpha : Scheme::bdf2);
+}
+
 MotionSettings first_settings(const Case& c) {
     return {c.surface.elements.value_or(first_triangles),
             c.surface.time_tolerance.value_or(tolerance_for(c.accuracy.energy))};

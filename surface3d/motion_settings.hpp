@@ -13,6 +13,8 @@ struct MotionSettings {
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
 };
 
+Scheme time_scheme(const Case& c);
+
 // What the case gives, or what its accuracy asks for.
 MotionSettings first_settings(const Case& c);
 bool settings_given(const Case& c);
