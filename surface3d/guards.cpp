@@ -12,12 +12,6 @@
 
 namespace tubule::surface3d {
 
-namespace {
-
-constexpr double tolerance = 0.01;
-
-}  // namespace
-
 std::optional<StopReport> find_fold(const MeshQuality& quality) {
     if (quality.worst > 0) return std::nullopt;
     const Eigen::Vector3d& x = quality.where;
@@ -27,15 +21,15 @@ std::optional<StopReport> find_fold(const MeshQuality& quality) {
         "use more elements, or discretisation.mesh = \"graded\""};
 }
 
-std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh) {
+std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh, double allowed) {
     const std::string advice = "use more elements, or another discretisation.recovery";
-    if (mesh.period == 0 && o.integral_H2 < (1 - tolerance) * willmore_bound)
+    if (mesh.period == 0 && o.integral_H2 < (1 - allowed) * willmore_bound)
         return StopReport{Stop::resolution_lost, 0,
                           fmt::format("INT H^2 = {:.6g} is below 16 pi = {:.6g}, which no closed surface can have",
                                       o.integral_H2, willmore_bound),
                           advice};
     const double defect = gauss_bonnet_defect(o, mesh);
-    if (!(std::abs(defect) <= tolerance * 4 * pi))
+    if (!(std::abs(defect) <= allowed * 4 * pi))
         return StopReport{Stop::resolution_lost, 0,
                           fmt::format("INT K = {:.6g} is off by {:.3g} from 2 pi times the Euler characteristic {}",
                                       o.integral_K, defect, euler_characteristic(mesh)),

@@ -13,8 +13,9 @@ namespace tubule::surface3d {
 std::optional<StopReport> find_fold(const MeshQuality& quality);
 
 // Closed surfaces have INT H^2 >= 16 pi (Willmore), and INT K is 2 pi times the Euler characteristic (Gauss-Bonnet):
-// a report where one of them is missed by more than 1 % of 16 pi or 4 pi.
-std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh);
+// a report where one of them is missed by more than `allowed` of 16 pi or 4 pi.
+std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh,
+                                                    double allowed = 0.01);
 
 // Triangles that meet where they should not, those of the next periods of a tube included; the curved ones are taken as
 // the flat ones between their nodes.

@@ -52,6 +52,7 @@ private:
     // A step.
     std::optional<StopReport> step();
     std::optional<Refusal> attempt(double tau);
+    std::optional<StopReport> impossible(const Observables& o, const VectorField& X) const;
     std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
     void take(const MotionStep& next, const MotionMeasures& m);
     void set_next_step(double tau, double asked, double error);

@@ -46,6 +46,24 @@ TEST(SelfIntersection, OfATubeWithItsOwnImages) {
     }
 }
 
+TEST(ImpossibleCurvature, IsTold) {
+    // A sphere has INT H^2 = 16 pi and INT K = 4 pi, a tube INT K = 0 and no least INT H^2.
+    const CurvedMesh sphere = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}}));
+    const CurvedMesh tube = tube_mesh({.radius = 1, .length = 1, .modes = {}}, 4, 8, 2);
+    const auto told = [](const CurvedMesh& mesh, double H2, double K, double allowed) {
+        Observables o;
+        o.integral_H2 = H2 * 16 * pi, o.integral_K = K * 4 * pi;
+        return find_impossible_curvature(o, mesh, allowed).has_value();
+    };
+    for (const double allowed : {0.01, 0.05}) {
+        EXPECT_FALSE(told(sphere, 1 - 0.9 * allowed, 1 + 0.9 * allowed, allowed));
+        EXPECT_TRUE(told(sphere, 1 - 1.1 * allowed, 1, allowed));
+        EXPECT_TRUE(told(sphere, 1, 1 - 1.1 * allowed, allowed));
+        EXPECT_FALSE(told(tube, 0.1, 0.9 * allowed, allowed));
+        EXPECT_TRUE(told(tube, 0.1, 1.1 * allowed, allowed));
+    }
+}
+
 TEST(Energy, RisesAreToldFromErrors) {
     // docs/surface_motion.md: a quarter of the accuracy asked in a step, ten times that accuracy in many.
     EXPECT_FALSE(find_rise_in_step(-1, 1e-2, 3, 0.1));
