@@ -1,6 +1,5 @@
 #include "surface3d/mesh_motion.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

@@ -262,7 +262,8 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
 }
 
 // (H, phi) + te (c.grad (H - H*), phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with
-// c = u* - w* along the surface if there is inertia, else 0, and what a velocity makes of them:
+// c = u* - w* along the surface if there is inertia, else 0, L_H on the left and of X* - Xbar and u* - w* taken
+// 1 + stiffer |B| (width) times, and what a velocity makes of them:
 //   L_H(v) = (grad(v.nu), grad phi) - (|B|^2 v.nu, phi)
 //   L_K(v) = ((HP-B) grad(v.nu), grad phi) - (H K v.nu, phi)
 // div(HP-B) = 0 makes the second the transpose of K's force, as the first is of H's.
@@ -332,6 +333,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
     add_pressure(at, work);
     add_curvature_evolution(at, cell, work);
     unknowns_.add(system.A, cell, work.block);
+    if (law_.inertia != 0) space_.add(system.advection, cell, work.advection);
     const int* numbers = unknowns_.of_cell(cell);
     for (int i = 0; i < unknowns_.width(); ++i) {
         system.b[numbers[i]] += work.rhs[i];
@@ -347,6 +349,7 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const M
               const StepBase& base, StepSystem& system) {
     if (system.A.size() == 0) system.A = unknowns.pattern();
     std::fill_n(system.A.valuePtr(), system.A.nonZeros(), 0.0);
+    if (law.inertia != 0) system.advection = space.pattern();
     system.b.setZero(unknowns.size());
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());

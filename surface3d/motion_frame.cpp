@@ -62,6 +62,8 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     out.mesh = mesh_number;
     out.numbers = {{"energy", m.bending.energy},
                    {"restart_lambda", s.lambda},
+                   {"restart_solved_time", s.solved.time},
+                   {"restart_solved_lambda", s.solved.lambda},
                    {"restart_step", s.step},
                    {"restart_missed_area", s.missed.area},
                    {"restart_missed_volume", s.missed.volume},
@@ -80,6 +82,7 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     if (s.u_rate.size() > 0) {
         out.arrays.push_back(array("restart_X_rate", s.X_rate));
         out.arrays.push_back(column("restart_u_rate", s.u_rate));
+        if (s.p.size() > 0) out.arrays.push_back(column("restart_solved_p", s.solved.p));
     }
     return out;
 }
@@ -90,6 +93,8 @@ MotionRestart motion_restart(const Record& record) {
     s.time = record.time;
     s.step = number_of(record, "restart_step");
     s.lambda = number_of(record, "restart_lambda");
+    s.solved.time = number_of(record, "restart_solved_time");
+    s.solved.lambda = number_of(record, "restart_solved_lambda");
     s.X = field_of(record, "points"), s.w = field_of(record, "restart_w"), s.u = vector_of(record, "restart_u");
     s.X_past = field_of(record, "restart_X_past"), s.w_past = field_of(record, "restart_w_past");
     s.u_past = vector_of(record, "restart_u_past");
@@ -98,6 +103,7 @@ MotionRestart motion_restart(const Record& record) {
         return std::any_of(record.arrays.begin(), record.arrays.end(), [&](const Array& a) { return a.name == name; });
     };
     if (has("restart_p")) s.p = vector_of(record, "restart_p");
+    if (has("restart_solved_p")) s.solved.p = vector_of(record, "restart_solved_p");
     if (has("restart_u_rate"))
         s.X_rate = field_of(record, "restart_X_rate"), s.u_rate = vector_of(record, "restart_u_rate");
     for_each_number(out.memory, [&](const char* name, double& value) { value = number_of(record, name); });

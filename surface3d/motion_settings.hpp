@@ -13,6 +13,7 @@ struct MotionSettings {
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
 };
 
+// The case's, or alpha for fluids and bdf2 for what has no inertia.
 Scheme time_scheme(const Case& c);
 
 // What the case gives, or what its accuracy asks for.

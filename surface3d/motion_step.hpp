@@ -20,6 +20,13 @@ struct Extent {
     double area = 0, volume = 0;
 };
 
+// Pressure and the multiplier of the volume.
+struct Multipliers {
+    double time = 0;
+    Eigen::VectorXd p;
+    double lambda = 0;
+};
+
 // Nodal values at a time, and what the next step needs of the one before.
 struct MotionState {
     double time = 0;
@@ -30,11 +37,10 @@ struct MotionState {
     Eigen::VectorXd u_past;
     VectorField X_rate;  // of scheme alpha: the rates that it carries on
     Eigen::VectorXd u_rate;
-    // Pressure, at the nodes of its own order, and the volume's multiplier, where the step was solved: at its end, or
-    // with scheme alpha up to .44 of the step before.
-    Eigen::VectorXd p;
-    double lambda = 0;
-    Extent missed;  // of scheme alpha: what the linear system of a step is expected to miss of area and volume
+    Eigen::VectorXd p;   // pressure, at the nodes of its own order
+    double lambda = 0;   // multiplier of the volume
+    Multipliers solved;  // of scheme alpha: the same where the step was solved
+    Extent missed;       // of scheme alpha: what the linear system of a step is expected to miss of area and volume
 };
 
 // With so many components of the velocity at a node, and so many pressures.
@@ -84,6 +90,7 @@ public:
 private:
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
     struct Formula;
+    bool has_past(const MotionState& from) const;
     static Formula euler(const MotionState& from, double tau);
     static Formula bdf2(const MotionState& from, double tau);
     static Formula alpha(const MotionState& from, double tau, double radius);
