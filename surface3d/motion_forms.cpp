@@ -349,7 +349,8 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const M
               const StepBase& base, StepSystem& system) {
     if (system.A.size() == 0) system.A = unknowns.pattern();
     std::fill_n(system.A.valuePtr(), system.A.nonZeros(), 0.0);
-    if (law.inertia != 0) system.advection = space.pattern();
+    if (law.inertia != 0 && system.advection.size() == 0) system.advection = space.pattern();
+    std::fill_n(system.advection.valuePtr(), system.advection.nonZeros(), 0.0);
     system.b.setZero(unknowns.size());
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());

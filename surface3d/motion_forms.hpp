@@ -33,10 +33,11 @@ struct StepBase {
 struct StepSystem {
     Eigen::SparseMatrix<double> A;
     Eigen::VectorXd b;
-    Eigen::VectorXd flux;                   // (u.nu, 1) = flux . unknowns: the column and the row of lambda
-    Eigen::VectorXd pressure_load;          // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
-    Eigen::VectorXd force;                  // (b, v) on X*, in the rows of the velocity
-    Eigen::SparseMatrix<double> advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface, if there is inertia
+    Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
+    Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
+    Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
+    Eigen::SparseMatrix<double>
+        advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia
 };
 
 // H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in

@@ -23,15 +23,19 @@ Array column(const std::string& name, const Eigen::VectorXd& values) {
     return array(name, values.transpose());
 }
 
+[[noreturn]] void missing(const std::string& name) {
+    throw std::runtime_error("nothing can go on from this frame: " + name +
+                             " is missing, as in results of another version; run the case without --resume");
+}
 const Array& array_of(const Record& record, const std::string& name) {
     for (const Array& a : record.arrays)
         if (a.name == name) return a;
-    throw std::runtime_error("the frame holds no moving surface: " + name + " is missing");
+    missing(name);
 }
 double number_of(const Record& record, const std::string& name) {
     for (const auto& [key, value] : record.numbers)
         if (key == name) return value;
-    throw std::runtime_error("the frame holds no moving surface: " + name + " is missing");
+    missing(name);
 }
 Eigen::VectorXd vector_of(const Record& record, const std::string& name) {
     const std::vector<double>& data = array_of(record, name).data;
