@@ -67,6 +67,7 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     out.numbers = {{"energy", m.bending.energy},
                    {"restart_lambda", s.lambda},
                    {"restart_solved_time", s.solved.time},
+                   {"restart_lag", s.lag},
                    {"restart_solved_lambda", s.solved.lambda},
                    {"restart_step", s.step},
                    {"restart_missed_area", s.missed.area},
@@ -98,6 +99,7 @@ MotionRestart motion_restart(const Record& record) {
     s.step = number_of(record, "restart_step");
     s.lambda = number_of(record, "restart_lambda");
     s.solved.time = number_of(record, "restart_solved_time");
+    s.lag = number_of(record, "restart_lag");
     s.solved.lambda = number_of(record, "restart_solved_lambda");
     s.X = field_of(record, "points"), s.w = field_of(record, "restart_w"), s.u = vector_of(record, "restart_u");
     s.X_past = field_of(record, "restart_X_past"), s.w_past = field_of(record, "restart_w_past");

@@ -279,6 +279,7 @@ struct MotionStepper::Formula {
     Eigen::VectorXd ubar;
     double error;         // of the positions in a step, in units of their third derivative * tau^3
     double renewing = 1;  // of scheme alpha: the part of the carried rates that a step makes anew
+    double lag = 0;       // and the time from which they then are, before the end of the step
 };
 
 MotionStepper::Formula MotionStepper::euler(const MotionState& from, double tau) {
@@ -305,14 +306,20 @@ double MotionStepper::wave_factor(const MotionState& from, double tau) const {
     return fastest_waves * std::exp(-rate * tau);
 }
 
-// Jansen, Whiting and Hulbert (2000), with a spectral radius at infinity. The rates belong to a time just before that
-// of the state, by (1 - radius)/(2 (1 + radius)) of the step that made them: .03 for .9. Where steps differ, that part
-// of the change of the step is missed: short steps hardly notice it, and long ones that grow are of first order.
+// Jansen, Whiting and Hulbert (2000), with a spectral radius at infinity, for steps that vary: rates are linear between
+// those carried on, of `lag` steps before the state, and those of the stage, at `level`. The error is that of X_t = c
+// X.
 MotionStepper::Formula MotionStepper::alpha(const MotionState& from, double tau, double radius) {
-    const double level = 1 / (1 + radius), mass = (3 - radius) / (2 * (1 + radius)), gamma = 0.5 + mass - level;
-    const double kept = level * tau * (1 - gamma / mass);
-    return {level,   level * gamma * tau / mass, from.X + kept * from.X_rate, from.u + kept * from.u_rate, 1.0 / 12,
-            1 / mass};
+    const double level = 1 / (1 + radius), lag = from.lag / tau, next_lag = (1 - radius) / (2 * (1 + radius));
+    const double share = (0.5 + lag) / (level + lag), kept = level * tau * (1 - share);
+    const double error = (1.0 / 3 + (lag - level) / 2 - lag * level) / 2 - share * level * (1 - level) / 2;
+    return {level,
+            level * tau * share,
+            from.X + kept * from.X_rate,
+            from.u + kept * from.u_rate,
+            error,
+            (1 - next_lag + lag) / (level + lag),
+            next_lag * tau};
 }
 
 // A run that another scheme began goes on without.
@@ -376,6 +383,7 @@ void MotionStepper::finish(const MotionState& from, const Formula& f, MotionStat
             to.lambda += ahead * (to.lambda - from.solved.lambda);
             if (to.p.size() > 0) to.p += ahead * (to.p - from.solved.p);
         }
+        to.lag = f.lag;
         const VectorField X_rate = to.w;
         const Eigen::VectorXd u_rate = (to.u - f.ubar) / f.te;
         to.X_rate = first ? X_rate : VectorField(from.X_rate + f.renewing * (X_rate - from.X_rate));

@@ -37,6 +37,7 @@ struct MotionState {
     Eigen::VectorXd u_past;
     VectorField X_rate;  // of scheme alpha: the rates that it carries on
     Eigen::VectorXd u_rate;
+    double lag = 0;      // they are those of so much before `time`
     Eigen::VectorXd p;   // pressure, at the nodes of its own order
     double lambda = 0;   // multiplier of the volume
     Multipliers solved;  // of scheme alpha: the same where the step was solved
