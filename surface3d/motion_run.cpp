@@ -47,10 +47,10 @@ void accept(RunSummary& s, const Case& c, bool chosen, const Coarse& coarse) {
     s.warnings.pop_back();
 }
 
-Coarse run_coarse(const Case& c, RunObserver& observer, const MotionSettings& fine, bool by_order,
-                  Clock::time_point started) {
+Coarse run_coarse_once(const Case& c, RunObserver& observer, const MotionSettings& fine, bool by_order,
+                       Clock::time_point started) {
     Case lower = c;
-    if (by_order) lower.surface.order = std::max(element_order(c) - 1, 2);
+    if (by_order) lower.surface.order = element_order(c) > 2 ? element_order(c) - 1 : 3;
     if (c.surface.step) lower.surface.step = 2 * *c.surface.step;
     MotionSettings settings = coarser(fine);
     if (by_order) settings.elements = fine.elements;
@@ -58,6 +58,18 @@ Coarse run_coarse(const Case& c, RunObserver& observer, const MotionSettings& fi
     run.begin();
     run.go();
     return {std::move(run.trace), run.summary.stop};
+}
+
+// With too few triangles, or when their number is not ours to choose, the other run has elements of another order. So
+// it has where fewer triangles lose the surface on the way.
+Coarse run_coarse(const Case& c, RunObserver& observer, const MotionSettings& fine, bool resizable,
+                  Clock::time_point started) {
+    const bool fewer = resizable && coarser(fine).elements >= least_triangles;
+    Coarse out = run_coarse_once(c, observer, fine, !fewer, started);
+    const bool lost = out.stop.reason == Stop::resolution_lost || out.stop.reason == Stop::pinch_off;
+    if (!fewer || !lost) return out;
+    Coarse other = run_coarse_once(c, observer, fine, true, started);
+    return can_go_on(other.stop.reason) || other.known_until(out.stop.time) ? std::move(other) : std::move(out);
 }
 
 void run_fine(MotionAttempt& run, const Restart* restart) {
@@ -78,13 +90,11 @@ RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* resta
         const MotionMemory memory = motion_restart(restart->record).memory;
         settings = {memory.elements, memory.tolerance};
     }
-    // With too few triangles, or when their number is not ours to choose, the coarser run has elements of lower order.
     const bool resizable = start_mesh(c, settings.elements).resizable;
-    const bool by_order = !resizable || coarser(settings).elements < least_triangles;
     Coarse coarse;
     if (restart) coarse.trace = MotionTrace(restart->record);
     if (coarse.trace.empty()) {
-        coarse = run_coarse(c, observer, settings, by_order, started);
+        coarse = run_coarse(c, observer, settings, resizable, started);
         if (can_go_on(coarse.stop.reason)) {
             MotionAttempt first(c, observer, true, settings, nullptr, started);  // ends as soon: a step to go on from
             run_fine(first, restart);
