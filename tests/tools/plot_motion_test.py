@@ -306,7 +306,16 @@ class Render(InFolder):
 
     def render(self, *arguments):
         command = [sys.executable, "-B", PLOT.parent / "render", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, env={"PATH": str(self.folder)})
+        return subprocess.run(command, capture_output=True, text=True, env={"PATH": str(self.folder), **self.more})
+
+    def setUp(self):
+        super().setUp()
+        self.more = {}
+
+    def fake(self, name, script):
+        """A program on the PATH, of the shell alone."""
+        (self.folder / name).write_text(f"#!/bin/sh\n{script}\n")
+        (self.folder / name).chmod(0o755)
 
     def test_says_that_there_is_none(self):
         done = self.render(write(self.folder / "a.hdf", times=(0, 1)))
@@ -315,16 +324,49 @@ class Render(InFolder):
         self.assertIn("no such file", self.render(self.folder / "b.hdf").stderr)
 
     def test_gives_the_series_to_paraview_where_there_is_one(self):
-        file, fake = write(self.folder / "a.hdf", times=(0, 1)), self.folder / "pvpython"
+        file = write(self.folder / "a.hdf", times=(0, 1))
         (self.folder / "view").mkdir()
         (self.folder / "view/a.hdf.series").touch()
-        fake.write_text(f'#!/bin/sh\necho "$@" > {self.folder}/said; : > {self.folder}/out/000000.png\n')
-        fake.chmod(0o755)
+        self.fake("pvpython", f'echo "$@" > {self.folder}/said; : > {self.folder}/out/000000.png')
         done = self.render(file, "-o", self.folder / "out", "--colour", "H")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("no ffmpeg", done.stderr)
         said = (self.folder / "said").read_text().split()
         self.assertEqual(said[-3:], [str((self.folder / path).resolve()) for path in ("view/a.hdf.series", "out")] + ["H"])
+
+    def test_film_has_no_pictures_of_an_earlier_run(self):
+        file, out = write(self.folder / "a.hdf", times=(0, 1)), self.folder / "a"
+        out.mkdir()
+        for name in ("000000.png", "000007.png", "mine.png"):
+            (out / name).touch()
+        self.fake("pvpython", f": > {out}/000000.png; : > {out}/000001.png")
+        self.fake("ffmpeg", "echo *.png > film.mp4")
+        done = self.render(file)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((out / "film.mp4").read_text().split(), ["000000.png", "000001.png", "mine.png"])
+
+    def test_starts_an_x_server_only_without_a_display(self):
+        file = write(self.folder / "a.hdf", times=(0, 1))
+        self.fake("pvpython", f": > {self.folder}/a/000000.png")
+        self.fake("xvfb-run", f'echo "$@" > {self.folder}/said; shift 3; exec "$@"')
+        self.assertEqual(self.render(file).returncode, 0)
+        self.assertTrue((self.folder / "said").read_text().startswith("-a -s -noreset "))
+        (self.folder / "said").unlink()
+        self.more = {"DISPLAY": ":7"}
+        self.assertEqual(self.render(file).returncode, 0)
+        self.assertFalse((self.folder / "said").exists())
+
+    def test_failures_of_paraview(self):
+        file = write(self.folder / "a.hdf", times=(0, 1))
+        (self.folder / "a").mkdir()
+        (self.folder / "a/000000.png").touch()  # of an earlier run: no sign of success
+        self.fake("pvpython", "exit 0")
+        done = self.render(file)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("xvfb", done.stderr)
+        self.fake("pvpython", "exit 2")  # it has said why
+        done = self.render(file)
+        self.assertEqual((done.returncode, done.stderr), (2, ""))
 
 
 if __name__ == "__main__":
