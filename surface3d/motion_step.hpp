@@ -83,6 +83,7 @@ public:
 
     const SurfaceSpace& space() const { return space_; }
     const MotionUnknowns& unknowns() const { return unknowns_; }
+    const StepSystem& system() const { return system_; }  // of the last step, rows scaled to be almost symmetric
     const MotionLaw& law() const { return law_; }
     MotionFields fields(const CurvedMesh& mesh);
     // (u.nu, phi) of a velocity as in MotionState.

@@ -1,0 +1,40 @@
+// The paper's perturbed sphere as a fluid, k42 = 0.12, whose steps are timed.
+#pragma once
+
+#include "surface3d/base_meshes.hpp"
+#include "surface3d/motion_step.hpp"
+#include "tests/surface3d/errors.hpp"
+
+namespace tubule::surface3d {
+
+inline const Bending energy{.k = {0.125, 0, 0.12}, .H0 = 0};
+inline const MotionLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}});
+inline constexpr double tau = 1e-3;
+
+inline MotionControl control_of(const CurvedMesh& mesh) {
+    const Extent e = extent(SurfaceSpace(mesh), mesh);
+    return {.area = e.area, .volume = e.volume, .scheme = Scheme::alpha};
+}
+
+// The surface after a few steps, and the system of the next one.
+struct Scene {
+    CurvedMesh mesh;
+    MotionStepper stepper;
+    MotionState state;
+    MotionFields fields;
+    StepBase base;
+    StepSystem system;
+
+    Scene(int n, int order)
+        : mesh(mapped_mesh(icosphere(n), order, map_of(perturbed_sphere()))),
+          stepper(mesh, fluid, energy, control_of(mesh)),
+          state(stepper.start(mesh)) {
+        for (int i = 0; i < 3; ++i) state = stepper.step(state, tau).state;
+        mesh = stepper.mesh(state.X);
+        fields = stepper.fields(mesh);
+        base = {&mesh, fields, state.X - state.X_past, state.w, state.u, state.u, tau};
+        assemble(stepper.space(), stepper.unknowns(), fluid, energy, base, system);
+    }
+};
+
+}  // namespace tubule::surface3d
