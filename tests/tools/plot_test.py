@@ -567,6 +567,48 @@ class WorkPrecision(InFolder):
             self.assertIn(words, done.stderr)
 
 
+class StepCosts(InFolder):
+    HEADER = "part,order,triangles,measure,clock,threads,whole,analysis,factors,iterations,fill,residual\n"
+    ROWS = (
+        "solvers,3,320,a step,cpu,1,70,0,0,0,0,0\n"
+        '"solvers",3,320,"its system, with border",cpu,1,30,0,0,5,0,0\n'
+        "solvers,3,320,some factors,cpu,1,28,4,16,5,1e6,1e-12\n"
+        "lagged,3,320,factors kept for 1,cpu,1,28,0,16,5,0,0\n"
+        "lagged,3,320,factors kept for 8,cpu,1,42,0,2,19,0,0\n"
+        "threads,3,320,a step,wall,1,70,0,0,0,0,0\n"
+        "threads,3,320,a step,wall,2,50,0,0,0,0,0\n"
+    )
+
+    def draw(self, text):
+        table = self.folder / "table.csv"
+        table.write_text(text)
+        command = [sys.executable, "-B", PLOT / "step_costs.py", table, "-o", self.folder / "s.svg"]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_chart(self):
+        done = self.draw(self.HEADER + self.ROWS)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        texts = svg_texts(self.folder / "s.svg")
+        # The factors' own time beside their bar; iterations of the factors that are kept longest.
+        for words in ("some factors", "28", "k = 3, 320 triangles", "19", "rest of the step", "two threads"):
+            self.assertIn(words, texts)
+
+    def test_without_threads(self):
+        done = self.draw(self.HEADER + "".join(r for r in self.ROWS.splitlines(True) if not r.startswith("threads")))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertNotIn("two threads", svg_texts(self.folder / "s.svg"))
+
+    def test_refusals(self):
+        for text, words in (
+            ("a,b\n1,2\n", "must have the columns"),
+            (self.HEADER + self.ROWS.replace("70", "nan"), "negative or not finite"),
+            (self.HEADER + self.ROWS.replace("solvers", "other"), "has no rows of solvers"),
+        ):
+            done = self.draw(text)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, done.stderr)
+
+
 class WorkPrecisionFluid(InFolder):
     HEADER = "model,series,asked,error,estimate,cpu_s\n"
     ROWS = (

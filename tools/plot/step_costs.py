@@ -8,7 +8,9 @@ import sys
 from dataclasses import dataclass
 
 NUMBERS = ("order", "triangles", "threads", "whole", "analysis", "factors", "iterations")
+PARTS = ("solvers", "lagged")  # "threads" needs a quiet machine and may be missing
 STEP, SYSTEM = "a step", "its system, with border"
+CHOSEN = "LDL^T single, METIS on nodes"
 DENSE = "the same, H and K first"  # twenty times as long as the others: in the table alone
 
 
@@ -42,13 +44,14 @@ def read_table(path):
     except (KeyError, TypeError, ValueError, csv.Error) as error:
         columns = ", ".join(("part", "measure", *NUMBERS))
         raise BadInput(f"{path}: must have the columns {columns} with numbers ({error})") from error
-    if not any(row.part == "solvers" for row in rows):
-        raise BadInput(f"{path}: has no rows of solvers")
+    for part in PARTS:
+        if not any(row.part == part for row in rows):
+            raise BadInput(f"{path}: has no rows of {part}")
     return rows
 
 
 def draw_solvers(axes, rows, colours):
-    """A bar a measure: analysis, factors, solution, and what else a step takes."""
+    """A bar a measure: its system (the number), and what else a step takes. Bold: what the program does."""
     by_name = {row.measure: row for row in rows}
     rest = by_name[STEP].whole - by_name[SYSTEM].whole
     names = [name for name in by_name if name not in (STEP, SYSTEM, DENSE)]
@@ -60,6 +63,8 @@ def draw_solvers(axes, rows, colours):
             left += part
         axes.annotate(f"{row.whole:.0f}", (left, place), (2, 0), textcoords="offset points", va="center", fontsize=6.5)
     axes.set_yticks(range(len(names)), reversed(names))
+    for label in axes.get_yticklabels():
+        label.set_fontweight("bold" if label.get_text() == CHOSEN else "normal")
     axes.set_xlim(0, 1.15 * axes.get_xlim()[1])
     axes.tick_params(axis="y", length=0)
 
@@ -82,7 +87,7 @@ def draw_lagged(axes, rows, sizes):
     axes.set_xticks((1, 2, 4, 8), ("1", "2", "4", "8"))
     axes.set_xlim(0.9, 10)
     axes.set_xlabel("steps for which factors are kept")
-    axes.set_ylabel("time of the system over that of n = 1")
+    axes.set_ylabel("system's time over that of n = 1")
     axes.set_title("lagged factors (numbers: iterations)")
     axes.legend()
 
@@ -115,23 +120,24 @@ def draw(path, outputs):
     orders = sorted({order for order, _ in sizes})
     triangles = sorted({number for _, number in sizes})
     colours = [*style.line_colours(3), "0.85"]
-    height = 7.6
-    figure = Figure(figsize=(style.WIDTH, height))
+    figure = Figure(figsize=(style.WIDTH, 7.6))
     for i, order in enumerate(orders):
         for j, number in enumerate(triangles):
-            axes = figure.add_axes([0.255 + 0.25 * j, 0.735 - 0.305 * i, 0.225, 0.235])
+            axes = figure.add_axes([0.255 + 0.25 * j, 0.735 - 0.295 * i, 0.225, 0.235])
             draw_solvers(axes, [r for r in rows if (r.part, r.order, r.triangles) == ("solvers", order, number)], colours)
             axes.set_title(f"k = {order}, {number} triangles")
             if j > 0:
                 axes.set_yticklabels([])
             if i + 1 == len(orders):
                 axes.set_xlabel("CPU time, one thread (ms)")
-    parts = ("analysis", "factors", "solution", "rest of the step")
-    handles = [Patch(color=colour, label=label) for label, colour in zip(parts, colours)]
-    figure.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.6, 0.36), ncol=4)
-    draw_lagged(figure.add_axes([0.085, 0.06, 0.4, 0.26]), [r for r in rows if r.part == "lagged"], sizes)
+    names = ("analysis", "factors", "solution", "rest of the step")
+    handles = [Patch(color=colour, label=label) for label, colour in zip(names, colours)]
+    figure.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.6, 0.352), ncol=4)
     threads = [r for r in rows if r.part == "threads"]
-    draw_threads(figure.add_axes([0.585, 0.06, 0.4, 0.26]), threads, sizes, style.line_colours(3))
+    width = 0.4 if threads else 0.9
+    draw_lagged(figure.add_axes([0.085, 0.06, width, 0.26]), [r for r in rows if r.part == "lagged"], sizes)
+    if threads:
+        draw_threads(figure.add_axes([0.585, 0.06, 0.4, 0.26]), threads, sizes, style.line_colours(3))
     style.save(figure, outputs)
 
 
