@@ -46,8 +46,6 @@ System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorF
     const int n = space.width(), points = table.points();
     System out{space.pattern(), {}, VectorField::Zero(3, space.size())};
     out.flux.fill(out.L);
-    Eigen::MatrixXd products(n * n, points);
-    for (int q = 0; q < points; ++q) products.col(q) = (table.value.col(q) * table.value.col(q).transpose()).reshaped();
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
         const CellColumns<3> nu = space.gather(normal, cell);
@@ -61,7 +59,7 @@ System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorF
         }
         const CellMatrix stiffness = grad * grad.transpose();
         space.add(out.L, cell, stiffness);
-        const Eigen::MatrixX3d blocks = products * dS_nu;
+        const Eigen::MatrixX3d blocks = space.products() * dS_nu;
         for (int d = 0; d < 3; ++d) space.add(out.flux[d], cell, blocks.col(d).reshaped(n, n));
         const CellColumns<3> pull = X * stiffness * -weight[cell];
         for (int a = 0; a < n; ++a) out.pull.col(space.node(cell, a)) += pull.col(a);

@@ -16,8 +16,8 @@ struct MotionMemory {
     double total_start = 0, lowest_total = 0;  // energy with kinetic energy, then and since
     double dissipated = 0, corrected = 0, reference_energy = 0;
     double dissipation_past = 0;  // rate at the step before
-    double error = 0;   // largest difference from the coarser run
-    double defect = 0;  // largest defect of the dissipation identity
+    double error = 0;             // largest difference from the coarser run
+    double defect = 0;            // largest defect of the dissipation identity
 };
 
 // Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest

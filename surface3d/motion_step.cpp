@@ -17,37 +17,42 @@ constexpr double stiffer = 0.08;
 constexpr double follows = 1e-7;     // how well the mesh follows the surface, relative
 constexpr int most_iterations = 20;  // of that, before it is factored
 
-template <class AtPoint>
-Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, AtPoint&& at_point) {
-    Eigen::Matrix2Xd of_cell(2, space.cells());  // so that the sum does not depend on the number of threads
+// `of_cell(cell)` gives what a cell has at its points: at_point(p, q).
+template <class OfCell>
+Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, OfCell&& of_cell) {
+    Eigen::Matrix2Xd sums(2, space.cells());  // so that the sum does not depend on the number of threads
     const Tabulation& table = space.tabulation();
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
+        const auto at_point = of_cell(cell);
         Eigen::Vector2d sum = Eigen::Vector2d::Zero();
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
-            sum += table.weight[q] * p.area * at_point(cell, p, q);
+            sum += table.weight[q] * p.area * at_point(p, q);
         }
-        of_cell.col(cell) = sum;
+        sums.col(cell) = sum;
     });
-    const Eigen::Vector2d total = of_cell.rowwise().sum();
+    const Eigen::Vector2d total = sums.rowwise().sum();
     return {total[0], total[1]};
 }
 
 }  // namespace
 
 Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh) {
-    return sum_over(space, mesh, [](int, const SurfacePoint<double>& p, int) {
-        return Eigen::Vector2d(1, p.x.head<2>().dot(p.normal.head<2>()) / 2);  // the flux of (x, y, 0)/2
+    return sum_over(space, mesh, [](int) {
+        return [](const SurfacePoint<double>& p, int) {
+            return Eigen::Vector2d(1, p.x.head<2>().dot(p.normal.head<2>()) / 2);  // the flux of (x, y, 0)/2
+        };
     });
 }
 
 Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d) {
     const Tabulation& table = space.tabulation();
-    return sum_over(space, mesh, [&](int cell, const SurfacePoint<double>& p, int q) {
-        const CellColumns<3> D = space.gather(d, cell);
-        const double divergence = gradients(p, table, q).cwiseProduct(D).sum();
-        return Eigen::Vector2d(divergence, (D * table.value.col(q)).dot(p.normal));
+    return sum_over(space, mesh, [&](int cell) {
+        return [&table, D = space.gather(d, cell)](const SurfacePoint<double>& p, int q) {
+            const double divergence = gradients(p, table, q).cwiseProduct(D).sum();
+            return Eigen::Vector2d(divergence, (D * table.value.col(q)).dot(p.normal));
+        };
     });
 }
 
@@ -199,15 +204,20 @@ Eigen::MatrixXd MotionStepper::momenta(const CurvedMesh& mesh, const Eigen::Matr
     return out;
 }
 
+// What friction leaves of them after a step; nothing where there is no inertia.
+Eigen::VectorXd MotionStepper::momenta_after(const MotionState& from, double tau) const {
+    if (!law_.flows || law_.inertia == 0) return {};
+    const CurvedMesh m = mesh(from.X);
+    return std::exp(-law_.friction / law_.inertia * tau) * (momenta(m, rigid_motions(m)).transpose() * from.u);
+}
+
 // Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,
 // which would move a surface at rest ever faster: a rigid motion takes it back. It changes no shape.
-void MotionStepper::keep_momenta(const MotionState& from, double te, MotionState& to) const {
-    if (!law_.flows || law_.inertia == 0) return;
-    const CurvedMesh before = mesh(from.X), after = mesh(to.X);
-    const Eigen::MatrixXd motions = rigid_motions(after), of = momenta(after, motions);
-    const double left = std::exp(-law_.friction / law_.inertia * (to.time - from.time));
-    const Eigen::VectorXd lack =
-        left * (momenta(before, rigid_motions(before)).transpose() * from.u) - of.transpose() * to.u;
+void MotionStepper::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
+    if (kept.size() == 0) return;
+    const CurvedMesh m = mesh(to.X);
+    const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m, motions);
+    const Eigen::VectorXd lack = kept - of.transpose() * to.u;
     const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
     to.u += back;
     const VectorField nodal = back.reshaped(unknowns_.nodes(), 3).transpose();
@@ -419,7 +429,8 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
         mesh_motion_.velocity(space_, at, base.fields, *projection_, mesh_flux(base, to.u), control_.relaxation, f.te);
     to.X = f.Xbar + f.te * to.w;
     finish(from, f, to);
-    keep_momenta(from, f.te / f.level, to);
+    const Eigen::VectorXd momenta = momenta_after(from, tau);
+    keep_momenta(momenta, f.te / f.level, to);
     if (past) {
         // Adams-Bashforth of second order for comparison; the constants of both errors are known (Milne).
         const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * from.w_past);
@@ -435,7 +446,7 @@ MotionStep MotionStepper::step(const MotionState& from, double tau) {
     const VectorField kept_extent = correction(to.X, base.fields, keeps_volume);
     out.correction = work(kept_extent, base.fields);
     to.X += kept_extent;
-    keep_momenta(from, 0, to);  // on the surface as it is now
+    keep_momenta(momenta, 0, to);  // on the surface as it is now
     to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;
     return out;
 }

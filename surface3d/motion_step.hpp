@@ -105,7 +105,8 @@ private:
     void make_symmetric(const StepBase& base);
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
     Eigen::MatrixXd momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const;
-    void keep_momenta(const MotionState& from, double te, MotionState& to) const;
+    Eigen::VectorXd momenta_after(const MotionState& from, double tau) const;
+    void keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const;
     Extent lack(const CurvedMesh& mesh) const;
     VectorField correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
     double work(const VectorField& displacement, const MotionFields& fields) const;

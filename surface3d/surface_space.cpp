@@ -13,7 +13,10 @@ SurfaceSpace::SurfaceSpace(const CurvedMesh& mesh, int degree)
       size_(mesh.size()),
       width_(mesh.nodes_per_cell()),
       cells_(mesh.cells),
-      tabulation_(mesh.order, quadrature(degree)) {
+      tabulation_(mesh.order, quadrature(degree)),
+      products_(width_ * width_, tabulation_.points()) {
+    for (int q = 0; q < tabulation_.points(); ++q)
+        products_.col(q) = (tabulation_.value.col(q) * tabulation_.value.col(q).transpose()).reshaped();
     set_colours();
     set_pattern();
 }
@@ -71,12 +74,9 @@ Eigen::SparseMatrix<double> mass_matrix(const SurfaceSpace& space, const CurvedM
     Eigen::SparseMatrix<double> A = space.pattern();
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
-        CellMatrix block = CellMatrix::Zero(space.width(), space.width());
-        for (int q = 0; q < table.points(); ++q) {
-            const double dS = table.weight[q] * tangent_point(X, table, q).area;
-            block.noalias() += (dS * table.value.col(q)) * table.value.col(q).transpose();
-        }
-        space.add(A, cell, block);
+        Eigen::VectorXd dS(table.points());
+        for (int q = 0; q < table.points(); ++q) dS[q] = table.weight[q] * tangent_point(X, table, q).area;
+        space.add(A, cell, (space.products() * dS).reshaped(space.width(), space.width()));
     });
     return A;
 }

@@ -51,6 +51,9 @@ public:
     int width() const { return width_; }  // nodes of a cell
     int node(int cell, int a) const { return cells_[cell * width_ + a]; }
     const Tabulation& tabulation() const { return tabulation_; }
+    // phi_a phi_b at each point, one column each, entry (a, b) at b * width() + a: a cell's integrals of such products
+    // are this times what stands before them, point by point.
+    const Eigen::MatrixXd& products() const { return products_; }
     // At the same points, functions of another order.
     Tabulation tabulation(int order) const;
 
@@ -95,6 +98,7 @@ private:
     int order_, size_, width_;
     std::vector<int> cells_;
     Tabulation tabulation_;
+    Eigen::MatrixXd products_;
     std::vector<std::vector<int>> colours_;
     Eigen::SparseMatrix<double> pattern_;
     std::vector<int> slots_;  // of each entry of each cell matrix, column by column

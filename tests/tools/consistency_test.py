@@ -41,6 +41,13 @@ class Rows(unittest.TestCase):
         self.assertAlmostEqual(one.order, 4, delta=1e-6)
         self.assertEqual(one.complaints(), [])
 
+    def test_a_coarse_mesh_right_by_accident(self):
+        """The order is counted from the worst of the coarser meshes: 8 times less on a mesh half as wide is 3."""
+        one = row({100: 1e-4, 200: -8e-3, 800: 1e-3})
+        self.assertAlmostEqual(one.order, 3, delta=1e-6)
+        self.assertEqual(one.complaints(), [])
+        self.assertEqual(row({100: 1e-4, 200: -1e-3, 400: 2e-3}).complaints(), ["falls with order -2 only"])
+
     def test_too_far_apart(self):
         self.assertEqual(row({100: 1e-1, 400: 1.1e-2}).complaints(), ["differs by 0.011, more than 0.01"])
         self.assertEqual(row({100: 1e-1, 400: 1.1e-2}, bound=None).complaints(), [])

@@ -86,8 +86,8 @@ which ends with status 1 if a difference exceeds its bound. Do not edit them: th
 - *T* triangles of order 4. *Differences* are the largest of all output times (in `consistency.csv` each by itself),
   relative to E_ref for energies and for what was dissipated, to the size of the shape for distances (radius of the
   sphere of the same area, or of the tube), to 4 pi for INT K, else to the largest value of tier 1.
-- *Order* is that of the difference in the mesh width, from the coarsest to the finest mesh; empty where tier 1's error
-  or rounding would decide it. The tolerance of the time steps falls with T^-3, so that errors in time fall as those in
+- *Order* is that of the difference in the mesh width, to the finest mesh from the one with the largest difference (the coarsest, unless it is
+  right by accident); empty where tier 1's error or rounding would decide it. The tolerance of the time steps falls with T^-3, so that errors in time fall as those in
   space should, with the fourth power of the mesh width; fixed steps (rates) are the same on all meshes.
 - *Bound*: more than that on the finest mesh fails the command, and so does an order below 1 if more than a tenth of the
   bound is left (but for extremes, and where curvature jumps). Empty: only told.

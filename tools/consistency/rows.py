@@ -29,11 +29,12 @@ class Row:
 
     @property
     def order(self):
-        """In the mesh width, from the coarsest to the finest mesh; None where the reference's error is in the way, or
-        nothing is left but rounding."""
+        """In the mesh width, from the mesh with the largest difference (the coarsest, unless it is right by accident)
+        to the finest; None where the reference's error is in the way, or nothing is left but rounding."""
         if len(self.found) < 2:
             return None
-        first, last = self.meshes[0], self.meshes[-1]
+        last = self.meshes[-1]
+        first = max(self.meshes[:-1], key=self.difference)
         coarse, fine = self.difference(first), self.difference(last)
         if fine <= max(3 * self.error, 1e-9):
             return None
