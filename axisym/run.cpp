@@ -6,6 +6,7 @@
 
 #include "axisym/curve_frame.hpp"
 #include "axisym/curve_run.hpp"
+#include "axisym/frame.hpp"
 #include "axisym/graph_run.hpp"
 
 namespace tubule::axisym {
@@ -37,6 +38,13 @@ void describe_effort(RunSummary& s) {
 
 std::vector<std::string> series_names(const Case& c) {
     return begins_as_graph(c) ? graph_series_names(c) : curve_series_names(c);
+}
+
+void check_restart(const Record& record) {
+    if (is_curve(record))
+        curve_restart(record);
+    else
+        restart_state(record);
 }
 
 RunSummary run(const Case& c, RunObserver& observer, const Record* restart) {

@@ -23,6 +23,9 @@ void describe_effort(RunSummary& summary);
 // Names of the series a run of this case writes, "time" first.
 std::vector<std::string> series_names(const Case& c);
 
+// Throws std::runtime_error if the record does not hold what a run goes on from.
+void check_restart(const Record& record);
+
 // Tubes in gradient flow are computed as graphs r(z), from the beginning as curves if one overhangs; all else as
 // curves. Runs the case, from `restart` (a frame or checkpoint of the same case) if given. What the physics or the
 // numerics do is reported in the summary, never thrown; a start that cannot be set up throws std::runtime_error.

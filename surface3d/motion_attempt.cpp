@@ -43,15 +43,24 @@ double dissipated_in(double tau, double before, double rate, double now, double 
 
 }  // namespace
 
-MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, bool recorded, const MotionSettings& settings,
-                             const MotionTrace* coarser, std::chrono::steady_clock::time_point started)
-    : case_(c), watch_(watch), recorded_(recorded), coarser_(coarser), started_(started), outputs_(output_times(c)) {
-    memory_.elements = settings.elements, memory_.tolerance = settings.tolerance;
+std::optional<StopReport> find_pause(const Case& c, RunObserver& watch, Clock::time_point started, double time) {
+    if (c.time.limit && std::chrono::duration<double>(Clock::now() - started).count() > *c.time.limit)
+        return StopReport{Stop::time_limit, time, fmt::format("used the {} s of time.limit", *c.time.limit),
+                          "go on with --resume"};
+    if (watch.interrupted())
+        return StopReport{Stop::interrupted, time, "interrupted by a signal", "go on with --resume"};
+    return std::nullopt;
+}
+
+MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, const MotionSettings& settings,
+                             const MotionTrace* coarser, Clock::time_point started)
+    : case_(c), watch_(watch), coarser_(coarser), started_(started), outputs_(output_times(c)) {
+    memory_.settings = settings;
     memory_.error = settings.difference;
 }
 
 double MotionAttempt::seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+    return std::chrono::duration<double>(Clock::now() - started_).count();
 }
 
 double MotionAttempt::length() const {
@@ -71,12 +80,11 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
                                 .least_variation = memory_.least_variation,
                                 .scheme = time_scheme(case_)};
     stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
-    if (recorded_) mesh_number_ = watch_.mesh(cells_of(mesh));
     summary.elements = mesh.triangles();
 }
 
 void MotionAttempt::begin() {
-    const StartMesh start = start_mesh(case_, memory_.elements);
+    const StartMesh start = start_mesh(case_, memory_.settings.elements);
     summary.warnings = start.notes;
     const SurfaceSpace space(start.mesh);
     if (const auto fold = find_fold(mesh_quality(start.mesh))) {
@@ -122,7 +130,8 @@ void MotionAttempt::resume(const Restart& restart) {
     look();
     next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), state_.time) - outputs_.begin();
     last_row_ = last_frame_ = state_.time;
-    trace.add(state_.time, now_.bending.energy);
+    trace = MotionTrace(restart.record, own_trace);
+    if (next_output_ == outputs_.size()) early_ = StopReport{Stop::finished, state_.time, "reached time.end", ""};
 }
 
 void MotionAttempt::look() {
@@ -131,7 +140,7 @@ void MotionAttempt::look() {
 
 // A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
 std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const VectorField& X) const {
-    return find_impossible_curvature(o, stepper_->mesh(X), recorded_ ? 0.01 : 0.05);
+    return find_impossible_curvature(o, stepper_->mesh(X), reported() ? 0.01 : 0.05);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
@@ -151,7 +160,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     try {
         const MotionStep next = paper_ ? paper_->step(state_, tau) : stepper_->step(state_, tau);
         if (!next.state.X.allFinite() || !next.state.u.allFinite()) return failed("the step overflows");
-        const double error = next.error / (memory_.tolerance * length());
+        const double error = next.error / (memory_.settings.tolerance * length());
         if (!case_.surface.step && error > 2)
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
@@ -180,7 +189,7 @@ void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
     now_ = m;
     memory_.lowest_total = std::min(memory_.lowest_total, total());
     memory_.defect = std::max(memory_.defect, std::abs(defect_now()));
-    ++steps_;
+    ++memory_.steps;
 }
 
 // A step that was cut short by an output says little about how long the next one may be.
@@ -191,7 +200,7 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 }
 
 bool MotionAttempt::wants_new_mesh() const {
-    if (paper_ || steps_ < mesh_since_ + steps_between_meshes) return false;
+    if (paper_ || memory_.steps < memory_.mesh_since + steps_between_meshes) return false;
     return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > turn_to_remesh);
 }
 
@@ -199,7 +208,7 @@ bool MotionAttempt::wants_new_mesh() const {
 // What the energy jumps counts as an error. Where no better mesh can be made, the old one is kept: check_state() tells
 // when it will do no longer.
 void MotionAttempt::make_new_mesh() {
-    mesh_since_ = steps_;
+    memory_.mesh_since = memory_.steps;
     const MotionLaw& law = stepper_->law();
     const int n = static_cast<int>(state_.X.cols()), d = law.components();
     const auto found = remesh(stepper_->mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
@@ -207,7 +216,7 @@ void MotionAttempt::make_new_mesh() {
     if (!better || better->quality.worst < now_.quality.worst) return;
     const double time = state_.time, energy = now_.bending.energy, before = total();
     make_stepper(better->mesh);
-    ++meshes_;
+    ++memory_.meshes;
     state_ = stepper_->start(better->mesh);
     state_.time = time;
     state_.u = better->fields.transpose().reshaped();
@@ -220,17 +229,17 @@ void MotionAttempt::make_new_mesh() {
 
 std::optional<StopReport> MotionAttempt::step() {
     const double left = left_until_output();
-    double tau = left / std::ceil(left / memory_.next_step * (1 - 1e-9));  // arrives without a last short step
-    while (const auto refusal = attempt(tau)) {
-        ++rejected_;
-        tau *= refusal->shrink;
-        memory_.next_step = tau;
-        if (case_.surface.step || tau < shortest_step * memory_.relaxation) return refusal->report;
+    const auto tau = [&] { return left / std::ceil(left / memory_.next_step * (1 - 1e-9)); };  // no short last step
+    while (const auto refusal = attempt(tau())) {
+        ++memory_.rejected;
+        memory_.next_step = refusal->shrink * tau();
+        if (case_.surface.step || memory_.next_step < shortest_step * memory_.relaxation) return refusal->report;
         if (watch_.interrupted()) break;
     }
+    trace.add(state_.time, now_.bending.energy);
     compare();
     write_row();
-    if (recorded_) watch_.progress(state_.time, now_.bending.energy, state_.step);
+    if (reported()) watch_.progress(state_.time, now_.bending.energy, state_.step);
     const bool at_output = left_until_output() <= 1e-12 * case_.time.end;
     auto stop = check_state();
     if (!stop) stop = check_crossing(at_output);
@@ -242,7 +251,7 @@ std::optional<StopReport> MotionAttempt::step() {
     }
     if (!stop) stop = check_progress();
     if (stop) return stop;
-    if (recorded_ && seconds() > last_checkpoint_ + seconds_between_checkpoints) write_checkpoint();
+    if (seconds() > last_checkpoint_ + seconds_between_checkpoints) write_checkpoint();
     if (wants_new_mesh()) make_new_mesh();
     return std::nullopt;
 }
@@ -252,6 +261,7 @@ void MotionAttempt::go() {
     if (!stop) stop = check_state();
     if (!stop) stop = impossible(now_.bending, state_.X);
     if (!stop) stop = check_crossing(true);
+    if (stop && !early_) compare();
     while (!stop) stop = step();
     summarise(*stop);
 }
@@ -270,9 +280,9 @@ std::optional<StopReport> MotionAttempt::check_state() const {
 // is no deeper than that.
 std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
     const double spacing = length() / std::sqrt(summary.elements) / element_order(case_);
-    moved_ += state_.step * now_.speed;
-    if (moved_ < unseen_move * spacing && !at_output) return std::nullopt;
-    moved_ = 0;
+    memory_.moved += state_.step * now_.speed;
+    if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
+    memory_.moved = 0;
     auto crossing = find_self_intersection(stepper_->mesh(state_.X));
     if (crossing) crossing->time = state_.time;
     return crossing;
@@ -281,10 +291,7 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
 // Whether it is worth while, and allowed, to go on.
 std::optional<StopReport> MotionAttempt::check_progress() {
     const double t = state_.time;
-    if (case_.time.limit && seconds() > *case_.time.limit)
-        return StopReport{Stop::time_limit, t, fmt::format("used the {} s of time.limit", *case_.time.limit),
-                          "go on with --resume"};
-    if (watch_.interrupted()) return StopReport{Stop::interrupted, t, "interrupted by a signal", "go on with --resume"};
+    if (auto pause = find_pause(case_, watch_, started_, t)) return pause;
     if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.reference_energy)
         return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
     return crawl_.look(t, state_.step, first_step * memory_.relaxation, memory_.lowest_total / memory_.reference_energy,
@@ -299,7 +306,6 @@ double MotionAttempt::what_may_change() const {
 
 void MotionAttempt::compare() {
     const double t = state_.time;
-    trace.add(t, now_.bending.energy);
     error_now_ = memory_.reference_energy;  // nothing is known
     if (!coarser_ || t > coarser_->end()) return;
     error_now_ = std::abs(now_.bending.energy - (*coarser_)(t));
@@ -307,13 +313,13 @@ void MotionAttempt::compare() {
 }
 
 void MotionAttempt::write_row() {
-    if (!recorded_ || last_row_ == state_.time) return;
+    if (!reported() || last_row_ == state_.time) return;
     last_row_ = state_.time;
     watch_.row(motion_values({state_, now_, defect_now(), memory_.corrected, error_now_, summary.elements, seconds()}));
 }
 
 void MotionAttempt::write_frame() {
-    if (!recorded_ || state_.time == last_frame_) return;
+    if (!reported() || state_.time == last_frame_) return;
     last_frame_ = state_.time;
     watch_.frame([&] { return record(); });
 }
@@ -324,8 +330,10 @@ void MotionAttempt::write_checkpoint() {
 }
 
 Record MotionAttempt::record() const {
-    Record out = motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh_number_);
-    if (coarser_) out.arrays.push_back(coarser_->array());
+    const std::size_t mesh = watch_.mesh(cells_of(stepper_->mesh(state_.X)));
+    Record out = motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh);
+    out.arrays.push_back(trace.array(own_trace));
+    if (coarser_) out.arrays.push_back(coarser_->array(coarser_trace));
     return out;
 }
 
@@ -337,18 +345,18 @@ void MotionAttempt::summarise(const StopReport& stop) {
     write_row();
     if (!can_go_on(stop.reason))
         write_frame();
-    else if (recorded_)
+    else
         write_checkpoint();  // what a resumed run goes on from is no frame of its own
     const int nodes = static_cast<int>(state_.X.cols());
-    summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", steps_, rejected_,
-                                 summary.elements, element_order(case_), nodes);
+    summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", memory_.steps,
+                                 memory_.rejected, summary.elements, element_order(case_), nodes);
     summary.details = {{"elements", std::int64_t{summary.elements}},
                        {"nodes", std::int64_t{nodes}},
                        {"order", std::int64_t{element_order(case_)}},
-                       {"steps", std::int64_t{steps_}},
-                       {"rejected_steps", std::int64_t{rejected_}},
-                       {"time_tolerance", memory_.tolerance},
-                       {"meshes", std::int64_t{meshes_}},
+                       {"steps", std::int64_t{memory_.steps}},
+                       {"rejected_steps", std::int64_t{memory_.rejected}},
+                       {"time_tolerance", memory_.settings.tolerance},
+                       {"meshes", std::int64_t{memory_.meshes}},
                        {"relaxation", memory_.relaxation},
                        {"dissipated", memory_.dissipated},
                        {"identity_defect", defect_now()},

@@ -18,12 +18,17 @@
 
 namespace tubule::surface3d {
 
+using Clock = std::chrono::steady_clock;
+
+// Whether a run is to stop here and go on another time.
+std::optional<StopReport> find_pause(const Case& c, RunObserver& watch, Clock::time_point started, double time);
+
 class MotionAttempt {
 public:
-    // Nothing is written unless `recorded`. Of the time limit, what has gone by since `started` is used. All references
-    // must outlive the attempt.
-    MotionAttempt(const Case& c, RunObserver& watch, bool recorded, const MotionSettings& settings,
-                  const MotionTrace* coarser, std::chrono::steady_clock::time_point started);
+    // Of a run for comparison nothing is written but checkpoints. Of the time limit, what has gone by since `started`
+    // is used. All references must outlive the attempt.
+    MotionAttempt(const Case& c, RunObserver& watch, const MotionSettings& settings, const MotionTrace* coarser,
+                  Clock::time_point started);
 
     // One of the first two, then go().
     void begin();
@@ -73,6 +78,7 @@ private:
     void summarise(const StopReport& stop);
     Record record() const;
 
+    bool reported() const { return memory_.settings.role == Role::reported; }
     double seconds() const;
     double length() const;
     double total() const { return now_.bending.energy + now_.kinetic; }
@@ -81,21 +87,18 @@ private:
 
     const Case& case_;
     RunObserver& watch_;
-    bool recorded_;
     const MotionTrace* coarser_;
-    std::chrono::steady_clock::time_point started_;
+    Clock::time_point started_;
     std::unique_ptr<MotionStepper> stepper_;
     std::unique_ptr<PaperStepper> paper_;  // makes the steps instead where the case says so
     MotionState state_;
     MotionMeasures now_;
     MotionMemory memory_;
     Crawl crawl_;
-    std::optional<StopReport> early_;  // nothing can be begun
+    std::optional<StopReport> early_;  // nothing can be begun, or nothing is left to do
     std::vector<double> outputs_;
-    std::size_t next_output_ = 0, mesh_number_ = 0;
-    double error_now_ = 0, moved_ = 0;
-    double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
-    int steps_ = 0, rejected_ = 0, mesh_since_ = 0, meshes_ = 1;
+    std::size_t next_output_ = 0;
+    double error_now_ = 0, last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
 };
 
 }  // namespace tubule::surface3d

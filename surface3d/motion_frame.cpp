@@ -10,13 +10,17 @@ namespace {
 template <class Memory, class Visit>
 void for_each_number(Memory& m, Visit&& visit) {
     visit("restart_next_step", m.next_step), visit("restart_relaxation", m.relaxation);
-    visit("restart_tolerance", m.tolerance);
+    visit("restart_elements", m.settings.elements), visit("restart_tolerance", m.settings.tolerance);
+    visit("restart_difference", m.settings.difference), visit("restart_pair", m.settings.pair);
+    visit("restart_role", m.settings.role);
     visit("restart_area", m.area), visit("restart_volume", m.volume);
     visit("restart_least_variation", m.least_variation), visit("restart_lowest_total", m.lowest_total);
     visit("restart_total_start", m.total_start), visit("restart_dissipated", m.dissipated);
     visit("restart_corrected", m.corrected), visit("restart_error", m.error);
     visit("restart_reference_energy", m.reference_energy), visit("restart_defect", m.defect);
-    visit("restart_dissipation_past", m.dissipation_past);
+    visit("restart_dissipation_past", m.dissipation_past), visit("restart_moved", m.moved);
+    visit("restart_steps", m.steps), visit("restart_rejected", m.rejected);
+    visit("restart_mesh_since", m.mesh_since), visit("restart_meshes", m.meshes);
 }
 
 Array column(const std::string& name, const Eigen::VectorXd& values) {
@@ -71,9 +75,10 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
                    {"restart_solved_lambda", s.solved.lambda},
                    {"restart_step", s.step},
                    {"restart_missed_area", s.missed.area},
-                   {"restart_missed_volume", s.missed.volume},
-                   {"restart_elements", static_cast<double>(memory.elements)}};
-    for_each_number(memory, [&](const char* name, double value) { out.numbers.emplace_back(name, value); });
+                   {"restart_missed_volume", s.missed.volume}};
+    for_each_number(memory, [&](const char* name, const auto& value) {
+        out.numbers.emplace_back(name, static_cast<double>(value));
+    });
     Eigen::VectorXd density_at(s.X.cols());
     for (int i = 0; i < density_at.size(); ++i) density_at[i] = density(bending, m.fields.H[i], m.fields.K[i]).f;
     const Eigen::VectorXd u_n = m.velocity.cwiseProduct(m.fields.normal).colwise().sum().transpose();
@@ -112,8 +117,9 @@ MotionRestart motion_restart(const Record& record) {
     if (has("restart_solved_p")) s.solved.p = vector_of(record, "restart_solved_p");
     if (has("restart_u_rate"))
         s.X_rate = field_of(record, "restart_X_rate"), s.u_rate = vector_of(record, "restart_u_rate");
-    for_each_number(out.memory, [&](const char* name, double& value) { value = number_of(record, name); });
-    out.memory.elements = static_cast<int>(number_of(record, "restart_elements"));
+    for_each_number(out.memory, [&]<class Number>(const char* name, Number& value) {
+        value = static_cast<Number>(number_of(record, name));
+    });
     return out;
 }
 

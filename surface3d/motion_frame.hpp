@@ -3,21 +3,23 @@
 
 #include "common/result/result.hpp"
 #include "surface3d/motion_measures.hpp"
+#include "surface3d/motion_settings.hpp"
 
 namespace tubule::surface3d {
 
 // Beside the state of the surface, what a run has to remember.
 struct MotionMemory {
+    MotionSettings settings;
     double next_step = 0, relaxation = 0;
-    double least_variation = 0;  // of H, see MotionControl
-    int elements = 0;            // asked for
-    double tolerance = 0;
+    double least_variation = 0;                // of H, see MotionControl
     double area = 0, volume = 0;               // at the start
     double total_start = 0, lowest_total = 0;  // energy with kinetic energy, then and since
     double dissipated = 0, corrected = 0, reference_energy = 0;
     double dissipation_past = 0;  // rate at the step before
     double error = 0;             // largest difference from the coarser run
     double defect = 0;            // largest defect of the dissipation identity
+    double moved = 0;             // the nodes, at most, since the last look for self-intersection
+    int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
 };
 
 // Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest

@@ -17,6 +17,9 @@ struct Restart {
 
 std::vector<std::string> motion_series_names(const Case& c);
 
+// Throws std::runtime_error if the record does not hold what a run goes on from.
+void check_restart(const Record& record);
+
 // Each run is one of a pair: the energies of the coarser one, of fewer triangles and larger steps, tell the error of
 // the finer one, which is written. Pairs become finer until the energy is as accurate as asked at all times.
 RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* restart);

@@ -32,8 +32,9 @@ bool settings_given(const Case& c) {
     return c.surface.elements || c.surface.time_tolerance || c.surface.step;
 }
 
-MotionSettings coarser(const MotionSettings& s) {
-    return {static_cast<int>(s.elements / fewer_triangles), s.tolerance * longer_tolerance};
+MotionSettings coarser(const MotionSettings& s, Role role) {
+    const int elements = role == Role::other_order ? s.elements : static_cast<int>(s.elements / fewer_triangles);
+    return {.elements = elements, .tolerance = s.tolerance * longer_tolerance, .pair = s.pair, .role = role};
 }
 
 // Errors fall with the fourth power of the mesh width and the power 2/3 of the tolerance. Where the energies of a pair
@@ -41,9 +42,10 @@ MotionSettings coarser(const MotionSettings& s) {
 MotionSettings finer(const MotionSettings& s, double asked, double difference, double defect) {
     const double excess = std::max(difference, defect) / asked;
     if (difference <= asked && s.difference == 0)
-        return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), difference};
+        return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), difference, s.pair + 1};
     const double by = std::clamp(std::sqrt(excess), least_growth, most_growth);
-    return {static_cast<int>(std::ceil(by * s.elements)), s.tolerance / std::clamp(std::pow(excess, 1.5), 4.0, 64.0)};
+    return {static_cast<int>(std::ceil(by * s.elements)), s.tolerance / std::clamp(std::pow(excess, 1.5), 4.0, 64.0), 0,
+            s.pair + 1};
 }
 
 bool can_be_finer(const MotionSettings& s) {

@@ -7,10 +7,16 @@ namespace tubule::surface3d {
 
 constexpr int least_triangles = 80;  // fewer tell nothing
 
+// What a run is for: its own sake, or for another to be compared with, on fewer triangles or with elements of another
+// order.
+enum class Role { reported, fewer_triangles, other_order };
+
 struct MotionSettings {
     int elements = 0;
     double tolerance = 0;   // of the positions in a step, relative to the root of the area
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
+    int pair = 1;           // its number
+    Role role = Role::reported;
 };
 
 // The case's, or alpha for fluids and bdf2 for what has no inertia.
@@ -20,10 +26,11 @@ Scheme time_scheme(const Case& c);
 MotionSettings first_settings(const Case& c);
 bool settings_given(const Case& c);
 
-// Of the coarser run of a pair.
-MotionSettings coarser(const MotionSettings& s);
+// Of the other run of a pair.
+MotionSettings coarser(const MotionSettings& s, Role role);
 
-// After a pair whose energies differ so much and whose balance is off so much, where less is asked; all absolute.
+// Of the next pair, after one whose energies differ so much and whose balance is off so much, where less is asked; all
+// absolute.
 MotionSettings finer(const MotionSettings& s, double asked, double difference, double defect);
 
 // Whether more triangles are worth a try.

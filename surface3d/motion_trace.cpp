@@ -5,14 +5,13 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr const char* array_name = "restart_coarser_run";
 constexpr double shortest_neighbour = 0.1;  // of a step: shorter ones beside it, as on a new mesh, say nothing of it
 
 }  // namespace
 
-MotionTrace::MotionTrace(const Record& record) {
+MotionTrace::MotionTrace(const Record& record, const char* name) {
     for (const Array& a : record.arrays)
-        if (a.name == array_name)
+        if (a.name == name)
             for (std::size_t i = 0; i + 1 < a.data.size(); i += 2) add(a.data[i], a.data[i + 1]);
 }
 
@@ -35,8 +34,8 @@ double MotionTrace::operator()(double t) const {
     return sum;
 }
 
-Array MotionTrace::array() const {
-    Array out{array_name, {points_.size(), 2}, {}};
+Array MotionTrace::array(const char* name) const {
+    Array out{name, {points_.size(), 2}, {}};
     for (const auto& p : points_) out.data.insert(out.data.end(), p.begin(), p.end());
     return out;
 }

@@ -243,13 +243,14 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     return ResultWriter(std::move(impl));
 }
 
-ResultWriter ResultWriter::resume(const fs::path& file) {
+ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void(const Record&)>& check) {
     const auto path = resolved(file);
     require_result(path);  // refuse what is no result before touching anything
     auto impl = std::make_unique<Impl>(path);
     impl->contents = load(path);
     try {
         impl->restart = rewind(impl->contents);
+        check(impl->restart);
     } catch (const std::runtime_error& e) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }

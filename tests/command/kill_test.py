@@ -201,6 +201,15 @@ class Surface(ProgramTest):
         self.assertNotEqual(process.returncode, 0)
         return self.shown(self.result)[1]
 
+    def test_a_state_of_another_version_is_refused(self):
+        self.disturbed(signal.SIGTERM, 20)
+        with h5py.File(self.result, "r+") as file:
+            del file["checkpoint"].attrs["restart_lag"]
+        before = self.result.read_bytes()
+        err = self.tubule("run", self.case, "--resume", status=2)[1]
+        self.assertIn("restart_lag is missing, as in results of another version", err)
+        self.assertEqual(self.result.read_bytes(), before)
+
     def test_kills_and_signals_lose_nothing(self):
         for number, rows in ((signal.SIGKILL, 20), (signal.SIGTERM, 60), (signal.SIGKILL, 100)):
             written = self.disturbed(number, rows)

@@ -24,16 +24,24 @@ struct Watch : RunObserver {
     std::optional<Record> saved;
     std::vector<SurfaceCells> meshes;
     std::size_t most_rows = 1000000;  // then it is interrupted
+    int most_looks = 1000000;         // at whether it is: so a run is that writes no rows
+    int looks = 0;
+    std::vector<int> looks_at_discard;
 
     void row(std::span<const double> row) override { rows.emplace_back(row.begin(), row.end()); }
     std::size_t mesh(const SurfaceCells& cells) override {
-        meshes.push_back(cells);
-        return meshes.size() - 1;
+        const auto same = std::find(meshes.begin(), meshes.end(), cells);
+        const auto number = static_cast<std::size_t>(same - meshes.begin());
+        if (same == meshes.end()) meshes.push_back(cells);
+        return number;
     }
     void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
     void checkpoint(const Record& state) override { saved = state; }
-    void discard() override { rows.clear(), frames.clear(), meshes.clear(); }
-    bool interrupted() override { return rows.size() >= most_rows; }
+    void discard() override {
+        rows.clear(), frames.clear(), meshes.clear(), saved.reset();
+        looks_at_discard.push_back(looks);
+    }
+    bool interrupted() override { return rows.size() >= most_rows || ++looks > most_looks; }
 };
 
 struct Outcome {
@@ -335,7 +343,98 @@ TEST(MotionGuards, TimeLimit) {
     EXPECT_EQ(o.summary.estimated_error, 1);  // one run tells nothing
     ASSERT_TRUE(o.watch.saved);
     EXPECT_EQ(o.watch.saved->time, o.summary.stop.time);
-    EXPECT_EQ(o.last("time"), o.summary.stop.time);
+    EXPECT_NE(o.summary.stop.message.find("in the coarser run"), std::string::npos) << o.summary.stop.message;
+    EXPECT_EQ(o.series("time"), std::vector<double>{0});  // the result shows the start
+    EXPECT_EQ(o.watch.frames.size(), 1u);
+}
+
+// The first pair is less accurate than asked.
+const std::vector<std::string> two_pairs{"accuracy.energy=1e-3", "discretisation.order=2", "model.kind=gradient-flow"};
+
+Case open_case(const std::vector<std::string>& sets) {
+    std::string text = wavy;
+    text.erase(text.find("elements = 80\n"), 14);
+    return begin(text, sets).c;
+}
+
+std::int64_t detail(const RunSummary& s, const std::string& name) {
+    for (const auto& [key, value] : s.details)
+        if (key == name) return std::get<std::int64_t>(value);
+    return -1;
+}
+
+TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
+    const Case c = open_case(two_pairs);
+    Watch undisturbed;
+    const RunSummary whole = run(c, undisturbed);
+    ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
+    ASSERT_EQ(detail(whole, "pairs"), 2);
+    // Again and again: in the coarser run, in the run that is found wanting, and in the one that will do.
+    int times = 0, before_rows = 0, in_first_pair = 0;
+    std::optional<Restart> restart;
+    RunSummary s;
+    Watch watch;
+    do {
+        watch.looks = 0, watch.most_looks = 23;
+        s = run(c, watch, restart ? &*restart : nullptr);
+        if (s.stop.reason != Stop::interrupted) break;
+        ASSERT_LT(++times, 100);
+        before_rows += watch.rows.size() < 2;
+        in_first_pair += watch.rows.size() > 1 && detail(s, "pairs") == 1;
+        // As a result file is rewound: to the checkpoint or to the last frame.
+        const Record& at =
+            watch.saved && watch.saved->time >= watch.frames.back().time ? *watch.saved : watch.frames.back();
+        restart = Restart{at, watch.meshes.at(*at.mesh)};
+        std::erase_if(watch.rows, [&](const std::vector<double>& row) { return row[0] > at.time; });
+    } while (true);
+    ASSERT_EQ(s.stop.reason, Stop::finished) << s.stop.message;
+    EXPECT_GT(before_rows, 0);
+    EXPECT_GT(in_first_pair, 0);
+    for (const char* name : {"pairs", "steps", "rejected_steps", "elements", "meshes"})
+        EXPECT_EQ(detail(s, name), detail(whole, name)) << name;
+    EXPECT_EQ(watch.rows.size(), undisturbed.rows.size());
+    EXPECT_NEAR(s.energy, whole.energy, 1e-9 * whole.reference_energy);
+    EXPECT_NEAR(s.estimated_error, whole.estimated_error, 1e-6 * whole.estimated_error);
+}
+
+TEST(MotionRun, NothingIsRefinedThatNoMeshCures) {
+    // maths 2: f_HH + f_KK K = 2 k20 + 2 k42 < 0 on a unit sphere. Four times the triangles again and again: ten
+    // minutes.
+    const Outcome o = run_case(R"(
+[energy]
+k20 = 1.0
+k42 = -1.05
+[shape]
+kind = "sphere"
+radius = 1.0
+[accuracy]
+energy = 1e-2
+[time]
+end = 1.0
+)",
+                               {"discretisation.order=2"});
+    EXPECT_EQ(o.summary.stop.reason, Stop::ill_posed) << o.summary.stop.message;
+    EXPECT_EQ(detail(o.summary, "pairs"), 1);
+    EXPECT_LT(o.summary.elements, 400);
+}
+
+TEST(MotionRun, AnInterruptionIsHeardBeforeAFinerRun) {
+    const Case c = open_case(two_pairs);
+    Watch watch;
+    const RunSummary whole = run(c, watch);
+    // The run begins again after its coarser run, and after the first pair, which the last look before that would end.
+    ASSERT_EQ(watch.looks_at_discard.size(), 2u);
+    Watch again;
+    again.most_looks = watch.looks_at_discard.back() - 1;
+    const RunSummary s = run(c, again);
+    EXPECT_EQ(s.stop.reason, Stop::interrupted);
+    EXPECT_EQ(s.stop.time, c.time.end);
+    EXPECT_NE(s.stop.message.find("before a finer run"), std::string::npos) << s.stop.message;
+    const Restart restart{again.frames.back(), again.meshes.back()};
+    again = {};
+    const RunSummary end = run(c, again, &restart);
+    EXPECT_EQ(detail(end, "pairs"), 2);
+    EXPECT_NEAR(end.energy, whole.energy, 1e-9 * whole.reference_energy);
 }
 
 TEST(MotionRun, ResumedRunsEndAsUndisturbedOnes) {

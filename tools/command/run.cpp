@@ -166,7 +166,7 @@ std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
     if (old.frames.empty() && !old.checkpoint) return create(c, file);
-    ResultWriter writer = ResultWriter::resume(file);
+    ResultWriter writer = ResultWriter::resume(file, [&](const Record& record) { check_restart(c, record); });
     const Record& record = writer.restart_record();
     surface3d::Restart restart{record, record.mesh ? old.meshes.at(*record.mesh) : SurfaceCells{}};
     return Opened{std::move(writer), std::move(restart), std::move(old)};

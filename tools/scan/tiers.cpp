@@ -18,6 +18,13 @@ void check_start(const Case& c) {
     if (c.equilibrium) axisym::check_equilibrium(c);
 }
 
+void check_restart(const Case& c, const Record& record) {
+    if (!record.mesh)
+        axisym::check_restart(record);
+    else if (c.moves())
+        surface3d::check_restart(record);
+}
+
 RunSummary run_tier(const Case& c, RunObserver& observer, const surface3d::Restart* restart, const Result* unfinished) {
     if (c.tier == Tier::automatic) return run_auto(c, observer, restart, unfinished);
     if (c.equilibrium) return axisym::run_equilibrium(c, observer);
