@@ -71,10 +71,10 @@ public:
                                const std::vector<std::string>& series);
     // Goes on with a result from its newest restart record (checkpoint or last frame, whichever is later);
     // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
-    // restart_record() gives it. Throws std::runtime_error if there is none, and whatever `check` throws of it, with the
-    // file as it was.
-    static ResultWriter resume(const std::filesystem::path& file,
-                               const std::function<void(const Record&)>& check = [](const Record&) {});
+    // restart_record() gives it. Throws std::runtime_error if there is none, and whatever `check` throws of it, with
+    // the file as it was.
+    static ResultWriter resume(
+        const std::filesystem::path& file, const std::function<void(const Record&)>& check = [](const Record&) {});
     ResultWriter(ResultWriter&&) noexcept;
     ResultWriter& operator=(ResultWriter&&) noexcept;
     ~ResultWriter();
