@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surface3d/generalised_alpha.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -316,20 +318,9 @@ double MotionStepper::wave_factor(const MotionState& from, double tau) const {
     return fastest_waves * std::exp(-rate * tau);
 }
 
-// Jansen, Whiting and Hulbert (2000), with a spectral radius at infinity, for steps that vary: rates are linear between
-// those carried on, of `lag` steps before the state, and those of the stage, at `level`. The error is that of X_t = c
-// X.
 MotionStepper::Formula MotionStepper::alpha(const MotionState& from, double tau, double radius) {
-    const double level = 1 / (1 + radius), lag = from.lag / tau, next_lag = (1 - radius) / (2 * (1 + radius));
-    const double share = (0.5 + lag) / (level + lag), kept = level * tau * (1 - share);
-    const double error = (1.0 / 3 + (lag - level) / 2 - lag * level) / 2 - share * level * (1 - level) / 2;
-    return {level,
-            level * tau * share,
-            from.X + kept * from.X_rate,
-            from.u + kept * from.u_rate,
-            error,
-            (1 - next_lag + lag) / (level + lag),
-            next_lag * tau};
+    const AlphaNumbers a = alpha_numbers(tau, from.lag, radius);
+    return {a.level, a.te, from.X + a.kept * from.X_rate, from.u + a.kept * from.u_rate, a.error, a.renewing, a.lag};
 }
 
 // A run that another scheme began goes on without.
