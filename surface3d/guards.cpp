@@ -23,7 +23,7 @@ std::optional<StopReport> find_fold(const MeshQuality& quality) {
 
 std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh, double allowed) {
     const std::string advice = "use more elements, or another discretisation.recovery";
-    if (mesh.period == 0 && o.integral_H2 < (1 - allowed) * willmore_bound)
+    if (mesh.period == 0 && !(o.integral_H2 >= (1 - allowed) * willmore_bound))
         return StopReport{Stop::resolution_lost, 0,
                           fmt::format("INT H^2 = {:.6g} is below 16 pi = {:.6g}, which no closed surface can have",
                                       o.integral_H2, willmore_bound),

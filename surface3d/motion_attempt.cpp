@@ -112,7 +112,7 @@ void MotionAttempt::begin() {
 void MotionAttempt::set_moving() {
     try {
         const MotionState soon = stepper_->step(state_, moment * memory_.next_step).state;
-        if (!soon.X.allFinite() || !soon.u.allFinite()) return;
+        if (!is_finite(soon)) return;
         state_.u = state_.u_past = soon.u;
         state_.w = state_.w_past = soon.w;
         state_.p = soon.p, state_.lambda = soon.lambda;
@@ -140,7 +140,7 @@ void MotionAttempt::look() {
 
 // A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
 std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const VectorField& X) const {
-    return find_impossible_curvature(o, stepper_->mesh(X), reported() ? 0.01 : 0.05);
+    return find_impossible_motion(o, stepper_->mesh(X), reported() ? 0.01 : 0.05, state_.time);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
@@ -159,7 +159,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     };
     try {
         const MotionStep next = paper_ ? paper_->step(state_, tau) : stepper_->step(state_, tau);
-        if (!next.state.X.allFinite() || !next.state.u.allFinite()) return failed("the step overflows");
+        if (!is_finite(next.state)) return failed("the step overflows");
         const double error = next.error / (memory_.settings.tolerance * length());
         if (!case_.surface.step && error > 2)
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),

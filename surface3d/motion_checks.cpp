@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "surface3d/guards.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -32,11 +34,11 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
         return StopReport{Stop::ill_posed, time,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
                           "no resolution helps: the energy does not resist short waves there"};
-    if (m.neck_radius < r_min)
+    if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
                           "lower accuracy.r_min to follow the neck further"};
-    if (m.turn.angle > sharpest_turn)
+    if (!(m.turn.angle <= sharpest_turn))
         return StopReport{m.turn.saddle ? Stop::pinch_off : Stop::resolution_lost, time,
                           fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
                                       m.turn.saddle ? "a neck closes" : "the surface is too sharp", where(m.turn.where),
@@ -51,7 +53,7 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
 }
 
 std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step) {
-    if (!(rise > climb * asked)) return std::nullopt;
+    if (rise <= climb * asked) return std::nullopt;
     return StopReport{
         Stop::resolution_lost, time,
         fmt::format("the energy rises by {:.3g} of E_ref in a step of {:.3g}, which it cannot", rise, step),
@@ -59,19 +61,29 @@ std::optional<StopReport> find_rise_in_step(double rise, double asked, double ti
 }
 
 std::optional<StopReport> find_slow_rise(double rise, double asked, double time) {
-    if (!(rise > creep * asked)) return std::nullopt;
+    if (rise <= creep * asked) return std::nullopt;
     return StopReport{Stop::resolution_lost, time,
                       fmt::format("the energy has risen by {:.3g} of E_ref, little by little, which it cannot", rise),
                       "use more elements or, if given, a smaller discretisation.step"};
 }
 
+std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
+                                                 double time) {
+    auto found = find_impossible_curvature(o, mesh, allowed);
+    if (found) found->time = time, found->advice = "use more elements, or another discretisation.order";
+    return found;
+}
+
 std::optional<StopReport> find_drift(double change, double asked, double time) {
-    if (!(std::abs(change) > most_drift * asked)) return std::nullopt;
-    return StopReport{Stop::resolution_lost, time,
-                      fmt::format("the volume has drifted by {:.3g} of itself: on so few triangles it cannot be told "
-                                  "from the area, which is kept",
-                                  std::abs(change)),
-                      "use more elements"};
+    if (std::abs(change) <= most_drift * asked) return std::nullopt;
+    if (!std::isfinite(change))
+        return StopReport{Stop::resolution_lost, time, "the volume is not a number", "use more elements"};
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the volume has drifted by {:.3g} of itself, as where on so few triangles it cannot be "
+                    "told from the area, which is kept",
+                    std::abs(change)),
+        "use more elements"};
 }
 
 std::optional<StopReport> Crawl::look(double time, double step, double tiny, double lowest_energy, double asked) {

@@ -1,5 +1,5 @@
-// Why a run in motion stops before its end: judgements on what was measured. Each is silent while all is well. The
-// guards of single surfaces are in guards.hpp.
+// Why a run in motion stops before its end: judgements on what was measured. Each is silent while all is well, and
+// speaks where a number is none. The guards of single surfaces are in guards.hpp.
 #pragma once
 
 #include <cmath>
@@ -23,7 +23,12 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
 std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step);
 std::optional<StopReport> find_slow_rise(double rise, double asked, double time);
 
+// INT H^2 or INT K off by more than `allowed` (find_impossible_curvature), with advice for a motion.
+std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
+                                                 double time);
+
 // Where area and volume are one condition, the area alone is kept: the relative change of the volume since the start.
+// Where they are two, steps that miss the volume are refused.
 std::optional<StopReport> find_drift(double change, double asked, double time);
 
 // Steps that lead nowhere: a hundred in which neither time goes on by a thousandth nor the lowest energy falls by a

@@ -67,6 +67,10 @@ MotionState at_rest(const CurvedMesh& mesh, int components, int pressures) {
     return s;
 }
 
+bool is_finite(const MotionState& s) {
+    return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda);
+}
+
 MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending,
                              const MotionControl& control)
     : mesh_(mesh),

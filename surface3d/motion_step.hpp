@@ -47,6 +47,9 @@ struct MotionState {
 // With so many components of the velocity at a node, and so many pressures.
 MotionState at_rest(const CurvedMesh& mesh, int components, int pressures);
 
+// Whether positions, velocities and multipliers are numbers.
+bool is_finite(const MotionState& state);
+
 // What is kept on the way, and how the mesh moves.
 struct MotionControl {
     std::optional<double> area, volume;  // kept to rounding, where the law has the multiplier

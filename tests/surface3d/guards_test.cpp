@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <limits>
+#include <map>
+#include <regex>
+
+#include "common/case/read.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "surface3d/motion_checks.hpp"
@@ -21,6 +27,14 @@ CurvedMesh pancakes(double bulge, double up) {
         x = {radius * x.x(), radius * x.y(), x.z() + bulge * std::sin(2 * pi * s)};
     }
     return mesh;
+}
+
+// As find_bad_shape lets it pass.
+MotionMeasures sound_shape() {
+    MotionMeasures m;
+    m.symbol = 1, m.neck_radius = 1, m.turn.angle = 0.1, m.quality.worst = 1;
+    m.narrowest = m.least_symbol = m.turn.where = m.quality.where = Eigen::Vector3d::Zero();
+    return m;
 }
 
 TEST(SelfIntersection, OfClosedSurfaces) {
@@ -78,6 +92,93 @@ TEST(Energy, RisesAreToldFromErrors) {
     EXPECT_EQ(creep->reason, Stop::resolution_lost);
     EXPECT_EQ(creep->time, 3);
     EXPECT_EQ(creep->message, "the energy has risen by 0.11 of E_ref, little by little, which it cannot");
+}
+
+TEST(Guards, SpeakWhereANumberIsNone) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(find_rise_in_step(none, 1e-2, 3, 0.1));
+    EXPECT_TRUE(find_slow_rise(none, 1e-2, 3));
+    const auto drift = find_drift(none, 1e-2, 3);
+    ASSERT_TRUE(drift);
+    EXPECT_EQ(drift->message, "the volume is not a number");
+    const CurvedMesh sphere = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}}));
+    for (const bool H : {false, true}) {
+        Observables o;
+        o.integral_H2 = H ? none : 16 * pi, o.integral_K = H ? 4 * pi : none;
+        EXPECT_TRUE(find_impossible_curvature(o, sphere)) << H;
+    }
+    // Of a shape that has nothing else amiss.
+    const MotionMeasures well = sound_shape();
+    EXPECT_FALSE(find_bad_shape(well, 1e-3, 3));
+    MotionMeasures m = well;
+    m.symbol = none;
+    EXPECT_TRUE(find_bad_shape(m, 1e-3, 3));
+    m = well, m.neck_radius = none;
+    EXPECT_TRUE(find_bad_shape(m, 1e-3, 3));
+    m = well, m.turn.angle = none;
+    EXPECT_TRUE(find_bad_shape(m, 1e-3, 3));
+    m = well, m.quality.worst = none;
+    EXPECT_TRUE(find_bad_shape(m, 1e-3, 3));
+}
+
+TEST(Guards, AStateIsFiniteInAllItsParts) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    const MotionState well = at_rest(mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}})), 3, 4);
+    EXPECT_TRUE(is_finite(well));
+    MotionState s = well;
+    s.X(1, 2) = none;
+    EXPECT_FALSE(is_finite(s));
+    s = well, s.w(1, 2) = none;
+    EXPECT_FALSE(is_finite(s));
+    s = well, s.u[3] = none;
+    EXPECT_FALSE(is_finite(s));
+    s = well, s.p[3] = none;
+    EXPECT_FALSE(is_finite(s));
+    s = well, s.lambda = std::numeric_limits<double>::infinity();
+    EXPECT_FALSE(is_finite(s));
+}
+
+// What every guard of a motion has to say, at its worst.
+std::vector<StopReport> all_reports() {
+    MeshQuality folded;
+    folded.worst = -1;
+    std::vector<StopReport> out{*find_rise_in_step(1, 1e-2, 3, 0.1), *find_slow_rise(1, 1e-2, 3),
+                                *find_drift(1, 1e-2, 3), *find_fold(folded)};
+    const CurvedMesh sphere = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}}));
+    for (const bool H : {false, true}) {
+        Observables o;
+        o.integral_H2 = H ? 0 : 16 * pi, o.integral_K = H ? 4 * pi : 0;
+        out.push_back(*find_impossible_motion(o, sphere, 0.05, 3));
+        EXPECT_EQ(out.back().time, 3);
+    }
+    for (const auto& spoil : std::vector<std::function<void(MotionMeasures&)>>{
+             [](MotionMeasures& m) { m.symbol = -1; }, [](MotionMeasures& m) { m.neck_radius = 0; },
+             [](MotionMeasures& m) { m.turn.angle = 3; }, [](MotionMeasures& m) { m.quality.worst = 0; }}) {
+        MotionMeasures m = sound_shape();
+        spoil(m);
+        out.push_back(*find_bad_shape(m, 1e-3, 3));
+    }
+    return out;
+}
+
+TEST(Guards, AdviseNothingThatACaseRefuses) {
+    // Every key that is named, with a value that the documentation allows, in a case that moves. One that such a case
+    // does not have is refused.
+    const std::map<std::string, std::string> values{
+        {"accuracy.r_min", "1e-3"},         {"discretisation.order", "3"}, {"discretisation.mesh", "graded"},
+        {"discretisation.relaxation", "1"}, {"discretisation.step", "1"},  {"discretisation.recovery", "patch"}};
+    const std::string moving =
+        "tier = \"surface3d\"\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 1\n";
+    EXPECT_THROW(parse_case(moving, {"discretisation.recovery=patch"}, "case.toml"), std::exception);
+    const std::regex key("(accuracy|discretisation|model|time)\\.[a-z_0-9]*[a-z0-9]");
+    int named = 0;
+    for (const StopReport& report : all_reports())
+        for (std::sregex_iterator i(report.advice.begin(), report.advice.end(), key), end; i != end; ++i, ++named) {
+            const auto found = values.find(i->str());
+            ASSERT_NE(found, values.end()) << i->str();
+            EXPECT_NO_THROW(parse_case(moving, {found->first + "=" + found->second}, "case.toml")) << report.advice;
+        }
+    EXPECT_GE(named, 6);
 }
 
 // How many steps of one length are taken from t = 1 until they are found to lead nowhere, at most `most`.
