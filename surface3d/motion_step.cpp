@@ -1,5 +1,7 @@
 #include "surface3d/motion_step.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +12,7 @@ namespace {
 
 constexpr int most_corrections = 5;
 constexpr double kept = 1e-12;            // area and volume, relative
+constexpr double still_kept = 1e-8;       // a step that is further off is refused
 constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
 constexpr double fastest_waves = 0.9;     // of scheme alpha: the factor by which a short step damps them
 constexpr double learns = 0.5;            // from what the linear system of a step missed of area and volume
@@ -260,11 +263,16 @@ VectorField MotionStepper::correction(const VectorField& X, const MotionFields& 
     VectorField sum = VectorField::Zero(3, X.cols());
     if (!area && !volume) return sum;
     const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
-    for (int k = 0; k < most_corrections; ++k) {
+    for (int k = 0;; ++k) {
         const CurvedMesh m = mesh(X + sum);
-        const Extent now = extent(space_, m);
-        const Eigen::Vector2d missing(area ? *control_.area - now.area : 0, volume ? *control_.volume - now.volume : 0);
-        if (std::abs(missing[0]) <= kept * now.area && std::abs(missing[1]) <= kept * std::abs(now.volume)) break;
+        const Extent lacks = lack(m);
+        const Eigen::Vector2d missing(area ? lacks.area : 0, volume ? lacks.volume : 0);
+        const Eigen::Vector2d parts(area ? missing[0] / *control_.area : 0, volume ? missing[1] / *control_.volume : 0);
+        const double off = parts.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
+        if (off <= kept || (k == most_corrections && off <= still_kept)) return sum;
+        if (k == most_corrections)
+            throw SolveError(fmt::format("area and volume are not kept: {:.2g} of them is missing after {} corrections",
+                                         off, most_corrections));
         const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
         if (area && volume) {
             Eigen::Matrix2d J;
@@ -275,7 +283,6 @@ VectorField MotionStepper::correction(const VectorField& X, const MotionFields& 
             sum += volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
         }
     }
-    return sum;
 }
 
 // -(b, d), to first order the energy that a displacement of the nodes takes.

@@ -309,6 +309,31 @@ TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
     EXPECT_LT(gap[1], 0.02);
 }
 
+TEST(Models, AreaAndVolumeThatCannotBeKeptAreRefused) {
+    // No surface has half the area of a sphere around its volume; nor is there a displacement along the normal of a
+    // sphere of which the volume would become negative.
+    const auto why = [](const CurvedMesh& mesh, ModelKind kind, double area, double volume) -> std::string {
+        const Extent e = extent(SurfaceSpace(mesh), mesh);
+        MotionControl control{.area = e.area * area, .volume = e.volume * volume, .least_variation = 0.01};
+        const Model model{.kind = kind, .Re = 1, .gamma = 1, .keeps_volume = true};
+        try {
+            MotionStepper(mesh, motion_law(model), {.k = {1}}, control).start(mesh);
+        } catch (const SolveError& refusal) {
+            return refusal.what();
+        }
+        return "kept";
+    };
+    const CurvedMesh cell = mesh_of(wavy, icosphere(2), 3),
+                     sphere = mesh_of(Sphere{.radius = 1, .modes = {}}, icosphere(2), 3);
+    const std::string refused = "area and volume are not kept";
+    EXPECT_EQ(why(cell, ModelKind::fluid, 0.5, 1).substr(0, refused.size()), refused);
+    EXPECT_EQ(why(cell, ModelKind::gradient_flow, 1, -1).substr(0, refused.size()), refused);
+    // What five corrections do, they do: a thousandth; on a sphere, whose H varies by less than `least_variation`, the
+    // area alone is kept, whatever the volume.
+    EXPECT_EQ(why(cell, ModelKind::fluid, 1.001, 0.999), "kept");
+    EXPECT_EQ(why(sphere, ModelKind::fluid, 1.01, 0.5), "kept");
+}
+
 TEST(Models, MomentumDecaysByFriction) {
     // maths 3: momentum and angular momentum fall as exp(-gamma t), whatever the membrane does. They are kept so, step
     // by step; the speed in between, which nothing prescribes, agrees with steps half as long.
