@@ -95,10 +95,9 @@ void MotionAttempt::begin() {
     memory_.next_step =
         case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end - begin_time(case_)));
     make_stepper(start.mesh);
-    state_ = stepper_->start(start.mesh);
+    const VectorField u = start_velocity(case_, start);
+    state_ = u.size() > 0 ? stepper_->start(start.mesh, u.transpose().reshaped()) : stepper_->start(start.mesh);
     state_.time = begin_time(case_);
-    if (const VectorField u = start_velocity(case_, start); u.size() > 0) state_.u = u.transpose().reshaped();
-    state_.u_past = state_.u;
     if (stepper_->law().inertia == 0 && !paper_) set_moving();
     look();
     memory_.total_start = memory_.lowest_total = total();
@@ -209,18 +208,23 @@ bool MotionAttempt::wants_new_mesh() const {
 // when it will do no longer.
 void MotionAttempt::make_new_mesh() {
     memory_.mesh_since = memory_.steps;
-    const MotionLaw& law = stepper_->law();
-    const int n = static_cast<int>(state_.X.cols()), d = law.components();
+    const int n = static_cast<int>(state_.X.cols()), d = stepper_->law().components();
     const auto found = remesh(stepper_->mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
     const double time = state_.time, energy = now_.bending.energy, before = total();
+    const Eigen::VectorXd momenta = stepper_->momenta(state_);
+    const int old_elements = summary.elements;
+    std::unique_ptr<MotionStepper> old = std::move(stepper_);
     make_stepper(better->mesh);
+    try {
+        state_ = stepper_->start(better->mesh, better->fields.transpose().reshaped(), momenta);
+    } catch (const SolveError&) {
+        stepper_ = std::move(old), summary.elements = old_elements;
+        return;
+    }
     ++memory_.meshes;
-    state_ = stepper_->start(better->mesh);
     state_.time = time;
-    state_.u = better->fields.transpose().reshaped();
-    state_.u_past = state_.u;
     look();
     memory_.error += std::abs(now_.bending.energy - energy);
     memory_.lowest_total += std::max(total() - before, 0.0);

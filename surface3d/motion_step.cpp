@@ -98,6 +98,17 @@ MotionState MotionStepper::start(const CurvedMesh& mesh) {
     return s;
 }
 
+MotionState MotionStepper::start(const CurvedMesh& at, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta) {
+    MotionState s = start(at);
+    s.u = u;
+    keep_momenta(momenta, 0, s);
+    const CurvedMesh now = mesh(s.X);
+    const MotionFields f = fields(now);
+    s.w = mesh_motion_.velocity(space_, now, f, *projection_, flux(s.u, now, f), control_.relaxation, 0);
+    s.u_past = s.u, s.w_past = s.w;
+    return s;
+}
+
 MotionFields MotionStepper::fields(const CurvedMesh& mesh) {
     if (projection_)
         projection_->update(space_, mesh);
@@ -213,11 +224,16 @@ Eigen::MatrixXd MotionStepper::momenta(const CurvedMesh& mesh, const Eigen::Matr
     return out;
 }
 
-// What friction leaves of them after a step; nothing where there is no inertia.
-Eigen::VectorXd MotionStepper::momenta_after(const MotionState& from, double tau) const {
+Eigen::VectorXd MotionStepper::momenta(const MotionState& state) const {
     if (!law_.flows || law_.inertia == 0) return {};
-    const CurvedMesh m = mesh(from.X);
-    return std::exp(-law_.friction / law_.inertia * tau) * (momenta(m, rigid_motions(m)).transpose() * from.u);
+    const CurvedMesh m = mesh(state.X);
+    return momenta(m, rigid_motions(m)).transpose() * state.u;
+}
+
+// What friction leaves of them after a step.
+Eigen::VectorXd MotionStepper::momenta_after(const MotionState& from, double tau) const {
+    const Eigen::VectorXd now = momenta(from);
+    return now.size() == 0 ? now : std::exp(-law_.friction / law_.inertia * tau) * now;
 }
 
 // Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,

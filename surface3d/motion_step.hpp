@@ -71,12 +71,18 @@ class MotionStepper {
 public:
     MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, const MotionControl& control);
 
-    // SolveError where a system cannot be solved.
+    // SolveError where a system cannot be solved, or area or volume cannot be kept to 1e-8.
     MotionStep step(const MotionState& from, double tau);
 
     // At rest, with the area and volume that are kept: what a new mesh lacks of them, a short step would make up for
-    // at great speed.
+    // at great speed. SolveError as in a step.
     MotionState start(const CurvedMesh& mesh);
+    // The same with a velocity as in MotionState, with which nodes begin to move, too: a first step from nodes at rest
+    // would not bend the surface. With a rigid motion added that makes `momenta` what is given, if anything is.
+    MotionState start(const CurvedMesh& mesh, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta = {});
+    // Momentum and angular momentum but for the density (a tube: about its axis alone), which friction alone changes;
+    // empty where there is no inertia.
+    Eigen::VectorXd momenta(const MotionState& state) const;
     CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
     // Velocities of the surface at the nodes.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
