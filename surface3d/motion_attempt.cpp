@@ -20,7 +20,8 @@ constexpr double moment = 1e-2;                // of the first step, see set_mov
 constexpr double growth = 1.6, safety = 0.85;  // of steps
 constexpr double shortest_step = 1e-9;         // of the relaxation time: shorter ones are a failure
 // A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
-constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5;
+// Nodes of the coarser run of a pair are so much farther apart, and turn so much more.
+constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
 constexpr double unseen_move = 0.25;  // between looks for self-intersection, of the distance of nodes
 constexpr double seconds_between_checkpoints = 20;
@@ -200,7 +201,8 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 
 bool MotionAttempt::wants_new_mesh() const {
     if (paper_ || memory_.steps < memory_.mesh_since + steps_between_meshes) return false;
-    return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > turn_to_remesh);
+    const double most = turn_to_remesh * (reported() ? 1 : farther_apart);
+    return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > most);
 }
 
 // The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.

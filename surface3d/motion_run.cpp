@@ -7,6 +7,7 @@
 
 #include "surface3d/motion_attempt.hpp"
 #include "surface3d/motion_series.hpp"
+#include "surface3d/motion_start.hpp"
 #include "surface3d/start.hpp"
 
 namespace tubule::surface3d {
@@ -137,7 +138,9 @@ private:
     RunSummary unfinished(RunSummary s) {
         if (!begun_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin();
         describe(s, case_, s.reference_energy, settings_.pair);  // nothing is known of the error yet
-        s.stop.message += ", in the coarser run, which tells the error of the other";
+        s.stop.message +=
+            fmt::format(", at t = {:.6g} of the coarser run, which tells the error of the other", s.stop.time);
+        s.stop.time = begin_time(case_);
         return s;
     }
 

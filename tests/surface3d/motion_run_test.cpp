@@ -342,8 +342,9 @@ TEST(MotionGuards, TimeLimit) {
     EXPECT_EQ(o.summary.stop.reason, Stop::time_limit);
     EXPECT_EQ(o.summary.estimated_error, 1);  // one run tells nothing
     ASSERT_TRUE(o.watch.saved);
-    EXPECT_EQ(o.watch.saved->time, o.summary.stop.time);
-    EXPECT_NE(o.summary.stop.message.find("in the coarser run"), std::string::npos) << o.summary.stop.message;
+    EXPECT_GT(o.watch.saved->time, 0);
+    EXPECT_EQ(o.summary.stop.time, 0);
+    EXPECT_NE(o.summary.stop.message.find("of the coarser run"), std::string::npos) << o.summary.stop.message;
     EXPECT_EQ(o.series("time"), std::vector<double>{0});  // the result shows the start
     EXPECT_EQ(o.watch.frames.size(), 1u);
 }
