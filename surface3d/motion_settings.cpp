@@ -12,6 +12,8 @@ constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarse
 constexpr double least_growth = 1.6, most_growth = 4;           // of the number of triangles, from pair to pair
 constexpr double tolerance_per_accuracy = 0.5;                  // tolerance = this * asked accuracy^1.5
 constexpr double loosest_tolerance = 1e-4;                      // beyond it steps are too long to be compared
+constexpr double loosest_of_coarser = 4e-4;                     // beyond it they leave waves that no mesh resolves
+constexpr double least_longer = 2;
 
 double tolerance_for(double accuracy) {
     return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, loosest_tolerance);
@@ -34,7 +36,9 @@ bool settings_given(const Case& c) {
 
 MotionSettings coarser(const MotionSettings& s, Role role) {
     const int elements = role == Role::other_order ? s.elements : static_cast<int>(s.elements / fewer_triangles);
-    return {.elements = elements, .tolerance = s.tolerance * longer_tolerance, .pair = s.pair, .role = role};
+    const double tolerance =
+        std::max(std::min(longer_tolerance * s.tolerance, loosest_of_coarser), least_longer * s.tolerance);
+    return {.elements = elements, .tolerance = tolerance, .pair = s.pair, .role = role};
 }
 
 // Errors fall with the fourth power of the mesh width and the power 2/3 of the tolerance. Where the energies of a pair

@@ -54,14 +54,14 @@ std::string words(const Value& value) {
 }
 
 // What only a resumed run can make sense of.
-bool is_private(const Array& array) {
-    return array.name.starts_with("restart_");
+bool is_private(const std::string& name) {
+    return name.starts_with("restart_");
 }
 
 std::string array_list(const Record& record) {
     std::string list;
     for (const Array& array : record.arrays)
-        if (!is_private(array))
+        if (!is_private(array.name))
             list += fmt::format("{}{}[{}]", list.empty() ? "" : ", ", array.name, fmt::join(array.shape, ", "));
     return list;
 }
@@ -78,12 +78,14 @@ void add_frames(Text& out, const std::vector<Record>& frames) {
         const Record& frame = frames[i];
         if (i == 0 || !alike(frame, frames[i - 1])) {
             add(out, "\n{:>6} {:>14}{}", "frame", "time", frame.mesh ? "   mesh" : "");
-            for (const auto& [name, value] : frame.numbers) add(out, " {:>14}", name);
+            for (const auto& [name, value] : frame.numbers)
+                if (!is_private(name)) add(out, " {:>14}", name);
             add(out, "  arrays\n");
         }
         add(out, "{:>6} {:>14.8g}", i, frame.time);
         if (frame.mesh) add(out, " {:>6}", *frame.mesh);
-        for (const auto& [name, value] : frame.numbers) add(out, " {:>14.8g}", value);
+        for (const auto& [name, value] : frame.numbers)
+            if (!is_private(name)) add(out, " {:>14.8g}", value);
         add(out, "  {}\n", array_list(frame));
     }
 }
@@ -157,7 +159,7 @@ std::vector<Column> profile_columns(const Record& frame) {
     if (z == frame.arrays.end()) throw std::runtime_error("the frame has no array z of sampling points");
     std::vector<Column> columns;
     for (const Array& array : frame.arrays)
-        if (array.shape == z->shape && array.name != "knots" && array.name != "coefficients" && !is_private(array))
+        if (array.shape == z->shape && array.name != "knots" && array.name != "coefficients" && !is_private(array.name))
             columns.push_back({array.name, &array.data});
     return columns;
 }
