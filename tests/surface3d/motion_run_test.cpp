@@ -106,6 +106,13 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
+TEST(MotionSettings, TheCoarserRunIsLooserButNotTooLoose) {
+    for (const auto& [finer, expected] : {std::pair{1e-6, 8e-6}, {5e-5, 4e-4}, {1e-4, 4e-4}, {1e-3, 2e-3}})
+        EXPECT_NEAR(coarser({.elements = 320, .tolerance = finer}, Role::other_order).tolerance, expected, 1e-18);
+    EXPECT_EQ(coarser({.elements = 450, .tolerance = 1e-4}, Role::fewer_triangles).elements, 200);  // 450/2.25
+    EXPECT_EQ(coarser({.elements = 450, .tolerance = 1e-4}, Role::other_order).elements, 450);
+}
+
 TEST(MotionTrace, InterpolatesStepsOfAnyLength) {
     MotionTrace trace;
     for (const double t : {0.0, 1.0, 2.5, 3.0}) trace.add(t, t * t * t);
