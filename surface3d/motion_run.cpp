@@ -66,9 +66,11 @@ public:
 
     RunSummary run() {
         if (coarse_.trace.empty()) {
+            // The result shows the start, whatever ends the coarser run.
+            if (!restart_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin();
             RunSummary other = run_coarse();
             if (can_go_on(other.stop.reason)) return unfinished(std::move(other));
-            watch_.discard();  // what it was saved with
+            watch_.discard();  // the start, and what the other was saved with
             restart_ = nullptr;
         }
         const bool given = settings_given(case_) || !resizable_;
@@ -134,9 +136,8 @@ private:
         return first;
     }
 
-    // The coarser run has been saved, to go on with; the result shows the start.
+    // The coarser run has been saved, to go on with.
     RunSummary unfinished(RunSummary s) {
-        if (!begun_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin();
         describe(s, case_, s.reference_energy, settings_.pair);  // nothing is known of the error yet
         s.stop.message +=
             fmt::format(", at t = {:.6g} of the coarser run, which tells the error of the other", s.stop.time);

@@ -26,6 +26,7 @@ struct Watch : RunObserver {
     std::size_t most_rows = 1000000;  // then it is interrupted
     int most_looks = 1000000;         // at whether it is: so a run is that writes no rows
     int looks = 0;
+    std::size_t frames_at_first_look = 0;
     std::vector<int> looks_at_discard;
 
     void row(std::span<const double> row) override { rows.emplace_back(row.begin(), row.end()); }
@@ -41,7 +42,10 @@ struct Watch : RunObserver {
         rows.clear(), frames.clear(), meshes.clear(), saved.reset();
         looks_at_discard.push_back(looks);
     }
-    bool interrupted() override { return rows.size() >= most_rows || ++looks > most_looks; }
+    bool interrupted() override {
+        if (looks == 0) frames_at_first_look = frames.size();
+        return rows.size() >= most_rows || ++looks > most_looks;
+    }
 };
 
 struct Outcome {
@@ -377,6 +381,7 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     const RunSummary whole = run(c, undisturbed);
     ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
     ASSERT_EQ(detail(whole, "pairs"), 2);
+    EXPECT_EQ(undisturbed.frames_at_first_look, 1u);  // the start, for whoever is killed in the coarser run
     // Again and again: in the coarser run, in the run that is found wanting, and in the one that will do.
     int times = 0, before_rows = 0, in_first_pair = 0;
     std::optional<Restart> restart;

@@ -98,7 +98,7 @@ std::vector<std::string> unmet(const Case& c, const Result& result) {
     for (const Expectation& e : c.expect.values) {
         const std::string where = e.time ? fmt::format("{} at t = {}", e.series, *e.time) : e.series + " at the end";
         const auto series = result.series.find(e.series);
-        const auto row = e.time ? std::find(times.begin(), times.end(), *e.time) : times.end() - 1;
+        const auto row = e.time || times.empty() ? std::find(times.begin(), times.end(), e.time) : times.end() - 1;
         if (series == result.series.end() || row == times.end()) {
             lines.push_back(fmt::format("{} was not computed", where));
             continue;
