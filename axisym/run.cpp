@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "axisym/curve_frame.hpp"
-#include "axisym/curve_run.hpp"
-#include "axisym/frame.hpp"
-#include "axisym/graph_run.hpp"
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_run.hpp"
+#include "axisym/graph/graph_frame.hpp"
+#include "axisym/graph/graph_run.hpp"
 
 namespace tubule::axisym {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "axisym/flow.hpp"
+#include "axisym/integration/flow.hpp"
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
 

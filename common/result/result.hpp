@@ -22,7 +22,7 @@ struct Array {
 };
 
 // The curved cells that frames share until a remesh (/meshes/000000): isoparametric Lagrange triangles, their nodes in
-// VTK's order (surface3d/curved_mesh.hpp).
+// VTK's order (surface3d/mesh/curved_mesh.hpp).
 struct SurfaceCells {
     int order = 3;           // k, 1 to 4
     std::size_t nodes = 0;   // how many

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "axisym/forms.hpp"
-#include "axisym/start.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"

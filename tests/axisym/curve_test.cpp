@@ -4,10 +4,10 @@
 #include <cmath>
 #include <random>
 
-#include "axisym/curve_forms.hpp"
-#include "axisym/curve_start.hpp"
-#include "axisym/forms.hpp"
-#include "axisym/start.hpp"
+#include "axisym/curve/curve_forms.hpp"
+#include "axisym/curve/curve_start.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"

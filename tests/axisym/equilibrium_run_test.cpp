@@ -1,5 +1,5 @@
 // Cases with [equilibrium]: what they may say, and the rows and frames that come out.
-#include "axisym/equilibrium_run.hpp"
+#include "axisym/equilibrium/equilibrium_run.hpp"
 
 #include <gtest/gtest.h>
 

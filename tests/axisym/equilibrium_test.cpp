@@ -1,13 +1,13 @@
 // Stationary shapes against an independent spectral computation (reference values to 1e-11 in energies, 1e-9 in
 // lengths), and branches of them.
-#include "axisym/equilibrium.hpp"
+#include "axisym/equilibrium/equilibrium.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "axisym/continuation.hpp"
-#include "axisym/curve_measures.hpp"
+#include "axisym/curve/curve_measures.hpp"
+#include "axisym/equilibrium/continuation.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 
@@ -336,9 +336,7 @@ TEST(Branch, refusals) {
     EXPECT_EQ(message([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, {}); }),
               "a branch starts from an equilibrium");
     none.stop = Stop::finished;
-    EXPECT_EQ(message([&] {
-                  follow_branch(vesicle(0.9), none, set_reduced_volume, outputs(0.5, 0.5, {}));
-              }),
+    EXPECT_EQ(message([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, outputs(0.5, 0.5, {})); }),
               "a branch needs an interval of its parameter");
 }
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "axisym/start.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 

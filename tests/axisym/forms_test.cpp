@@ -1,13 +1,12 @@
 // The discrete energy and its derivatives, and what they converge to.
-#include "axisym/forms.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "axisym/derivatives.hpp"
-#include "axisym/start.hpp"
+#include "axisym/graph/graph_derivatives.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/axisym/series.hpp"

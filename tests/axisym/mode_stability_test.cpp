@@ -1,5 +1,5 @@
 // Growth rates of non-axisymmetric modes against closed forms (maths 5, 6) and an independent computation.
-#include "axisym/mode_stability.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "axisym/continuation.hpp"
+#include "axisym/equilibrium/continuation.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 

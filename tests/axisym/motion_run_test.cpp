@@ -4,9 +4,9 @@
 #include <cmath>
 #include <fstream>
 
-#include "axisym/curve_motion.hpp"
-#include "axisym/curve_run.hpp"
-#include "axisym/curve_start.hpp"
+#include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_run.hpp"
+#include "axisym/curve/curve_start.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"

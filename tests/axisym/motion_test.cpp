@@ -5,8 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
-#include "axisym/curve_motion.hpp"
-#include "axisym/curve_start.hpp"
+#include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_start.hpp"
 #include "common/geometry/profile_point.hpp"
 
 namespace tubule::axisym {

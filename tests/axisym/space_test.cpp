@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "axisym/forms.hpp"
-#include "axisym/profile_space.hpp"
-#include "axisym/start.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
+#include "axisym/splines/profile_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 

@@ -1,5 +1,5 @@
 // Linear theory against the axisymmetric tier: its linearised operators, its spectra, growth in its runs.
-#include "axisym/spectrum.hpp"
+#include "axisym/equilibrium/spectrum.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "axisym/curve_frame.hpp"
-#include "axisym/profile_modes.hpp"
-#include "axisym/start.hpp"
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/equilibrium/profile_modes.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "common/case/read.hpp"
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"

@@ -3,8 +3,8 @@
 // stated by the program, both relative to E_ref; compare ratios within one run of this program.
 #include <benchmark/benchmark.h>
 
-#include "axisym/forms.hpp"
-#include "axisym/start.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
 #include "tests/benchmark/figure_case.hpp"
 
 namespace tubule::axisym {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "axisym/equilibrium.hpp"
-#include "axisym/mode_stability.hpp"
+#include "axisym/equilibrium/equilibrium.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
 
 namespace tubule::axisym {
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "common/solve/sparse.hpp"
-#include "surface3d/motion_measures.hpp"
+#include "surface3d/motion/motion_measures.hpp"
 #include "tests/benchmark/motion_scene.hpp"
 
 namespace tubule::surface3d {

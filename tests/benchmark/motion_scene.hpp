@@ -1,8 +1,8 @@
 // The paper's perturbed sphere as a fluid, k42 = 0.12, whose steps are timed.
 #pragma once
 
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/motion_step.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/motion/motion_step.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "surface3d/base_meshes.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/motion_runs.hpp"
 
 using namespace tubule;

@@ -6,9 +6,9 @@
 
 #include <functional>
 
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/projection.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/fem/projection.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

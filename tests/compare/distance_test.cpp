@@ -11,9 +11,9 @@
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/mapped_mesh.hpp"
-#include "surface3d/reference_triangle.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/mesh/reference_triangle.hpp"
 #include "tools/compare/revolution_surface.hpp"
 #include "tools/compare/triangle_surface.hpp"
 

@@ -8,8 +8,8 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::compare {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
-#include "surface3d/motion_frame.hpp"
-#include "surface3d/start.hpp"
+#include "surface3d/run/motion_frame.hpp"
+#include "surface3d/run/start.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 

@@ -1,10 +1,10 @@
 // How far a scan has come, in words.
-#include "tools/scan/scan_progress.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstdio>
 #include <string>
+
+#include "tools/scan/scan_progress.hpp"
 
 namespace tubule {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "common/shapes/ellipsoid.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/exact_curvature.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/curvature/exact_curvature.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

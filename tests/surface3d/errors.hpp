@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "common/shapes/sphere.hpp"
-#include "surface3d/curvature.hpp"
-#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/curvature/curvature.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::surface3d {
 

@@ -7,9 +7,9 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::surface3d {
 namespace {

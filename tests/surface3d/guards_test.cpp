@@ -1,5 +1,5 @@
 // Signs that a surface in motion cannot go on.
-#include "surface3d/guards.hpp"
+#include "surface3d/run/guards.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "common/case/read.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
-#include "surface3d/motion_checks.hpp"
+#include "surface3d/run/motion_checks.hpp"
 #include "tests/surface3d/errors.hpp"
 #include "tests/surface3d/motion.hpp"
 

@@ -1,9 +1,10 @@
 // What a mesh must be to be the boundary of one body, each refusal naming its element; and whether triangles meet, on
 // pairs whose answer is plain to see.
-#include "surface3d/import_check.hpp"
+#include "surface3d/import/import_check.hpp"
 
 #include <gtest/gtest.h>
 
+#include "surface3d/mesh/self_intersection.hpp"
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "surface3d/triangle_mesh.hpp"
+#include "surface3d/mesh/triangle_mesh.hpp"
 
 namespace tubule::surface3d::samples {
 

@@ -2,7 +2,7 @@
 // bumpy sphere. Orders come from theory (fitted polynomials of degree k + 1 leave nodes O(h^(k+2)) off the surface;
 // elements of degree k have errors O(h^(k+1)) in position, O(h^k) in the normal, O(h^(k-1)) in H). Magnitudes were
 // measured once; the bounds are 1.3 times those, so that a worse fit of the right order is noticed too.
-#include "surface3d/import_fit.hpp"
+#include "surface3d/import/import_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Mesh files: every format gives the mesh that was written, and every refusal has its place and its words. Lines,
 // columns and bytes are counted by hand.
-#include "surface3d/import_formats.hpp"
+#include "surface3d/import/import_formats.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "surface3d/curved_mesh.hpp"
-#include "surface3d/triangle_mesh.hpp"
+#include "surface3d/mesh/curved_mesh.hpp"
+#include "surface3d/mesh/triangle_mesh.hpp"
 
 namespace tubule::surface3d::samples {
 

@@ -1,5 +1,5 @@
 // How nodes move: with the surface, and along it with the least deformation of the mesh.
-#include "surface3d/mesh_motion.hpp"
+#include "surface3d/motion/mesh_motion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <random>
 
 #include "motion.hpp"
-#include "surface3d/graded_mesh.hpp"
-#include "surface3d/remesh.hpp"
+#include "surface3d/meshing/graded_mesh.hpp"
+#include "surface3d/meshing/remesh.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -12,9 +12,9 @@
 #include "common/shapes/revolution.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/graded_mesh.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/meshing/graded_mesh.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

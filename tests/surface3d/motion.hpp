@@ -6,10 +6,10 @@
 
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/mapped_mesh.hpp"
-#include "surface3d/motion_measures.hpp"
-#include "surface3d/motion_step.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/motion/motion_measures.hpp"
+#include "surface3d/motion/motion_step.hpp"
 
 namespace tubule::surface3d {
 

@@ -1,6 +1,6 @@
 // The linear system of a step of the moving surface: its force against the energy, the evolution of H and K against
 // surfaces that move, its symmetry, and how it is solved.
-#include "surface3d/motion_forms.hpp"
+#include "surface3d/motion/motion_forms.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/tube.hpp"
 #include "common/solve/bordered.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/mapped_mesh.hpp"
-#include "surface3d/mesh_quality.hpp"
-#include "surface3d/projection.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/fem/projection.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -1,5 +1,5 @@
 // Runs of moving surfaces: what is kept, what stops them, and how they go on.
-#include "surface3d/motion_run.hpp"
+#include "surface3d/run/motion_run.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "common/case/read.hpp"
-#include "surface3d/motion_frame.hpp"
-#include "surface3d/motion_settings.hpp"
-#include "surface3d/motion_trace.hpp"
-#include "surface3d/run.hpp"
+#include "surface3d/run/motion_frame.hpp"
+#include "surface3d/run/motion_settings.hpp"
+#include "surface3d/run/motion_trace.hpp"
+#include "surface3d/run/run.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/paper_scheme.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/motion/paper_scheme.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

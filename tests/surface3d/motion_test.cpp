@@ -7,8 +7,8 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "common/theory/waves.hpp"
-#include "surface3d/generalised_alpha.hpp"
-#include "surface3d/remesh.hpp"
+#include "surface3d/meshing/remesh.hpp"
+#include "surface3d/motion/generalised_alpha.hpp"
 
 namespace tubule::surface3d {
 namespace {

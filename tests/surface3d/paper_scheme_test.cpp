@@ -1,13 +1,13 @@
 // The paper's scheme: its forces are those of the default scheme, it is of first order in time, and it has the limits
 // that the default is to be free of.
-#include "surface3d/paper_scheme.hpp"
+#include "surface3d/motion/paper_scheme.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "surface3d/base_meshes.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/motion_runs.hpp"
 
 namespace tubule::surface3d {

@@ -1,5 +1,5 @@
 // Quadrature and Lagrange functions on the reference triangle.
-#include "surface3d/reference_triangle.hpp"
+#include "surface3d/mesh/reference_triangle.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Quality of meshes, nearest points on them, local changes of triangulations, and new meshes of the same surface:
 // good ones, without a jump of energy, area, volume or fields; or none.
-#include "surface3d/remesh.hpp"
+#include "surface3d/meshing/remesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,12 +11,12 @@
 #include "common/shapes/ellipsoid.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/closest_point.hpp"
-#include "surface3d/half_edges.hpp"
-#include "surface3d/motion_fields.hpp"
-#include "surface3d/projection.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/fem/projection.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/closest_point.hpp"
+#include "surface3d/mesh/half_edges.hpp"
+#include "surface3d/motion/motion_fields.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {

@@ -1,6 +1,6 @@
 // Cases of tier surface3d: energies of exactly known shapes as accurate as asked and as stated, on every kind of mesh;
 // guards; refusals.
-#include "surface3d/run.hpp"
+#include "surface3d/run/run.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Amplitudes of waves on curved meshes of surfaces that are given by their waves.
-#include "surface3d/surface_modes.hpp"
+#include "surface3d/curvature/surface_modes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -15,10 +15,10 @@
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
-#include "surface3d/base_meshes.hpp"
-#include "surface3d/bending_force.hpp"
-#include "surface3d/curvature.hpp"
-#include "surface3d/mapped_mesh.hpp"
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/curvature/curvature.hpp"
+#include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 
 using namespace tubule;
 using namespace tubule::surface3d;

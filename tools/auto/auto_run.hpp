@@ -6,11 +6,11 @@
 
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
-#include "surface3d/run.hpp"
+#include "surface3d/run/run.hpp"
 
 namespace tubule {
 
-// As those of the tiers (surface3d/run.hpp); both throw CaseError where a result to start from cannot be read.
+// As those of the tiers (surface3d/run/run.hpp); both throw CaseError where a result to start from cannot be read.
 std::vector<std::string> auto_series_names(const Case& c);
 void check_auto_start(const Case& c);
 

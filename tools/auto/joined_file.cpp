@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "axisym/run.hpp"
-#include "surface3d/run.hpp"
+#include "surface3d/run/run.hpp"
 #include "tools/auto/choice.hpp"
 
 namespace tubule {

@@ -5,8 +5,8 @@
 #include <complex>
 #include <stdexcept>
 
-#include "axisym/curve_frame.hpp"
-#include "axisym/spectrum.hpp"
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/equilibrium/spectrum.hpp"
 
 namespace tubule {
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "axisym/derivatives.hpp"
+#include "axisym/graph/graph_derivatives.hpp"
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"

@@ -13,9 +13,9 @@
 #include <stdexcept>
 #include <variant>
 
-#include "axisym/curve_frame.hpp"
-#include "axisym/equilibrium_run.hpp"
-#include "axisym/profile_modes.hpp"
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"

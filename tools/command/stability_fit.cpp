@@ -6,11 +6,11 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "axisym/curve_frame.hpp"
-#include "axisym/profile_modes.hpp"
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/equilibrium/profile_modes.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
-#include "surface3d/surface_modes.hpp"
+#include "surface3d/curvature/surface_modes.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 

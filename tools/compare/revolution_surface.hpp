@@ -5,7 +5,7 @@
 
 #include "common/shapes/profile_curve.hpp"
 #include "common/shapes/revolution.hpp"
-#include "surface3d/box_tree.hpp"
+#include "surface3d/mesh/box_tree.hpp"
 #include "tools/compare/surface.hpp"
 
 namespace tubule::compare {

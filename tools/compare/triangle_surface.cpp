@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "surface3d/reference_triangle.hpp"
+#include "surface3d/mesh/reference_triangle.hpp"
 
 namespace tubule::compare {
 

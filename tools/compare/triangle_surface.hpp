@@ -4,7 +4,7 @@
 #include <array>
 
 #include "common/result/result.hpp"
-#include "surface3d/box_tree.hpp"
+#include "surface3d/mesh/box_tree.hpp"
 #include "tools/compare/surface.hpp"
 
 namespace tubule::compare {

@@ -9,7 +9,7 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/theory/waves.hpp"
-#include "surface3d/surface_modes.hpp"
+#include "surface3d/curvature/surface_modes.hpp"
 #include "tools/compare/results.hpp"
 
 namespace tubule::confirm {

@@ -11,8 +11,8 @@
 #include <optional>
 #include <span>
 
-#include "axisym/forms.hpp"
-#include "axisym/frame.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_frame.hpp"
 #include "tools/scan/tiers.hpp"
 #include "tools/scan/uniform_fate.hpp"
 

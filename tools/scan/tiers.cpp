@@ -1,6 +1,6 @@
 #include "tools/scan/tiers.hpp"
 
-#include "axisym/equilibrium_run.hpp"
+#include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
 #include "tools/auto/auto_run.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
-#include "surface3d/run.hpp"
+#include "surface3d/run/run.hpp"
 
 namespace tubule {
 

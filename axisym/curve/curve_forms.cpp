@@ -1,0 +1,339 @@
+#include "axisym/curve/curve_forms.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "axisym/splines/pack.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+namespace stdx = std::experimental;
+constexpr int lanes = ProfileSpace::lanes;
+constexpr int wide = ProfileSpace::max_width;
+
+// A curve at the quadrature points of one group, from the coefficients of one element.
+struct Local {
+    Pack r{0.0}, r1{0.0}, r2{0.0}, z1, z2{0.0};
+    Local(const CurveSpace& space, int e, int g, const double* x) : z1(space.rise()) {
+        const auto& b = space.splines().basis(e, g);
+        const double* z = x + space.r().size();
+        for (int a = 0; a < space.splines().width(); ++a) {
+            const double cr = space.r().signs(e)[a] * x[space.r().dofs(e)[a]];
+            const double cz = space.z().signs(e)[a] * z[space.z().dofs(e)[a]];
+            r += cr * load(b.by_point[0][a]);
+            r1 += cr * load(b.by_point[1][a]);
+            r2 += cr * load(b.by_point[2][a]);
+            z1 += cz * load(b.by_point[1][a]);
+            z2 += cz * load(b.by_point[2][a]);
+        }
+    }
+};
+
+// d log g/ds
+template <class S>
+S stretching(const S& r1, const S& r2, const S& z1, const S& z2) {
+    return (r1 * r2 + z1 * z2) * inverse(S(r1 * r1 + z1 * z1));
+}
+
+// The functional per unit of s, with derivatives with respect to (r, r', r'', z', z'').
+template <int Order>
+Jet<Pack, 5, Order> functional_density(const Bending& bending, const Weights& w, const Local& at) {
+    using J = Jet<Pack, 5, Order>;
+    const J r = J::variable(at.r, 0), r1 = J::variable(at.r1, 1), r2 = J::variable(at.r2, 2),
+            z1 = J::variable(at.z1, 3), z2 = J::variable(at.z2, 4);
+    J sum;
+    if (w.energy != 0 || w.area != 0) {
+        const auto p = profile_point(r, r1, r2, z1, z2);
+        const auto f = density(bending, p.H.v, p.K.v);
+        sum = p.area * (w.energy * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK) + w.area);
+    }
+    if (w.volume != 0) sum += (w.volume * pi) * (r * r * z1);
+    if (w.gauge != 0) {
+        const J q = stretching(r1, r2, z1, z2);
+        sum += (w.gauge / 2) * (q * q);
+    }
+    return sum;
+}
+
+// Derivatives that r and z enter with: of r the zeroth to second, of z the first and second.
+constexpr int first_derivative[2] = {0, 1}, first_variable[2] = {0, 3};
+
+}  // namespace
+
+CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
+    : space_(space), bending_(bending), images_(space.images()) {
+    const int w = space.splines().width(), n = space.splines().elements();
+    const auto dof = [&](int e, int a) {  // -1: absent
+        const Field& field = a < w ? space.r() : space.z();
+        return field.signs(e)[a % w] == 0 ? -1 : field.dofs(e)[a % w] + (a < w ? 0 : space.r().size());
+    };
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int e = 0; e < n; ++e)
+        for (int b = 0; b < 2 * w; ++b)
+            for (int a = 0; a < 2 * w; ++a)
+                if (dof(e, a) >= 0 && dof(e, b) >= 0) entries.emplace_back(dof(e, a), dof(e, b), 0.0);
+    pattern_.resize(space.size(), space.size());
+    pattern_.setFromTriplets(entries.begin(), entries.end());
+    for (int e = 0; e < n; ++e)
+        for (int b = 0; b < 2 * w; ++b)
+            for (int a = 0; a < 2 * w; ++a) {
+                int slot = 0;  // receives zeros for what is absent
+                if (dof(e, a) >= 0 && dof(e, b) >= 0) {
+                    const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[dof(e, b)];
+                    const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[dof(e, b) + 1];
+                    slot = static_cast<int>(std::lower_bound(begin, end, dof(e, a)) - pattern_.innerIndexPtr());
+                }
+                slots_.push_back(slot);
+            }
+}
+
+template <int P>
+[[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const double* x, double* out) const {
+    const ProfileSpace& splines = space_.splines();
+    Pack smallest{std::numeric_limits<double>::infinity()};
+    for (int e = 0; e < splines.elements(); ++e) {
+        Pack sums[2][2] = {{Pack(0.0), Pack(0.0)}, {Pack(0.0), Pack(0.0)}};  // [field][half of the splines]
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Local at(space_, e, g, x);
+            smallest = stdx::min(smallest, at.r);
+            const auto density = functional_density<1>(bending_, weights, at);
+            const Pack weight = images_ * load(basis.weight);
+            alignas(32) double c[5][lanes];
+            for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
+            for (int q = 0; q < lanes; ++q)
+                for (int field = 0; field < 2; ++field)
+                    for (int d = first_derivative[field]; d < 3; ++d) {
+                        const double value = c[first_variable[field] + d - first_derivative[field]][q];
+                        sums[field][0] += value * load(basis.by_spline[q][d]);
+                        sums[field][1] += value * load(basis.by_spline[q][d] + lanes);
+                    }
+        }
+        for (int field = 0; field < 2; ++field) {
+            const Field& f = field == 0 ? space_.r() : space_.z();
+            double* to = field == 0 ? out : out + space_.r().size();
+            alignas(32) double local[wide];
+            store(sums[field][0], local);
+            store(sums[field][1], local + lanes);
+            for (int a = 0; a <= P; ++a) to[f.dofs(e)[a]] += f.signs(e)[a] * local[a];
+        }
+    }
+    return stdx::hmin(smallest) > 0;
+}
+
+template <int P>
+[[gnu::flatten]] void CurveForms::hessian_kernel(const Weights& weights, const double* x, double* values) const {
+    constexpr int w = P + 1;
+    const ProfileSpace& splines = space_.splines();
+    for (int e = 0; e < splines.elements(); ++e) {
+        alignas(32) Pack local[2][2][w][2];  // [field of column][field of row][column][half of the rows]
+        std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const auto density = functional_density<2>(bending_, weights, Local(space_, e, g, x));
+            const Pack weight = images_ * load(basis.weight);
+            alignas(32) double c[5][5][lanes];
+            for (int i = 0; i < 5; ++i)
+                for (int j = 0; j < 5; ++j) store(weight * density.dd[packed<5>(i, j)], c[i][j]);
+            for (int q = 0; q < lanes; ++q) {
+                const auto& s = basis.by_spline[q];
+                for (int field = 0; field < 2; ++field)
+                    for (int of = 0; of < 2; ++of)
+                        for (int half = 0; half * lanes <= P; ++half) {
+                            const int d0 = first_derivative[field], i0 = first_variable[field] - d0;
+                            const int k0 = first_derivative[of], j0 = first_variable[of] - k0;
+                            Pack rows[3];  // c contracted with the splines of the rows
+                            for (int d = d0; d < 3; ++d) {
+                                rows[d] = Pack(0.0);
+                                for (int k = k0; k < 3; ++k)
+                                    rows[d] += c[i0 + d][j0 + k][q] * load(s[k] + half * lanes);
+                            }
+                            for (int b = 0; b < w; ++b)
+                                for (int d = d0; d < 3; ++d) local[field][of][b][half] += s[d][b] * rows[d];
+                        }
+            }
+        }
+        const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+        for (int b = 0; b < 2 * w; ++b)
+            for (int of = 0; of < 2; ++of) {
+                alignas(32) double column[wide];
+                store(local[b / w][of][b % w][0], column);
+                store(local[b / w][of][b % w][1], column + lanes);
+                const double sign = (b < w ? space_.r() : space_.z()).signs(e)[b % w];
+                const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
+                for (int a = 0; a < w; ++a) values[slot[b * 2 * w + of * w + a]] += sign * signs[a] * column[a];
+            }
+    }
+}
+
+bool CurveForms::add_gradient(const Weights& weights, const double* x, double* out) const {
+    switch (space_.splines().degree()) {
+        case 3:
+            return gradient_kernel<3>(weights, x, out);
+        case 5:
+            return gradient_kernel<5>(weights, x, out);
+        default:
+            return gradient_kernel<7>(weights, x, out);
+    }
+}
+
+void CurveForms::add_hessian(const Weights& weights, const double* x, double* values) const {
+    switch (space_.splines().degree()) {
+        case 3:
+            return hessian_kernel<3>(weights, x, values);
+        case 5:
+            return hessian_kernel<5>(weights, x, values);
+        default:
+            return hessian_kernel<7>(weights, x, values);
+    }
+}
+
+Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::VectorXd& x) const {
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(space_.size());
+    add_gradient(weights, x.data(), out.data());
+    return out;
+}
+
+Eigen::SparseMatrix<double> CurveForms::hessian(const Weights& weights, const Eigen::VectorXd& x) const {
+    Eigen::SparseMatrix<double> out = pattern_;
+    add_hessian(weights, x.data(), out.valuePtr());
+    return out;
+}
+
+double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const {
+    const CurveObservation o = observe(x);
+    return weights.energy * o.energy + weights.area * o.area + weights.volume * o.volume + weights.gauge * o.gauge;
+}
+
+Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    const int w = splines.width();
+    Eigen::SparseMatrix<double> out = pattern_;
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Local at(space_, e, g, x.data());
+            const Pack dS = (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
+            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+            for (int b = 0; b < w; ++b)
+                for (int a = 0; a < w; ++a) {
+                    const double value = stdx::reduce(dS * load(basis.by_point[0][a]) * load(basis.by_point[0][b]));
+                    const double* r = space_.r().signs(e);
+                    const double* z = space_.z().signs(e);
+                    out.valuePtr()[slot[b * 2 * w + a]] += r[a] * r[b] * value;
+                    out.valuePtr()[slot[(w + b) * 2 * w + w + a]] += z[a] * z[b] * value;
+                }
+        }
+    return out;
+}
+
+bool CurveForms::admissible(const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(space_, e, g, x.data());
+            if (!(stdx::hmin(at.r) > 0 && stdx::hmin(at.r1 * at.r1 + at.z1 * at.z1) > 0)) return false;
+        }
+    return true;
+}
+
+CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
+    const ProfileSpace& splines = space_.splines();
+    const int n = splines.elements();
+    CurveObservation o;
+    Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0}, terms[n_bending_terms];
+    for (auto& t : terms) t = Pack(0.0);
+    std::vector<double> stiffness(n, 0.0);
+    for (int e = 0; e < n; ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Local at(space_, e, g, x.data());
+            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
+            const Pack weight = load(basis.weight), dA = weight * p.area, speed = 1.0 / p.inverse_speed;
+            const Pack q = stretching(at.r1, at.r2, at.z1, at.z2);
+            area += dA;
+            volume += pi * weight * at.r * at.r * at.z1;
+            gauge += 0.5 * weight * q * q;
+            length += weight * speed;
+            for_each_bending_term([&](std::size_t i, const auto& term) {
+                if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
+            });
+            const auto f = density(bending_, p.H, p.K);
+            const auto symbol = [&](const Pack& kappa) { return f.HH + kappa * (2.0 * f.HK + kappa * f.KK); };
+            const Pack s = symbol(p.kappa_theta);
+            // Of a parabola in x the minimum over an interval is at an end or at its clamped vertex.
+            const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
+            const Pack vertex = stdx::clamp(-f.HK * f.KK / (f.KK * f.KK + 1e-300), low, high);
+            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(stdx::min(s, stdx::min(symbol(p.kappa_s), symbol(vertex)))));
+            const Pack ig2 = p.inverse_speed * p.inverse_speed;
+            stiffness[e] += stdx::reduce(dA * ig2 * ig2 * stdx::abs(s));
+            const Pack bent = stdx::max(stdx::abs(low), stdx::abs(high));
+            for (int i = 0; i < lanes; ++i) {
+                if (at.r[i] < o.r_min) o.r_min = at.r[i], o.s_min = basis.z[i];
+                if (at.r[i] > o.r_max) o.r_max = at.r[i], o.s_max = basis.z[i];
+                if (bent[i] > o.curvature) o.curvature = bent[i], o.s_curvature = basis.z[i];
+                if (s[i] < o.symbol) o.symbol = s[i], o.s_symbol = basis.z[i];
+                o.g_min = std::min(o.g_min, static_cast<double>(speed[i]));
+                o.g_max = std::max(o.g_max, static_cast<double>(speed[i]));
+            }
+        }
+    o.area = images_ * stdx::reduce(area);
+    o.volume = images_ * stdx::reduce(volume);
+    o.gauge = images_ * stdx::reduce(gauge);
+    o.length = images_ * stdx::reduce(length);
+    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = images_ * stdx::reduce(terms[i]);
+    if (defect) *defect = spline_defect(x, stiffness);
+    return o;
+}
+
+std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const {
+    const ProfileSpace& splines = space_.splines();
+    const int n = splines.elements(), p = splines.degree();
+    const auto& breaks = splines.breaks();
+    // Squared norm |B_2m|/(2m)! of the Bernoulli spline that is left of a polynomial of degree p + 1 when its second
+    // derivative is approximated by splines of degree p - 2; m = p - 1.
+    const double bernoulli = p == 3 ? 1.0 / 720 : p == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
+    const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
+    const auto top = [&](int e) {
+        return Eigen::Vector2d(space_.r().top_derivative(x.data(), e),
+                               space_.z().top_derivative(x.data() + space_.r().size(), e));
+    };
+    // Difference quotient of the highest derivative across the knot before element e = 0 ... n, along the normal there.
+    // The highest derivative, of odd order, is odd under reflection where the field is even, and the reverse.
+    std::vector<double> jump(n + 1);
+    const bool mirror = splines.cell().mirror;
+    const Parity r = space_.r_parity(), z = space_.z_parity();
+    for (int e = 0; e <= n; ++e) {
+        Eigen::Vector2d before = top(e > 0 ? e - 1 : n - 1), after = top(e < n ? e : 0);
+        if (mirror && e == 0) before = Eigen::Vector2d(-r.start * after[0], -z.start * after[1]);
+        if (mirror && e == n) after = Eigen::Vector2d(-r.end * before[0], -z.end * before[1]);
+        const double left = size(e > 0 ? e - 1 : mirror ? 0 : n - 1), right = size(e < n ? e : mirror ? n - 1 : 0);
+        const CurvePoint at = space_.evaluate(x, breaks[e]);
+        const Eigen::Vector2d normal = Eigen::Vector2d(at.z1, -at.r1).normalized();
+        jump[e] = 2 * normal.dot(after - before) / (left + right);
+    }
+    std::vector<double> defect(n);
+    for (int e = 0; e < n; ++e)
+        defect[e] = images_ * bernoulli / 4 * std::pow(size(e), 2 * (p - 1)) * stiffness[e] *
+                    (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
+    return defect;
+}
+
+double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    Pack magnitude{0.0};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(space_, e, g, x.data());
+            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
+            for_each_bending_term([&](std::size_t i, const auto& term) {
+                magnitude += std::abs(bending_.k[i]) * term.magnitude(p.H, p.K, bending_.H0) * p.area *
+                             load(splines.basis(e, g).weight);
+            });
+        }
+    return std::max(std::abs(observe(x).energy), images_ * stdx::reduce(magnitude));
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,82 @@
+// Functionals of a profile curve and their derivatives in the coefficients of (r, z): bending energy, area, volume, and
+// the gauge that keeps the parametrisation even.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "axisym/splines/curve_space.hpp"
+#include "common/energy/bending.hpp"
+
+namespace tubule::axisym {
+
+// The functional energy E + area A + volume V + gauge D of the whole cell or period, by its weights.
+//   E = INT f(H, K) dS        V = INT pi r^2 z' ds
+//   D = 1/2 INT (d log g/ds)^2 ds, g = |X'|
+// E, A and V do not depend on the parametrisation; D vanishes for one in proportion to arc length, which every shape
+// has. So E + alpha D has the stationary shapes of E, and a Hessian that is regular along the curve.
+struct Weights {
+    double energy = 0, area = 0, volume = 0, gauge = 0;
+};
+
+// What a curve is worth, over the whole cell or period; extremes over the quadrature points.
+struct CurveObservation {
+    double energy = 0;
+    std::array<double, n_bending_terms> energy_term{};
+    double area = 0, volume = 0, gauge = 0;
+    double length = 0;                                                  // of the meridian
+    double r_min = std::numeric_limits<double>::infinity(), s_min = 0;  // not a pole, but possibly near one
+    double r_max = 0, s_max = 0;
+    double g_min = std::numeric_limits<double>::infinity(), g_max = 0;  // speeds |X'|
+    double curvature = 0, s_curvature = 0;                              // largest |kappa_s| or |kappa_theta|
+    // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
+    // curvatures (maths 2).
+    double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
+};
+
+class CurveForms {
+public:
+    CurveForms(const CurveSpace& space, const Bending& bending);
+
+    const CurveSpace& space() const { return space_; }
+    const Bending& bending() const { return bending_; }
+    void set_bending(const Bending& bending) { bending_ = bending; }
+
+    // Not finite or meaningless unless r > 0 at all quadrature points: see admissible().
+    double value(const Weights& weights, const Eigen::VectorXd& x) const;
+    Eigen::VectorXd gradient(const Weights& weights, const Eigen::VectorXd& x) const;
+    // As above, added to `out` of space().size() numbers. False if r <= 0 at a quadrature point.
+    bool add_gradient(const Weights& weights, const double* x, double* out) const;
+    Eigen::SparseMatrix<double> hessian(const Weights& weights, const Eigen::VectorXd& x) const;
+    // As above, added to the values of a matrix with pattern().
+    void add_hessian(const Weights& weights, const double* x, double* values) const;
+    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
+    Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
+
+    // r > 0 and |X'| > 0 at all quadrature points.
+    bool admissible(const Eigen::VectorXd& x) const;
+    // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
+    // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
+    CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* defect = nullptr) const;
+    // E_ref (design): the scale that the asked accuracy refers to.
+    double reference_energy(const Eigen::VectorXd& x) const;
+
+private:
+    template <int P>
+    bool gradient_kernel(const Weights& weights, const double* x, double* out) const;
+    template <int P>
+    void hessian_kernel(const Weights& weights, const double* x, double* values) const;
+    std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const;
+
+    const CurveSpace& space_;
+    Bending bending_;
+    double images_;
+    Eigen::SparseMatrix<double> pattern_;
+    std::vector<int> slots_;  // place in pattern_ of the local matrix entries of each element, column by column
+};
+
+}  // namespace tubule::axisym

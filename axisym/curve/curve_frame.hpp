@@ -1,0 +1,36 @@
+// Profile curves as records of the result file, and as starts from it.
+#pragma once
+
+#include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_start.hpp"
+#include "common/case/case.hpp"
+#include "common/result/result.hpp"
+
+namespace tubule::axisym {
+
+// What a run of a curve needs to go on.
+struct CurveRestart {
+    std::vector<double> breaks;
+    Eigen::VectorXd y, rate;
+    int elements = 0;  // asked for, of one cell; there are more at seams
+    double tolerance = 0, total_start = 0, dissipated = 0, error = 0, reference_energy = 0;
+};
+
+// Numbers energy, length (of a period, or 0); sampled from pole to pole or over a period, in order along the profile:
+// r, z, H, K, u_n (normal velocity), and of a flow u_t (along the profile, in the order of the points), p (pressure),
+// u_theta (if it swirls); the restart state under names that begin with restart_.
+Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy);
+
+bool is_curve(const Record& record);
+
+// Throws std::runtime_error if the record is no curve of this tier.
+CurveRestart curve_restart(const Record& record);
+
+// The profile of a frame, of a graph or a curve, over its whole period or from pole to pole. Throws
+// std::invalid_argument for a record that has none.
+Meridian frame_meridian(const Record& frame);
+
+// Where a case begins. Throws CaseError for a result without a frame of this tier.
+Meridian start_meridian(const Case& c);
+
+}  // namespace tubule::axisym

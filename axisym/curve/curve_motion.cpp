@@ -1,0 +1,517 @@
+#include "axisym/curve/curve_motion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "axisym/splines/pack.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+namespace stdx = std::experimental;
+constexpr int lanes = ProfileSpace::lanes;
+constexpr int wide = ProfileSpace::max_width;
+
+enum FieldName { curve_r, curve_z, velocity_r, velocity_z, swirl, pressure, n_fields };
+
+// What enters the law at a point: values and first derivatives of the fields. (The energy is added by CurveForms.)
+enum Slot { r0, r1, z0, z1, ur0, ur1, uz0, uz1, w0, w1, p0, n_slots };
+constexpr std::array<int, n_slots> slot_field{curve_r,    curve_r,    curve_z, curve_z, velocity_r, velocity_r,
+                                              velocity_z, velocity_z, swirl,   swirl,   pressure};
+constexpr std::array<int, n_slots> slot_derivative{0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
+
+// What comes out: the factors of test functions and their derivatives, and two integrals.
+enum Row { kr, kz, mr0, mr1, mz0, mz1, sw0, sw1, continuity, drift_sum, shift_sum, n_rows };
+constexpr int n_test_rows = drift_sum;
+constexpr std::array<int, n_test_rows> row_field{curve_r,    curve_z, velocity_r, velocity_r, velocity_z,
+                                                 velocity_z, swirl,   swirl,      pressure};
+constexpr std::array<int, n_test_rows> row_derivative{0, 0, 0, 1, 0, 1, 0, 1, 0};
+
+// The fields at a point; S is a pack of points or a jet of it. Rates are of the parameter's points, X_t at fixed s.
+template <class S>
+struct PointFields {
+    std::array<S, n_slots> v;
+    S r_t, z_t, ur_t, uz_t, w_t;
+};
+
+// The law per unit of s, but for the energy, the gauge and the volume.
+template <class S>
+std::array<S, n_rows> point_law(const PointFields<S>& f, const MotionLaw& law, double drift, double shift) {
+    const S &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
+    const S g2 = r_s * r_s + z_s * z_s, ig2 = inverse(g2), ig = inverse_sqrt(g2);
+    std::array<S, n_rows> out;
+    for (S& x : out) x = S(0.0);
+    if (!law.flows) {
+        const S rate = (2 * pi) * (r * (f.r_t * z_s - f.z_t * r_s));  // X_t.nu dS/g
+        out[kr] = rate * z_s * ig + shift * (2 * pi) * (r * r_s);
+        out[kz] = shift * (2 * pi) * (r * z_s) - rate * r_s * ig;
+        out[shift_sum] = (2 * pi) * (r * (f.r_t * r_s + f.z_t * z_s));
+        return out;
+    }
+    const S &u = f.v[ur0], &v = f.v[uz0], &w = f.v[w0], &p = f.v[p0];
+    const S inverse_r = inverse(r), dS = (2 * pi) * (r * (g2 * ig));
+    const S dr = f.r_t - u, dz = f.z_t - v;
+    const S across = (2 * pi) * (r * ((dr * z_s - dz * r_s) * ig));  // (X_t - u).nu dS/g
+    const S along = (2 * pi) * (r * (dr * r_s + dz * z_s));          // (X_t - u).t dS
+    if (law.lagrangian) {
+        out[kr] = dS * dr;
+        out[kz] = dS * dz;
+    } else {
+        out[kr] = across * z_s + shift * (2 * pi) * (r * r_s);
+        out[kz] = shift * (2 * pi) * (r * z_s) - across * r_s;
+    }
+    out[shift_sum] = along;
+    out[drift_sum] = dS * v;
+
+    const S stretch_s = (r_s * f.v[ur1] + z_s * f.v[uz1]) * ig2, stretch_theta = u * inverse_r;
+    const S divergence = stretch_s + stretch_theta;
+    S force_r = law.friction * u - p * inverse_r + (2 * law.viscosity) * (stretch_theta * inverse_r);
+    S force_z = law.friction * v + drift;
+    const S tension = ((2 * law.viscosity) * stretch_s - p) * ig2;
+    if (law.inertia != 0) {
+        const S half = 0.5 * divergence, advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
+        force_r += law.inertia * (f.ur_t + advect * f.v[ur1] + half * u - w * w * inverse_r);
+        force_z += law.inertia * (f.uz_t + advect * f.v[uz1] + half * v);
+        if (law.swirls) {
+            const S shear = 0.5 * (ig * (f.v[w1] - w * r_s * inverse_r));
+            const S viscous = (2 * law.viscosity) * (shear * ig);
+            out[sw0] = dS * (law.inertia * (f.w_t + advect * f.v[w1] + half * w + u * w * inverse_r) +
+                             law.friction * w - viscous * r_s * inverse_r);
+            out[sw1] = dS * viscous;
+        }
+    }
+    out[mr0] = dS * force_r;
+    out[mz0] = dS * force_z;
+    out[mr1] = dS * tension * r_s;
+    out[mz1] = dS * tension * z_s;
+    out[continuity] = -(dS * divergence);
+    return out;
+}
+
+}  // namespace
+
+// Values at the points of one group of an element.
+struct CurveMotion::Local {
+    PointFields<Pack> fields;
+
+    Local(const CurveMotion& m, int e, int g, const double* y, const double* rate) {
+        for (Pack& value : fields.v) value = Pack(0.0);
+        Pack rates[n_fields];
+        for (int part = 0; part < n_fields; ++part) {
+            rates[part] = Pack(0.0);
+            const auto& [field, offset] = m.parts_[part];
+            if (offset < 0) continue;
+            const auto& b = field->splines().basis(e, g);
+            const int *dofs = field->dofs(e), slot = first_slot(part);
+            const double* signs = field->signs(e);
+            for (int a = 0; a < m.width(part); ++a) {
+                const double c = signs[a] * y[offset + dofs[a]];
+                fields.v[slot] += c * load(b.by_point[0][a]);
+                if (part == pressure) continue;
+                fields.v[slot + 1] += c * load(b.by_point[1][a]);
+                rates[part] += signs[a] * rate[offset + dofs[a]] * load(b.by_point[0][a]);
+            }
+        }
+        fields.v[z1] += m.space().rise();
+        fields.r_t = rates[curve_r], fields.z_t = rates[curve_z];
+        fields.ur_t = rates[velocity_r], fields.uz_t = rates[velocity_z], fields.w_t = rates[swirl];
+    }
+
+    static int first_slot(int part) { return 2 * part; }
+
+    // The same as jets in the slots; rates depend on the values of their fields by cj.
+    template <class J>
+    PointFields<J> jets(double cj) const {
+        PointFields<J> out;
+        for (int i = 0; i < n_slots; ++i) out.v[i] = J::variable(fields.v[i], i);
+        const auto rate = [&](const Pack& value, int slot) {
+            J x;
+            x.v = value;
+            x.d[slot] = Pack(cj);
+            return x;
+        };
+        out.r_t = rate(fields.r_t, r0), out.z_t = rate(fields.z_t, z0);
+        out.ur_t = rate(fields.ur_t, ur0), out.uz_t = rate(fields.uz_t, uz0), out.w_t = rate(fields.w_t, w0);
+        return out;
+    }
+};
+
+CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const MotionLaw& law, double gauge,
+                         double area, double volume)
+    : forms_(space, bending),
+      law_(law),
+      gauge_(law.lagrangian ? 0 : gauge),
+      area0_(area),
+      volume0_(volume),
+      pressure_splines_(space.splines().cell(), space.splines().breaks(), space.splines().degree() - 1,
+                        std::min(space.splines().smoothness(), space.splines().degree() - 2)),
+      swirl_(space.splines(), space.r_parity()),
+      pressure_(pressure_splines_, space.scalar_parity()) {
+    int size = 0;
+    const auto add = [&](bool present, int length) {
+        if (!present) return -1;
+        size += length;
+        return size - length;
+    };
+    at_.r = add(true, space.r().size());
+    at_.z = add(true, space.z().size());
+    at_.u_r = add(law.flows, space.r().size());
+    at_.u_z = add(law.flows, space.z().size());
+    at_.swirl = add(law.flows && law.swirls, swirl_.size());
+    at_.p = add(law.flows, pressure_.size());
+    at_.lambda = add(law.keeps_volume, 1);
+    at_.area = add(law.flows && law.holds_area, 1);
+    at_.volume = add(law.flows && law.keeps_volume && law.holds_volume, 1);
+    const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
+    at_.drift = add(law.flows && !held, 1);
+    at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
+    at_.size = size;
+    parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},  {&space.r(), at_.u_r},
+              {&space.z(), at_.u_z}, {&swirl_, at_.swirl}, {&pressure_, at_.p}};
+    set_pattern();
+}
+
+void CurveMotion::set_pattern() {
+    const int n = space().splines().elements();
+    for (int part = 0; part < n_fields; ++part) local_size_ += parts_[part].offset < 0 ? 0 : width(part);
+    const auto local_dofs = [&](int e) {  // -1: absent
+        std::vector<int> dofs;
+        for (int part = 0; part < n_fields; ++part) {
+            const auto& [field, offset] = parts_[part];
+            for (int a = 0; offset >= 0 && a < width(part); ++a)
+                dofs.push_back(field->signs(e)[a] == 0 ? -1 : offset + field->dofs(e)[a]);
+        }
+        return dofs;
+    };
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int e = 0; e < n; ++e) {
+        const std::vector<int> dofs = local_dofs(e);
+        for (const int column : dofs)
+            for (const int row : dofs)
+                if (row >= 0 && column >= 0) entries.emplace_back(row, column, 0.0);
+    }
+    for (const int number : {at_.lambda, at_.area, at_.volume, at_.drift, at_.shift}) {
+        if (number < 0) continue;
+        for (int i = 0; i < at_.size; ++i) {
+            entries.emplace_back(number, i, 0.0);
+            entries.emplace_back(i, number, 0.0);
+        }
+    }
+    pattern_.resize(at_.size, at_.size);
+    pattern_.setFromTriplets(entries.begin(), entries.end());
+    const auto slot_of = [&](int row, int column) {
+        const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
+        const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
+        return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
+    };
+    for (int e = 0; e < n; ++e) {
+        const std::vector<int> dofs = local_dofs(e);
+        for (const int column : dofs)
+            for (const int row : dofs) slots_.push_back(row < 0 || column < 0 ? 0 : slot_of(row, column));
+    }
+    const Eigen::SparseMatrix<double>& of_forms = forms_.pattern();
+    for (int column = 0; column < of_forms.cols(); ++column)
+        for (Eigen::SparseMatrix<double>::InnerIterator it(of_forms, column); it; ++it) {
+            curve_slots_.push_back(slot_of(at_.r + it.row(), column));
+            momentum_slots_.push_back(law_.flows ? slot_of(at_.u_r + it.row(), column) : 0);
+        }
+    for (const int number : {at_.lambda, at_.area, at_.volume, at_.drift, at_.shift}) {
+        if (number < 0) continue;
+        std::vector<int>& row = number_rows_[number];
+        for (int i = 0; i < at_.size; ++i) row.push_back(slot_of(number, i));
+    }
+}
+
+Eigen::VectorXd CurveMotion::differential() const {
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(at_.size);
+    out.head(space().size()).setOnes();
+    if (law_.inertia != 0) out.segment(at_.u_r, (at_.p >= 0 ? at_.p : at_.size) - at_.u_r).setOnes();
+    return out;
+}
+
+bool CurveMotion::residual(const double* y, const double* rate, double* F) const {
+    std::fill_n(F, at_.size, 0.0);
+    const ProfileSpace& splines = space().splines();
+    const double images = space().images(), drift = at_.drift < 0 ? 0 : y[at_.drift],
+                 shift = at_.shift < 0 ? 0 : y[at_.shift];
+    Pack smallest{std::numeric_limits<double>::infinity()}, area{0.0}, volume{0.0}, sums[2] = {Pack(0.0), Pack(0.0)};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Pack weight = images * load(basis.weight);
+            const Local at(*this, e, g, y, rate);
+            const auto& f = at.fields;
+            smallest = stdx::min(smallest, f.v[r0]);
+            area += weight * (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
+            volume += weight * pi * f.v[r0] * f.v[r0] * f.v[z1];
+            const std::array<Pack, n_rows> rows = point_law(f, law_, drift, shift);
+            for (int row = 0; row < n_test_rows; ++row) {
+                const int part = row_field[row], offset = parts_[part].offset;
+                if (offset < 0) continue;
+                const Field& field = *parts_[part].field;
+                const auto& tests = field.splines().basis(e, g);
+                alignas(32) double c[lanes];
+                store(weight * rows[row], c);
+                for (int a = 0; a < width(part); ++a) {
+                    double sum = 0;
+                    for (int q = 0; q < lanes; ++q) sum += c[q] * tests.by_spline[q][row_derivative[row]][a];
+                    F[offset + field.dofs(e)[a]] += field.signs(e)[a] * sum;
+                }
+            }
+            sums[0] += weight * rows[drift_sum];
+            sums[1] += weight * rows[shift_sum];
+        }
+    if (at_.drift >= 0) F[at_.drift] = stdx::reduce(sums[0]);
+    if (at_.shift >= 0) F[at_.shift] = stdx::reduce(sums[1]);
+    if (!(stdx::hmin(smallest) > 0)) return false;
+
+    const double lambda = at_.lambda < 0 ? 0 : y[at_.lambda];
+    forms_.add_gradient({.energy = 1, .volume = lambda}, y, law_.flows ? F + at_.u_r : F);
+    forms_.add_gradient(
+        {.area = at_.area < 0 ? 0 : y[at_.area], .volume = at_.volume < 0 ? 0 : y[at_.volume], .gauge = gauge_}, y, F);
+    if (at_.area >= 0) F[at_.area] = stdx::reduce(area) - area0_;
+    if (at_.volume >= 0) F[at_.volume] = stdx::reduce(volume) - volume0_;
+    if (at_.lambda >= 0 && !law_.flows) F[at_.lambda] = stdx::reduce(volume) - volume0_;
+    if (at_.lambda >= 0 && law_.flows) {
+        const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
+        F[at_.lambda] = slope.dot(Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, slope.size()));
+    }
+    return true;
+}
+
+Eigen::VectorXd CurveMotion::gradient_at(const Weights& weights, const double* y) const {
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(space().size());
+    forms_.add_gradient(weights, y, out.data());
+    return out;
+}
+
+void CurveMotion::jacobian(const double* y, const double* rate, double cj, double* values) const {
+    using J = Jet<Pack, n_slots, 1>;
+    std::fill_n(values, pattern_.nonZeros(), 0.0);
+    const ProfileSpace& splines = space().splines();
+    const double images = space().images(), drift = at_.drift < 0 ? 0 : y[at_.drift],
+                 shift = at_.shift < 0 ? 0 : y[at_.shift];
+    Eigen::MatrixXd local(local_size_, local_size_);
+    std::array<int, n_fields> first{};  // of each part in the local matrix
+    for (int part = 0, next = 0; part < n_fields; ++part) {
+        first[part] = next;
+        next += parts_[part].offset < 0 ? 0 : width(part);
+    }
+    for (int e = 0; e < splines.elements(); ++e) {
+        local.setZero();
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Pack weight = images * load(splines.basis(e, g).weight);
+            const Local at(*this, e, g, y, rate);
+            const std::array<J, n_rows> rows = point_law(at.jets<J>(cj), law_, drift, shift);
+            for (int row = 0; row < n_test_rows; ++row) {
+                const int test = row_field[row];
+                if (parts_[test].offset < 0) continue;
+                const auto& tests = parts_[test].field->splines().basis(e, g);
+                for (int slot = 0; slot < n_slots; ++slot) {
+                    const int trial = slot_field[slot];
+                    if (parts_[trial].offset < 0) continue;
+                    const auto& trials = parts_[trial].field->splines().basis(e, g);
+                    alignas(32) double c[lanes];
+                    store(weight * rows[row].d[slot], c);
+                    if (c[0] == 0 && c[1] == 0 && c[2] == 0 && c[3] == 0) continue;
+                    for (int q = 0; q < lanes; ++q)
+                        for (int b = 0; b < width(trial); ++b) {
+                            const double factor = c[q] * trials.by_spline[q][slot_derivative[slot]][b];
+                            for (int a = 0; a < width(test); ++a)
+                                local(first[test] + a, first[trial] + b) +=
+                                    factor * tests.by_spline[q][row_derivative[row]][a];
+                        }
+                }
+            }
+            const auto& f = at.fields;
+            if (at_.drift >= 0) {
+                const Pack dS = (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
+                add_row(at_.drift, e, g, weight, rows[drift_sum].d.data(), values);
+                add_column(at_.drift, velocity_z, e, g, weight * dS, values);
+            }
+            if (at_.shift >= 0) {
+                add_row(at_.shift, e, g, weight, rows[shift_sum].d.data(), values);
+                add_column(at_.shift, curve_r, e, g, weight * (2 * pi) * f.v[r0] * f.v[r1], values);
+                add_column(at_.shift, curve_z, e, g, weight * (2 * pi) * f.v[r0] * f.v[z1], values);
+            }
+        }
+        scatter(e, local, values);
+    }
+    add_forms(y, values);
+}
+
+// d(sum of a row of numbers)/dy, from its derivatives in the slots.
+template <class Packs>
+void CurveMotion::add_row(int number, int e, int g, const Packs& weight, const Packs* in_slots, double* values) const {
+    const std::vector<int>& row = number_rows_.at(number);
+    for (int slot = 0; slot < n_slots; ++slot) {
+        const auto& [field, offset] = parts_[slot_field[slot]];
+        if (offset < 0) continue;
+        const auto& basis = field->splines().basis(e, g);
+        alignas(32) double c[lanes];
+        store(weight * in_slots[slot], c);
+        for (int q = 0; q < lanes; ++q)
+            for (int a = 0; a < width(slot_field[slot]); ++a)
+                values[row[offset + field->dofs(e)[a]]] +=
+                    field->signs(e)[a] * c[q] * basis.by_spline[q][slot_derivative[slot]][a];
+    }
+}
+
+// dF/d(number), against the test functions of one part.
+template <class Packs>
+void CurveMotion::add_column(int number, int part, int e, int g, const Packs& factor, double* values) const {
+    const auto& [field, offset] = parts_[part];
+    if (offset < 0) return;
+    const auto& basis = field->splines().basis(e, g);
+    double* column = values + pattern_.outerIndexPtr()[number];
+    alignas(32) double c[lanes];
+    store(factor, c);
+    for (int q = 0; q < lanes; ++q)
+        for (int a = 0; a < width(part); ++a)
+            column[offset + field->dofs(e)[a]] += field->signs(e)[a] * c[q] * basis.by_spline[q][0][a];
+}
+
+void CurveMotion::scatter(int e, const Eigen::MatrixXd& local, double* values) const {
+    Eigen::VectorXd signs(local_size_);
+    int next = 0;
+    for (int part = 0; part < n_fields; ++part)
+        for (int a = 0; parts_[part].offset >= 0 && a < width(part); ++a)
+            signs[next++] = parts_[part].field->signs(e)[a];
+    const int* slot = &slots_[static_cast<std::size_t>(e) * local_size_ * local_size_];
+    for (int b = 0; b < local_size_; ++b)
+        for (int a = 0; a < local_size_; ++a) values[slot[b * local_size_ + a]] += signs[a] * signs[b] * local(a, b);
+}
+
+// What the energy, the gauge and the numbers lambda, area, volume contribute.
+void CurveMotion::add_forms(const double* y, double* values) const {
+    const auto number = [&](int at) { return at < 0 ? 0.0 : y[at]; };
+    const Weights force{.energy = 1, .volume = number(at_.lambda)};
+    const Weights along{.area = number(at_.area), .volume = number(at_.volume), .gauge = gauge_};
+    std::vector<double> entries(forms_.pattern().nonZeros());
+    const auto add = [&](const Weights& weights, const std::vector<int>& slots) {
+        std::fill(entries.begin(), entries.end(), 0.0);
+        forms_.add_hessian(weights, y, entries.data());
+        for (std::size_t i = 0; i < entries.size(); ++i) values[slots[i]] += entries[i];
+    };
+    add(force, law_.flows ? momentum_slots_ : curve_slots_);
+    add(along, curve_slots_);
+
+    const int n = space().size();
+    const auto add_border = [&](int at, int rows, int columns, const Eigen::VectorXd& slope) {
+        for (int i = 0; i < n; ++i) {
+            values[number_rows_.at(at)[columns + i]] += slope[i];
+            values[pattern_.outerIndexPtr()[at] + rows + i] += slope[i];
+        }
+    };
+    if (at_.area >= 0) add_border(at_.area, 0, 0, gradient_at({.area = 1}, y));
+    if (at_.lambda < 0) return;
+    const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
+    if (!law_.flows) return add_border(at_.lambda, 0, 0, slope);
+    if (at_.volume >= 0) add_border(at_.volume, 0, 0, slope);
+    add_border(at_.lambda, at_.u_r, at_.u_r, slope);
+    Eigen::SparseMatrix<double> second = forms_.pattern();
+    forms_.add_hessian({.volume = 1}, y, second.valuePtr());
+    const Eigen::VectorXd by_curve = second * Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, n);
+    for (int i = 0; i < n; ++i) values[number_rows_.at(at_.lambda)[i]] += by_curve[i];
+}
+
+CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) const {
+    const ProfileSpace& splines = space().splines();
+    const double images = space().images();
+    Balance out;
+    Pack kinetic{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0}, acceleration{0.0};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(*this, e, g, y, rate);
+            const auto& f = at.fields;
+            const Pack &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
+            const Pack g2 = r_s * r_s + z_s * z_s, ig = 1.0 / sqrt(g2);
+            const Pack dS = images * load(splines.basis(e, g).weight) * (2 * pi) * r * g2 * ig;
+            if (!law_.flows) {
+                const Pack normal = (f.r_t * z_s - f.z_t * r_s) * ig;
+                dissipation += dS * normal * normal;
+                speed = stdx::max(speed, normal * normal);
+                continue;
+            }
+            const Pack &u = f.v[ur0], &v = f.v[uz0], &w = f.v[w0];
+            const Pack square = u * u + v * v + w * w;
+            const Pack ss = (r_s * f.v[ur1] + z_s * f.v[uz1]) * ig * ig, tt = u / r;
+            const Pack shear = 0.5 * (f.v[w1] - w * r_s / r) * ig;
+            kinetic += (0.5 * law_.inertia) * dS * square;
+            dissipation += dS * (law_.friction * square + 2 * law_.viscosity * (ss * ss + tt * tt + 2 * shear * shear));
+            acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
+            momentum += dS * v;
+            angular += dS * r * w;
+            divergence += dS * (ss + tt) * (ss + tt);
+            speed = stdx::max(speed, square);
+        }
+    out.kinetic = stdx::reduce(kinetic), out.dissipation = stdx::reduce(dissipation);
+    out.momentum_z = space().images() == 2 ? 0 : stdx::reduce(momentum);  // the other half has the opposite
+    out.angular_z = stdx::reduce(angular);
+    out.acceleration = stdx::reduce(acceleration);
+    out.divergence = std::sqrt(stdx::reduce(divergence)), out.speed = std::sqrt(stdx::hmax(speed));
+    return out;
+}
+
+namespace {
+
+// Rows and columns of a matrix divided by the roots of their largest entries, again and again: pressures and velocities
+// over a very short step differ by many orders of magnitude.
+struct Equilibrated {
+    Eigen::VectorXd rows, columns;
+
+    explicit Equilibrated(Eigen::SparseMatrix<double>& A)
+        : rows(Eigen::VectorXd::Ones(A.rows())), columns(Eigen::VectorXd::Ones(A.cols())) {
+        for (int pass = 0; pass < 8; ++pass) {
+            Eigen::VectorXd r = Eigen::VectorXd::Zero(A.rows()), c = Eigen::VectorXd::Zero(A.cols());
+            const auto each = [&](auto&& visit) {
+                for (int j = 0; j < A.cols(); ++j)
+                    for (Eigen::SparseMatrix<double>::InnerIterator it(A, j); it; ++it) visit(it);
+            };
+            each([&](auto& it) {
+                r[it.row()] = std::max(r[it.row()], std::abs(it.value()));
+                c[it.col()] = std::max(c[it.col()], std::abs(it.value()));
+            });
+            const auto factor = [](double largest) { return largest > 0 ? 1 / std::sqrt(largest) : 1; };
+            r = r.unaryExpr(factor), c = c.unaryExpr(factor);
+            each([&](auto& it) { it.valueRef() *= r[it.row()] * c[it.col()]; });
+            rows.array() *= r.array(), columns.array() *= c.array();
+        }
+    }
+};
+
+}  // namespace
+
+CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
+    constexpr int most_iterations = 25;
+    Start s{y0, Eigen::VectorXd::Zero(at_.size)};
+    Eigen::VectorXd before = y0, F(at_.size);
+    Eigen::SparseMatrix<double> J = pattern_;
+    SparseLu lu;
+    for (int step = 0; step < 2; ++step, before = s.y) {
+        s.rate.setZero();
+        double last = std::numeric_limits<double>::infinity();
+        for (int iteration = 0;; ++iteration) {
+            if (!residual(s.y.data(), s.rate.data(), F.data()))
+                throw SolveError("the start of the motion leaves the half plane r > 0");
+            jacobian(s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
+            const Equilibrated scale(J);
+            lu.factor(J);
+            const Eigen::VectorXd change =
+                scale.columns.cwiseProduct(lu.solve(Eigen::VectorXd(scale.rows.cwiseProduct(F))));
+            s.y -= change;
+            s.rate = (s.y - before) / h;
+            const double size = change.head(space().size()).norm();
+            if (size >= 0.5 * last || size == 0) break;  // as good as rounding allows
+            if (iteration == most_iterations) throw SolveError("no consistent start of the motion was found");
+            last = size;
+        }
+    }
+    s.rate.array() *= differential().array();  // the others jumped from a guess
+    return s;
+}
+
+}  // namespace tubule::axisym

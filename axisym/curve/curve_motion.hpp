@@ -1,0 +1,116 @@
+// Laws of motion of a profile curve as one differential-algebraic system F(y, y') = 0 (maths 3, 4).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <map>
+#include <vector>
+
+#include "axisym/curve/curve_forms.hpp"
+
+namespace tubule::axisym {
+
+// What moves the curve. The models of a case are special ones: see law_of.
+struct MotionLaw {
+    bool flows = true;     // a velocity u with div u = 0 along the membrane; else X_t.nu = b, the gradient flow
+    double inertia = 0;    // 1: fluid
+    double viscosity = 0;  // 1/Re
+    double friction = 0;   // gamma
+    bool keeps_volume = true;
+    // Of a flow: whether A(X) and V(X) are held against drift by errors in time. Where H varies little, both are the
+    // same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda nu and a
+    // constant pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
+    bool holds_area = true, holds_volume = true;
+    bool lagrangian = false;  // the parameter goes with the flow, X_t = u, instead of staying even
+    bool swirls = false;      // u has a component around the axis
+};
+
+// The unknowns y and where they stand: the curve X = (r, z) as CurveSpace has it; the velocity u = (u_r, u_z) likewise;
+// the swirl u_theta; the pressure p; numbers. Those that the law has not are -1.
+struct MotionLayout {
+    int r = 0, z = 0, u_r = -1, u_z = -1, swirl = -1, p = -1;
+    int lambda = -1;             // force -lambda nu, by which the volume is kept: INT u.nu = 0
+    int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero but for errors in time
+    int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
+    int shift = -1;              // of INT (X_t - u).t = 0, for a period's parameter has no fixed point
+    int size = 0;
+};
+
+// In weak form, for all test displacements phi, velocities v, and pressures q (dS = 2 pi r g ds):
+//   ((X_t - u).nu, phi.nu) + c dD[phi] = 0            the curve goes with u, its parameter stays even (gauge D)
+//   (u_t + c u_s/g + ..., v) + 2/Re (sigma(u), sigma(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
+//   (q, div u) = 0,  dV[u] = 0
+// with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
+// has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + lambda dV[phi] + c dD[phi] = 0.
+class CurveMotion {
+public:
+    // `gauge` is the weight c of D; area and volume those to be kept. The space must outlive the motion.
+    CurveMotion(const CurveSpace& space, const Bending& bending, const MotionLaw& law, double gauge, double area,
+                double volume);
+    CurveMotion(const CurveMotion&) = delete;
+    CurveMotion& operator=(const CurveMotion&) = delete;
+
+    const CurveSpace& space() const { return forms_.space(); }
+    const CurveForms& forms() const { return forms_; }
+    const MotionLaw& law() const { return law_; }
+    const MotionLayout& layout() const { return at_; }
+    const Field& pressures() const { return pressure_; }
+
+    // F(y, rate). False where r <= 0 at a quadrature point: try a smaller step.
+    bool residual(const double* y, const double* rate, double* F) const;
+    // dF/dy + cj dF/drate, into the values of a matrix with pattern().
+    void jacobian(const double* y, const double* rate, double cj, double* values) const;
+    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    // 1 for unknowns whose rate matters, 0 for the others.
+    Eigen::VectorXd differential() const;
+
+    // Kinetic energy and its like: integrals over the whole cell or period.
+    struct Balance {
+        double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
+        double momentum_z = 0, angular_z = 0;
+        double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
+        double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
+        double divergence = 0;    // sqrt(INT (div u)^2 dS), of which only the part in the pressures is zero
+    };
+    Balance balance(const double* y, const double* rate) const;
+
+    // Consistent unknowns and rates from the curve and velocities of y0, whose other entries are a guess: two implicit
+    // Euler steps of length h. Throws SolveError if Newton's method fails.
+    struct Start {
+        Eigen::VectorXd y, rate;
+    };
+    Start consistent(const Eigen::VectorXd& y0, double h) const;
+
+private:
+    struct Local;
+    void set_pattern();
+    void add_forms(const double* y, double* values) const;
+    void scatter(int element, const Eigen::MatrixXd& local, double* values) const;
+    template <class Packs>
+    void add_row(int number, int e, int g, const Packs& weight, const Packs* in_slots, double* values) const;
+    template <class Packs>
+    void add_column(int number, int part, int e, int g, const Packs& factor, double* values) const;
+    Eigen::VectorXd gradient_at(const Weights& weights, const double* y) const;
+
+    // A field of unknowns: where it stands, and which of the pointwise slots it feeds.
+    struct Part {
+        const Field* field;
+        int offset;
+    };
+    int width(int part) const { return parts_[part].field->splines().width(); }
+
+    CurveForms forms_;
+    MotionLaw law_;
+    double gauge_, area0_, volume0_;
+    ProfileSpace pressure_splines_;
+    Field swirl_, pressure_;
+    MotionLayout at_;
+    std::vector<Part> parts_;  // in the order of the pointwise fields; absent ones have offset -1
+    Eigen::SparseMatrix<double> pattern_;
+    std::vector<int> slots_;  // of the local matrix of each element, column by column
+    int local_size_ = 0;
+    std::map<int, std::vector<int>> number_rows_;    // of each number, its row
+    std::vector<int> momentum_slots_, curve_slots_;  // of each entry of forms_.pattern() in the rows of u, of X
+};
+
+}  // namespace tubule::axisym

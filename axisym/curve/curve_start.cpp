@@ -1,0 +1,381 @@
+#include "axisym/curve/curve_start.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+using J = Jet<double, 1, 1>;
+
+// The image of the meridian of the unit sphere from the south pole, for shapes that map the sphere.
+template <class Shape>
+Meridian sphere_image(const Shape& shape) {
+    Meridian m;
+    m.at = [shape](double t) {
+        const J angle = pi * J::variable(t, 0);
+        const Vector3<J> X = position(shape, Vector3<J>(sin(angle), J(0.0), -cos(angle)));
+        return std::array{X[0].v, X[0].d[0], X[2].v, X[2].d[0]};
+    };
+    return m;
+}
+
+}  // namespace
+
+Meridian meridian(const Sphere& sphere) {
+    for (const SphereMode& mode : sphere.modes)
+        if (mode.m != 0)
+            throw std::invalid_argument(fmt::format("a sphere with a mode m = {} is not axisymmetric", mode.m));
+    return sphere_image(sphere);
+}
+
+Meridian meridian(const Ellipsoid& e) {
+    if (e.a != e.b)
+        throw std::invalid_argument(
+            fmt::format("an ellipsoid with a = {} and b = {} is not axisymmetric: they must be equal", e.a, e.b));
+    return sphere_image(e);
+}
+
+Meridian meridian(const Dumbbell& dumbbell) {
+    return sphere_image(dumbbell);
+}
+
+Meridian meridian(const Capsule& c) {
+    const double total = pi * c.radius + c.length, cap = pi / 2 * c.radius / total;
+    Meridian m;
+    m.seams = {cap, 1 - cap};
+    m.at = [c, total, cap](double t) {
+        if (t > cap && t < 1 - cap) return std::array{c.radius, 0.0, (t - 0.5) * total, total};
+        const double angle = (t <= cap ? t : t - 1) * total / c.radius;  // from the pole of this side
+        const double side = t <= cap ? 1 : -1;
+        return std::array{c.radius * std::sin(side * angle), side * total * std::cos(angle),
+                          -side * (c.length / 2 + c.radius * std::cos(angle)), side * total * std::sin(angle)};
+    };
+    return m;
+}
+
+Meridian meridian(const Torus& torus) {
+    Meridian m;
+    m.topology = Topology::tube;
+    m.at = [torus](double t) {
+        const double a = torus.tube_radius, c = std::cos(2 * pi * t), s = std::sin(2 * pi * t);
+        return std::array{torus.radius + a * c, -2 * pi * a * s, a * s, 2 * pi * a * c};
+    };
+    return m;
+}
+
+namespace {
+
+template <class Graph>
+Meridian graph_meridian(const Graph& graph) {
+    Meridian m;
+    m.topology = Topology::tube;
+    m.length = graph.length;
+    m.at = [graph](double t) {
+        const J r = radius_at(graph, J(graph.length) * J::variable(t, 0));
+        return std::array{r.v, r.d[0], graph.length * t, graph.length};
+    };
+    return m;
+}
+
+}  // namespace
+
+Meridian meridian(const Tube& tube) {
+    for (const TubeMode& mode : tube.modes)
+        if (mode.m != 0)
+            throw std::invalid_argument(fmt::format("a tube with a mode m = {} is not axisymmetric", mode.m));
+    return graph_meridian(tube);
+}
+
+Meridian meridian(const Revolution& surface) {
+    return graph_meridian(surface);
+}
+
+Meridian spheroid(double reduced_volume, bool prolate) {
+    if (!(reduced_volume > 0 && reduced_volume < 1))
+        throw std::invalid_argument(fmt::format("no spheroid has a reduced volume of {}", reduced_volume));
+    // Area of the spheroid with a = 1, c = q.
+    const auto area = [&](double q) {
+        const double e = std::sqrt(prolate ? 1 - 1 / (q * q) : 1 - q * q);
+        return 2 * pi * (prolate ? 1 + q / e * std::asin(e) : 1 + (1 - e * e) / e * std::atanh(e));
+    };
+    double low = 0, high = 1;  // of 1/q or q
+    for (int k = 0; k < 60; ++k) {
+        const double middle = (low + high) / 2, q = prolate ? 1 / middle : middle;
+        (8 * std::pow(pi, 1.5) * q / std::pow(area(q), 1.5) < reduced_volume ? low : high) = middle;
+    }
+    const double q = prolate ? 1 / low : low, a = std::sqrt(4 * pi / area(q));
+    return meridian(Ellipsoid{a, a, a * q});
+}
+
+Meridian bowl(double thickness, double opening) {
+    if (!(thickness > 0 && thickness < 1 && opening > 0 && opening < pi))
+        throw std::invalid_argument("a bowl needs a thickness between 0 and 1 and an opening between 0 and pi");
+    const double inner = 1 - thickness, rim = thickness / 2, middle = 1 - rim;
+    const double total = opening + pi * rim + inner * opening;
+    const double first = opening / total, second = (opening + pi * rim) / total;
+    Meridian m;
+    m.seams = {first, second};
+    m.at = [=](double t) {
+        const double s = t * total;
+        if (t <= first) return std::array{std::sin(s), total * std::cos(s), -std::cos(s), total * std::sin(s)};
+        if (t >= second) {
+            const double angle = (total - s) / inner;
+            return std::array{inner * std::sin(angle), -total * std::cos(angle), -inner * std::cos(angle),
+                              -total * std::sin(angle)};
+        }
+        // Around the middle of the rim, from the outward direction over the top to the inward one.
+        const double angle = opening + (s - opening) / rim;
+        return std::array{middle * std::sin(opening) + rim * std::sin(angle), total * std::cos(angle),
+                          -middle * std::cos(opening) - rim * std::cos(angle), total * std::sin(angle)};
+    };
+    return m;
+}
+
+namespace {
+
+Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::VectorXd& x) {
+    Meridian m;
+    m.topology = space->topology();
+    m.length = space->length();
+    if (space->splines().smoothness() < 3)
+        m.seams.assign(space->splines().breaks().begin() + 1, space->splines().breaks().end() - 1);
+    m.at = [space, x](double t) {
+        const CurvePoint p = space->evaluate(x, t);
+        return std::array{p.r, p.r1, p.z, p.z1};
+    };
+    return m;
+}
+
+// Coefficients of the spline with these values at the breaks; odd degree and simple knots make that a regular system.
+Eigen::VectorXd interpolate(const Field& field, Parity parity, const std::vector<double>& values) {
+    const ProfileSpace& splines = field.splines();
+    const int n = splines.elements(), w = splines.width();
+    const bool mirror = splines.cell().mirror;
+    const int first = mirror && parity.start < 0 ? 1 : 0, last = !mirror || parity.end < 0 ? n - 1 : n;
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd load(field.size());
+    double basis[ProfileSpace::max_width];
+    for (int i = first; i <= last; ++i) {
+        const int e = std::min(i, n - 1);
+        splines.splines(e, splines.breaks()[i], 0, basis);
+        for (int a = 0; a < w; ++a)
+            if (field.signs(e)[a] != 0 && basis[a] != 0)
+                entries.emplace_back(i - first, field.dofs(e)[a], field.signs(e)[a] * basis[a]);
+        load[i - first] = values[i];
+    }
+    Eigen::SparseMatrix<double> matrix(field.size(), field.size());
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    SparseLu lu;
+    lu.factor(matrix);
+    return lu.solve(load);
+}
+
+}  // namespace
+
+Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x) {
+    const ProfileSpace& s = space.splines();
+    return spline_meridian(
+        std::make_shared<CurveSpace>(space.topology(), s.breaks(), s.degree(), s.smoothness(), space.length()), x);
+}
+
+Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology topology, double length) {
+    const int n = static_cast<int>(points.size()) - 1;
+    if (n < 6) throw std::invalid_argument(fmt::format("a curve needs at least 7 points, not {}", n + 1));
+    std::vector<double> chord{0};
+    for (int i = 1; i <= n; ++i) {
+        const double step = std::hypot(points[i][0] - points[i - 1][0], points[i][1] - points[i - 1][1]);
+        if (!(step > 0))
+            throw std::invalid_argument(
+                fmt::format("points {} and {} of the curve coincide or are not finite", i - 1, i));
+        chord.push_back(chord.back() + step);
+    }
+    const double total = chord.back(), tolerance = 1e-9 * total;
+    for (double& c : chord) c /= total;
+    const auto require = [&](bool met, const char* what) {
+        if (!met) throw std::invalid_argument(what);
+    };
+    const bool closed = topology == Topology::cell || topology == Topology::half_cell;
+    for (int i = closed ? 1 : 0; i < (topology == Topology::cell ? n : n + 1); ++i)
+        if (!(points[i][0] > 0))
+            throw std::invalid_argument(fmt::format("point {} of the curve has the radius {}", i, points[i][0]));
+    if (closed) require(std::abs(points[0][0]) < tolerance, "the first point of a closed curve must have r = 0");
+    if (topology == Topology::cell)
+        require(std::abs(points[n][0]) < tolerance, "the last point of a closed curve must have r = 0");
+    if (topology == Topology::half_cell)
+        require(std::abs(points[n][1]) < tolerance, "the last point of a half cell must have z = 0");
+    if (topology == Topology::tube)
+        require(std::abs(points[n][0] - points[0][0]) < tolerance &&
+                    std::abs(points[n][1] - points[0][1] - length) < tolerance,
+                "the last point of a period must be the first one, a length further");
+    if (topology == Topology::half_tube)
+        require(std::abs(points[0][1]) < tolerance && std::abs(points[n][1] - length / 2) < tolerance,
+                "half a period must run from z = 0 to half the length");
+    const auto space = std::make_shared<CurveSpace>(topology, chord, 5, 4, length);
+    std::vector<double> r(n + 1), z(n + 1);
+    for (int i = 0; i <= n; ++i) r[i] = points[i][0], z[i] = points[i][1] - space->rise() * chord[i];
+    Eigen::VectorXd x(space->size());
+    x << interpolate(space->r(), space->r_parity(), r), interpolate(space->z(), space->z_parity(), z);
+    return spline_meridian(space, x);
+}
+
+std::array<double, 2> area_and_volume(const Meridian& m) {
+    constexpr int panels = 64;
+    const GaussRule rule = gauss_rule(16);
+    std::vector<double> edges{0};
+    edges.insert(edges.end(), m.seams.begin(), m.seams.end());
+    edges.push_back(1);
+    double area = 0, volume = 0;
+    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+        const double h = (edges[k + 1] - edges[k]) / panels;
+        for (int i = 0; i < panels; ++i)
+            for (std::size_t q = 0; q < rule.nodes.size(); ++q) {
+                const auto [r, r1, z, z1] = m.at(edges[k] + h * (i + rule.nodes[q]));
+                area += h * rule.weights[q] * 2 * pi * r * std::hypot(r1, z1);
+                volume += h * rule.weights[q] * pi * r * r * z1;
+            }
+    }
+    const int images = m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1;
+    return {images * area, images * volume};
+}
+
+Meridian half(const Meridian& whole) {
+    const bool cell = whole.topology == Topology::cell;
+    if (!cell && whole.topology != Topology::tube) throw std::invalid_argument("this curve is a half already");
+    const double shift = whole.at(cell ? 0.5 : 0)[2];
+    Meridian out = whole;
+    out.topology = cell ? Topology::half_cell : Topology::half_tube;
+    out.seams.clear();
+    for (double t : whole.seams)
+        if (t < 0.5) out.seams.push_back(2 * t);
+    out.at = [at = whole.at, shift](double t) {
+        const auto [r, r1, z, z1] = at(t / 2);
+        return std::array{r, r1 / 2, z - shift, z1 / 2};
+    };
+    for (int i = 1; i < 16; ++i) {
+        const auto a = whole.at(i / 32.0), b = whole.at(1 - i / 32.0);
+        const double plane = cell ? shift : shift + whole.length / 2;
+        const double size = std::abs(a[0]) + std::abs(a[2] - plane);
+        if (std::abs(a[0] - b[0]) + std::abs(a[2] + b[2] - 2 * plane) > 1e-6 * size)
+            throw std::invalid_argument("the curve does not mirror itself about the middle of its parameter");
+    }
+    return out;
+}
+
+namespace {
+
+const GaussRule& panel_rule() {
+    static const GaussRule rule = gauss_rule(8);
+    return rule;
+}
+
+}  // namespace
+
+ArcLength::ArcLength(Meridian meridian) : meridian_(std::move(meridian)) {
+    constexpr int panels = 200;  // 8 points on each: lengths to rounding for anything resolved by 100 elements
+    std::vector<double> edges{0};
+    edges.insert(edges.end(), meridian_.seams.begin(), meridian_.seams.end());
+    edges.push_back(1);
+    t_ = sum_ = {0};
+    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+        const double width = edges[k + 1] - edges[k];
+        const int n = std::max(1, static_cast<int>(std::ceil(panels * width)));
+        for (int i = 1; i <= n; ++i) {
+            t_.push_back(i < n ? edges[k] + width * i / n : edges[k + 1]);
+            sum_.push_back(sum_.back() + integral(t_[t_.size() - 2], t_.back()));
+        }
+    }
+}
+
+double ArcLength::speed(double t) const {
+    const auto p = meridian_.at(t);
+    return std::hypot(p[1], p[3]);
+}
+
+double ArcLength::integral(double from, double to) const {
+    const GaussRule& rule = panel_rule();
+    double sum = 0;
+    for (std::size_t i = 0; i < rule.nodes.size(); ++i)
+        sum += rule.weights[i] * speed(from + (to - from) * rule.nodes[i]);
+    return (to - from) * sum;
+}
+
+double ArcLength::fraction(double t) const {
+    const auto above = std::upper_bound(t_.begin() + 1, t_.end() - 1, t);
+    const std::size_t i = above - t_.begin() - 1;
+    return (sum_[i] + integral(t_[i], t)) / total();
+}
+
+double ArcLength::parameter(double fraction) const {
+    const double wanted = fraction * total();
+    const auto above = std::upper_bound(sum_.begin() + 1, sum_.end() - 1, wanted);
+    const std::size_t i = above - sum_.begin() - 1;
+    double t = t_[i] + (t_[i + 1] - t_[i]) * (wanted - sum_[i]) / (sum_[i + 1] - sum_[i]);
+    for (int k = 0; k < 20; ++k) {
+        const double step = (wanted - sum_[i] - integral(t_[i], t)) / speed(t);
+        t = std::clamp(t + step, t_[i], t_[i + 1]);
+        if (std::abs(step) < 1e-15) break;
+    }
+    return t;
+}
+
+std::array<double, 2> ArcLength::point(double fraction) const {
+    const auto p = meridian_.at(parameter(fraction));
+    return {p[0], p[2]};
+}
+
+std::vector<double> ArcLength::seams() const {
+    std::vector<double> out;
+    for (double t : meridian_.seams) out.push_back(fraction(t));
+    return out;
+}
+
+Eigen::VectorXd fit(const CurveSpace& space, const ArcLength& curve) {
+    if (curve.meridian().topology != space.topology() || curve.meridian().length != space.length())
+        throw std::invalid_argument("the curve does not have the topology or the period of its space");
+    return space.project([&](double s) { return curve.point(s); });
+}
+
+Eigen::VectorXd fit(const CurveSpace& space, const Meridian& meridian) {
+    return fit(space, ArcLength(meridian));
+}
+
+std::vector<double> graded_breaks(const std::vector<double>& seams, double largest, double smallest, double growth) {
+    std::vector<double> edges{0}, breaks{0};
+    edges.insert(edges.end(), seams.begin(), seams.end());
+    edges.push_back(1);
+    const auto distance = [&](double s) {
+        double d = 1;
+        for (double seam : seams) d = std::min(d, std::abs(s - seam));
+        return d;
+    };
+    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+        // Elements needed up to a point, by steps of a tenth of an element, and equal shares of that.
+        std::vector<double> at{edges[k]}, count{0};
+        const double middle = (edges[k] + edges[k + 1]) / 2;
+        while (at.back() < edges[k + 1]) {
+            const auto size = [&](double s) { return std::min(largest, smallest + growth * distance(s)); };
+            const double here = size(at.back()) / 10;
+            // Towards a seam the size shrinks: step by that of the far end.
+            const double step = at.back() < middle ? here : std::min(here, size(at.back() + here) / 10);
+            const double next = std::min(at.back() + step, edges[k + 1]);
+            count.push_back(count.back() + (next - at.back()) / size((next + at.back()) / 2));
+            at.push_back(next);
+        }
+        const int n = std::max(1, static_cast<int>(std::ceil(count.back() - 0.01)));
+        for (int i = 1, j = 0; i < n; ++i) {
+            const double wanted = count.back() * i / n;
+            while (count[j + 1] < wanted) ++j;
+            breaks.push_back(at[j] + (at[j + 1] - at[j]) * (wanted - count[j]) / (count[j + 1] - count[j]));
+        }
+        breaks.push_back(edges[k + 1]);
+    }
+    return breaks;
+}
+
+}  // namespace tubule::axisym

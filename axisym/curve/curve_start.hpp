@@ -1,0 +1,81 @@
+// From shapes, points and graphs to spline curves in proportion to arc length.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "axisym/splines/curve_space.hpp"
+#include "common/shapes/capsule.hpp"
+#include "common/shapes/dumbbell.hpp"
+#include "common/shapes/ellipsoid.hpp"
+#include "common/shapes/revolution.hpp"
+#include "common/shapes/sphere.hpp"
+#include "common/shapes/torus.hpp"
+#include "common/shapes/tube.hpp"
+
+namespace tubule::axisym {
+
+// A profile curve by any regular parameter t in [0, 1], in the direction that CurveSpace asks for.
+struct Meridian {
+    Topology topology = Topology::cell;
+    double length = 0;                                  // period of a tube
+    std::function<std::array<double, 4>(double t)> at;  // r, dr/dt, z, dz/dt
+    std::vector<double> seams;                          // where in (0, 1) it is less than smooth, ascending
+};
+
+// Closed cells from pole to pole; throw std::invalid_argument for what is not axisymmetric.
+Meridian meridian(const Sphere& sphere);
+Meridian meridian(const Ellipsoid& ellipsoid);
+Meridian meridian(const Dumbbell& dumbbell);
+Meridian meridian(const Capsule& capsule);
+// One period.
+Meridian meridian(const Torus& torus);
+Meridian meridian(const Tube& tube);
+Meridian meridian(const Revolution& surface);
+// Starts for the families of vesicles: a spheroid of this reduced volume (0 < v < 1) and the area 4 pi, prolate or
+// oblate; and a bowl, the shell between spheres of the radii 1 and 1 - thickness, open above the polar angle `opening`
+// from its bottom, with a round rim.
+Meridian spheroid(double reduced_volume, bool prolate);
+Meridian bowl(double thickness, double opening);
+// An existing curve, which is copied.
+Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x);
+// Through points (r, z) from end to end, by a quintic spline of the chord length. Closed cells begin and end with
+// r = 0, half ones end with z = 0; of a period both ends are given. Throws std::invalid_argument.
+Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology topology, double length = 0);
+// Area and enclosed volume of the whole surface, exact but for quadrature.
+std::array<double, 2> area_and_volume(const Meridian& meridian);
+// The first half of a meridian that mirrors itself: from the pole to the equator, or half a period from its z = 0.
+// Throws std::invalid_argument if the halves differ by more than 1e-6 of the size.
+Meridian half(const Meridian& whole);
+
+// The arc length of a meridian, tabulated.
+class ArcLength {
+public:
+    explicit ArcLength(Meridian meridian);
+    double total() const { return sum_.back(); }
+    double parameter(double fraction) const;  // t at which this fraction of the length is reached
+    double fraction(double t) const;
+    const Meridian& meridian() const { return meridian_; }
+    std::array<double, 2> point(double fraction) const;  // r, z
+    std::vector<double> seams() const;                   // as fractions
+
+private:
+    double speed(double t) const;
+    double integral(double from, double to) const;
+
+    Meridian meridian_;
+    std::vector<double> t_, sum_;
+};
+
+// The spline nearest to the meridian, parametrised in proportion to arc length.
+Eigen::VectorXd fit(const CurveSpace& space, const ArcLength& curve);
+Eigen::VectorXd fit(const CurveSpace& space, const Meridian& meridian);
+
+// Breaks that include the seams (fractions, ascending), with elements of size `smallest` at a seam that grow by
+// `growth` per distance up to `largest`.
+std::vector<double> graded_breaks(const std::vector<double>& seams, double largest, double smallest,
+                                  double growth = 0.4);
+
+}  // namespace tubule::axisym

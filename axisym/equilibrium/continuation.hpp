@@ -1,0 +1,45 @@
+// Branches of stationary shapes in one parameter of the problem, by pseudo-arclength continuation: around folds, with
+// folds and bifurcations detected and located.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "axisym/equilibrium/equilibrium.hpp"
+
+namespace tubule::axisym {
+
+// Gives the parameter a value: a modulus, H0, an area, a volume, or several of them at once.
+using SetParameter = std::function<void(StationaryProblem&, double)>;
+
+struct BranchSettings {
+    double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
+    std::vector<double> output;  // parameters at which shapes are wanted, each time the branch comes by
+    int max_steps = 500;
+    EquilibriumSettings shapes;  // accuracy of each
+};
+
+enum class PointKind { regular, fold, bifurcation };
+
+struct BranchPoint {
+    PointKind kind = PointKind::regular;
+    double parameter = 0;
+    int index = 0;      // axisymmetric negative directions; at a special point, before it
+    Equilibrium shape;  // at special points to about 1e-6 of the parameter's range
+};
+
+struct Branch {
+    std::vector<BranchPoint> points;  // in the order of the branch
+    int steps = 0;
+    Stop stop = Stop::finished;  // or why it ends inside the interval
+    std::string message;
+};
+
+// `problem` and `start` belong to the parameter `from`. A change of the number of negative directions that goes with a
+// turn of the parameter is a fold, one without is a bifurcation. Throws std::invalid_argument unless the start is an
+// equilibrium and from != to.
+Branch follow_branch(const StationaryProblem& problem, const Equilibrium& start, const SetParameter& set,
+                     const BranchSettings& settings);
+
+}  // namespace tubule::axisym

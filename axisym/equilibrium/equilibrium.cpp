@@ -1,0 +1,495 @@
+#include "axisym/equilibrium/equilibrium.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "axisym/curve/curve_measures.hpp"
+#include "axisym/graph/graph_start.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
+
+}  // namespace
+
+double reduced_volume(double area, double volume) {
+    return sphere_factor * volume / std::pow(area, 1.5);
+}
+
+StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem,
+                                   double gauge)
+    : space_(std::move(space)), forms_(*space_, problem.bending), gauge_(gauge) {
+    set_problem(problem);
+    place_ = Eigen::VectorXd::Zero(space_->size());
+    if (space_->topology() == Topology::cell) place_.tail(space_->z().size()) = space_->z().mean();
+}
+
+void StationarySystem::set_problem(const StationaryProblem& problem) {
+    const Constraints& c = problem.constraints;
+    if (c.reduced_volume && (c.area || c.volume))
+        throw std::invalid_argument("the reduced volume is held fixed alone: area and volume determine it already");
+    const auto positive = [](const std::optional<double>& value, const char* what) {
+        if (value && !(*value > 0)) throw std::invalid_argument(fmt::format("{} of {} cannot be met", what, *value));
+    };
+    positive(c.area, "an area"), positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
+    if (space_->closed()) {
+        std::optional<double> v = c.reduced_volume;
+        if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
+        if (v && *v > 1)
+            throw std::invalid_argument(fmt::format("a reduced volume of {:.6g} cannot be met: a sphere has 1", *v));
+    }
+    problem_ = problem;
+    forms_.set_bending(problem.bending);
+}
+
+Weights StationarySystem::lagrangian(const Eigen::VectorXd& u) const {
+    return {.energy = 1, .area = u[sigma()], .volume = u[P()], .gauge = gauge_};
+}
+
+Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
+    const int n = space_->size();
+    const Constraints& c = problem_.constraints;
+    const Eigen::VectorXd x = u.head(n);
+    const CurveObservation o = forms_.observe(x);
+    Eigen::VectorXd F = Eigen::VectorXd::Zero(n + 3);
+    F.head(n) = u[n + 2] * place_;
+    forms_.add_gradient(lagrangian(u), x.data(), F.data());
+    if (c.reduced_volume) {
+        F[n] = 2 * u[n] * o.area + 3 * u[n + 1] * o.volume;  // no change with size
+        F[n + 1] = o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5);
+    } else {
+        F[n] = c.area ? o.area - *c.area : u[n];
+        F[n + 1] = c.volume ? o.volume - *c.volume : u[n + 1];
+    }
+    F[n + 2] = space_->topology() == Topology::cell ? place_.dot(x) : u[n + 2];
+    return F;
+}
+
+Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u, double damping) const {
+    const int n = space_->size();
+    const Constraints& c = problem_.constraints;
+    const Eigen::VectorXd x = u.head(n);
+    Eigen::SparseMatrix<double> hessian = forms_.hessian(lagrangian(u), x);
+    if (damping != 0) hessian += damping * forms_.mass(x);
+    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x);
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3, n), corner = Eigen::MatrixXd::Zero(3, 3);
+    if (c.reduced_volume) {
+        const CurveObservation o = forms_.observe(x);
+        rows.row(0) = 2 * u[n] * area + 3 * u[n + 1] * volume;
+        rows.row(1) = volume - *c.reduced_volume / sphere_factor * 1.5 * std::sqrt(o.area) * area;
+        corner(0, 0) = 2 * o.area, corner(0, 1) = 3 * o.volume;
+    } else {
+        if (c.area) rows.row(0) = area;
+        if (c.volume) rows.row(1) = volume;
+        corner(0, 0) = c.area ? 0 : 1, corner(1, 1) = c.volume ? 0 : 1;
+    }
+    if (space_->topology() == Topology::cell)
+        rows.row(2) = place_;
+    else
+        corner(2, 2) = 1;
+
+    // Columns in order, each with the rows of the Hessian and then all three others, zeros included.
+    Eigen::SparseMatrix<double> J(n + 3, n + 3);
+    J.reserve(hessian.nonZeros() + 6 * n + 9);
+    for (int j = 0; j < n; ++j) {
+        J.startVec(j);
+        for (Eigen::SparseMatrix<double>::InnerIterator it(hessian, j); it; ++it)
+            J.insertBack(it.row(), j) = it.value();
+        for (int i = 0; i < 3; ++i) J.insertBack(n + i, j) = rows(i, j);
+    }
+    for (int j = 0; j < 3; ++j) {
+        const Eigen::VectorXd& column = j == 0 ? area : j == 1 ? volume : place_;
+        J.startVec(n + j);
+        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = column[i];
+        for (int i = 0; i < 3; ++i) J.insertBack(n + i, n + j) = corner(i, j);
+    }
+    J.finalize();
+    return J;
+}
+
+double StationarySystem::merit(const Eigen::VectorXd& u) const {
+    const Constraints& c = problem_.constraints;
+    const CurveObservation o = forms_.observe(u.head(space_->size()));
+    double value = o.energy + gauge_ * o.gauge;
+    if (c.area) value += u[sigma()] * (o.area - *c.area);
+    if (c.volume) value += u[P()] * (o.volume - *c.volume);
+    if (c.reduced_volume) value += u[P()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
+    return value;
+}
+
+Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) const {
+    const int n = space_->size();
+    const Constraints& c = problem_.constraints;
+    const Eigen::VectorXd x = u.head(n);
+    Eigen::MatrixXd hessian = forms_.hessian(lagrangian(u), x);
+    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x);
+    Eigen::MatrixXd fixed(n, 0);
+    const auto fix = [&](const Eigen::VectorXd& functional) {
+        fixed.conservativeResize(n, fixed.cols() + 1);
+        fixed.col(fixed.cols() - 1) = functional;
+    };
+    if (c.area) fix(area);
+    if (c.volume) fix(volume);
+    if (c.reduced_volume) {
+        const double A = forms_.observe(x).area, factor = *c.reduced_volume / sphere_factor;
+        fix(volume - factor * 1.5 * std::sqrt(A) * area);
+        hessian -= u[P()] * factor * 0.75 / std::sqrt(A) * area * area.transpose();
+    }
+    if (space_->topology() == Topology::cell) fix(place_);
+    const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints > 0 ? fixed : Eigen::MatrixXd::Zero(n, 1));
+    if (constraints > 0) {
+        hessian.applyOnTheLeft(qr.householderQ().transpose());
+        hessian.applyOnTheRight(qr.householderQ());
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+        hessian.bottomRightCorner(free, free), vectors ? Eigen::ComputeEigenvectors : Eigen::EigenvaluesOnly);
+    Variation out{eigen.eigenvalues(), {}};
+    if (!vectors) return out;
+    out.lowest = Eigen::VectorXd::Zero(n);
+    out.lowest.tail(free) = eigen.eigenvectors().col(0);
+    if (constraints > 0) out.lowest.applyOnTheLeft(qr.householderQ());
+    return out;
+}
+
+namespace {
+
+// Newton's method on one mesh; `size` is the length that steps are compared with.
+class Newton {
+public:
+    Newton(const StationarySystem& system, Eigen::VectorXd& u, int& iterations)
+        : system_(system),
+          u_(u),
+          iterations_(iterations),
+          size_(std::sqrt(system.forms().observe(curve()).area)),
+          scale_(system.forms().reference_energy(curve())),
+          damping_start_(10 * scale_ / std::pow(size_, 4)),
+          damping_(damping_start_) {}
+
+    // Plain steps, to rounding. False, and u as it was, if they do not converge or one is longer than `longest`.
+    bool converge(double longest) {
+        const Eigen::VectorXd start = u_;
+        try {
+            if (plain_steps(longest)) return true;
+        } catch (const SolveError&) {
+        }
+        u_ = start;
+        return false;
+    }
+
+    // Damped steps towards a minimum, until they are shorter than `tolerance`. A step solves the equations of the
+    // implicit Euler method for the descent, of a duration that grows while the model predicts the energy well. Far
+    // from the area and volume asked for, a step brings them nearer, and the energy may do what it must. False if no
+    // step makes progress any more.
+    bool descend(double tolerance, int most = 200) {
+        for (int k = 0; k < most; ++k) {
+            ++iterations_;
+            const Attempt step = attempt();
+            const double gain = step.sound ? merit_at(curve(), step.to) - system_.merit(step.to) : 0;
+            const double noise = 1e-13 * scale_;
+            if (!step.sound || (step.feasible && gain < 0.1 * step.predicted - noise)) {
+                damping_ *= 5;
+                if (damping_ > 1e12 * damping_start_) return false;
+                continue;
+            }
+            const double length = relative(step.to - u_);
+            u_ = step.to;
+            if (!step.feasible) continue;
+            if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
+            if (length < tolerance || gain > 0.6 * step.predicted) damping_ /= 6;
+        }
+        return false;
+    }
+
+private:
+    bool plain_steps(double longest) {
+        double before = std::numeric_limits<double>::infinity();
+        for (int k = 0; k < 25; ++k) {
+            lu_.factor(system_.jacobian(u_));
+            ++iterations_;
+            const Eigen::VectorXd step = -lu_.solve(system_.residual(u_));
+            const double length = relative(step);
+            if (!(length < longest) || !system_.forms().admissible(head(u_ + step))) return false;
+            u_ += step;
+            if (length < 1e-7 || (length < 1e-5 && length > before / 4)) return true;  // quadratic; or rounding reached
+            before = length;
+        }
+        return false;
+    }
+
+    Eigen::VectorXd head(const Eigen::VectorXd& u) const { return u.head(system_.space().size()); }
+    Eigen::VectorXd curve() const { return head(u_); }
+    double relative(const Eigen::VectorXd& step) const {
+        return step.head(system_.space().size()).lpNorm<Eigen::Infinity>() / size_;
+    }
+    // Area and volume off what is asked, in units of the size. (What is not held is off by nothing that matters here.)
+    double constraint_error(const Eigen::VectorXd& F) const {
+        const Constraints& c = system_.problem().constraints;
+        const double area = c.area ? std::abs(F[system_.sigma()]) / (size_ * size_) : 0;
+        const double volume = c.volume || c.reduced_volume ? std::abs(F[system_.P()]) / (size_ * size_ * size_) : 0;
+        return std::max(area, volume);
+    }
+    // The merit of a curve with the multipliers of u.
+    double merit_at(const Eigen::VectorXd& x, Eigen::VectorXd u) const {
+        u.head(x.size()) = x;
+        return system_.merit(u);
+    }
+
+    struct Attempt {
+        bool sound = false;     // downhill, not too far, and to a curve
+        bool feasible = false;  // area and volume are as asked, or nearly
+        double predicted = 0;   // gain of the merit
+        Eigen::VectorXd to;
+    };
+
+    // One damped step, then corrections that bring area and volume to what they were meant to be.
+    Attempt attempt() {
+        constexpr double farthest = 0.05;  // for the sake of area and volume
+        const int n = system_.space().size();
+        Attempt out;
+        try {
+            const Eigen::SparseMatrix<double> J = system_.jacobian(u_, damping_);
+            lu_.factor(J);
+            const Eigen::VectorXd F = system_.residual(u_);
+            Eigen::VectorXd force = F, off = F;
+            force.tail(3).setZero(), off.head(n).setZero();
+            const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
+            const double off_before = constraint_error(F), part = std::min(1.0, farthest / relative(back));
+            const Eigen::VectorXd step = down + part * back, dx = step.head(n);
+            const double curvature = dx.dot(J.topLeftCorner(n, n) * dx);
+            if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
+            out.predicted = curvature / 2;
+            out.to = u_ + step;
+            for (int k = 0; k < 2; ++k) {
+                if (!system_.forms().admissible(head(out.to))) return out;
+                Eigen::VectorXd still = system_.residual(out.to) - (1 - part) * off;
+                still.head(n).setZero();
+                out.to.head(n) -= lu_.solve(still).head(n);
+            }
+            const double off_after = constraint_error(system_.residual(out.to));
+            out.feasible = off_before < 1e-3 && part == 1;
+            out.sound = system_.forms().admissible(head(out.to)) &&
+                        off_after <= (out.feasible ? 1e-3 : (1 - part / 2) * off_before);
+        } catch (const SolveError&) {
+        }
+        return out;
+    }
+
+    const StationarySystem& system_;
+    Eigen::VectorXd& u_;
+    int& iterations_;
+    double size_;
+    double scale_, damping_start_, damping_;
+    SparseLu lu_;
+};
+
+constexpr int coarsest = 8;  // elements of a whole cell or period
+
+std::shared_ptr<const CurveSpace> make_space(Topology topology, double length, std::vector<double> breaks, int degree) {
+    return std::make_shared<CurveSpace>(topology, std::move(breaks), degree, degree - 1, length);
+}
+
+// Scales a closed curve to the area (or the volume, if that alone is held) that is asked for.
+void scale_to(const CurveForms& forms, const Constraints& c, Eigen::VectorXd& x) {
+    if (!forms.space().closed() || !(c.area || c.volume)) return;
+    const CurveObservation o = forms.observe(x);
+    x *= c.area ? std::sqrt(*c.area / o.area) : std::cbrt(*c.volume / o.volume);
+}
+
+}  // namespace
+
+std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
+    const int n = static_cast<int>(breaks.size()) - 1;
+    std::vector<double> out(elements + 1);
+    for (int i = 0; i <= elements; ++i) {
+        const double at = static_cast<double>(i) * n / elements;
+        const int e = std::min(static_cast<int>(at), n - 1);
+        out[i] = breaks[e] + (at - e) * (breaks[e + 1] - breaks[e]);
+    }
+    out.back() = 1;
+    return out;
+}
+
+namespace {
+
+// Descends on one mesh; area and volume go from those of the start to the asked ones in steps, and the shape follows.
+bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
+    const StationaryProblem goal = system.problem();
+    const CurveObservation o = system.forms().observe(u.head(system.space().size()));
+    if (!(o.area > 0 && o.volume > 0)) return false;  // turned inside out by an attempt before
+    const double v = reduced_volume(o.area, o.volume);
+    const auto off = [](const std::optional<double>& wanted, double is) {
+        return wanted ? std::abs(std::log(*wanted / is)) : 0;
+    };
+    const double distance = std::max({off(goal.constraints.area, o.area), off(goal.constraints.volume, o.volume),
+                                      off(goal.constraints.reduced_volume, v)});
+    const int stages = 1 + static_cast<int>(distance / 0.03);
+    for (int k = 1; k < stages; ++k) {
+        const auto between = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
+            if (!wanted) return wanted;
+            return is * std::pow(*wanted / is, static_cast<double>(k) / stages);
+        };
+        StationaryProblem stage = goal;
+        stage.constraints = {between(goal.constraints.area, o.area), between(goal.constraints.volume, o.volume),
+                             between(goal.constraints.reduced_volume, v)};
+        system.set_problem(stage);
+        Newton(system, u, iterations).descend(std::max(0.03, tolerance), 30);
+    }
+    system.set_problem(goal);
+    return Newton(system, u, iterations).descend(tolerance);
+}
+
+// The stationary shape on one mesh; with `from_afar`, and wherever plain Newton steps fail, after a descent. False, and
+// u somewhere on the way, if there is none to be found.
+bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const EquilibriumSettings& settings,
+            Equilibrium& out) {
+    const int n = system.space().size();
+    if (!settings.descend) return Newton(system, u, out.iterations).converge(0.5);
+    bool found = !from_afar && Newton(system, u, out.iterations).converge(0.1);
+    for (double tolerance = 1e-3; !found && tolerance > 1e-6; tolerance *= 0.03)
+        found = descend(system, u, tolerance, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
+    // Newton's last steps, or a symmetry of the start, may lead to a saddle: leave it downhill.
+    for (int k = 0; k < 3 && found; ++k) {
+        const Variation variation = system.variation(u, true);
+        if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;
+        const double size = std::sqrt(system.forms().observe(u.head(n)).area);
+        u.head(n) += 0.01 * size / variation.lowest.lpNorm<Eigen::Infinity>() * variation.lowest;
+        found = descend(system, u, 1e-3, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
+    }
+    return found;
+}
+
+// What energies on a sequence of meshes tell of the error of the last but one.
+class MeshComparison {
+public:
+    // Infinite until there are two in a row.
+    double operator()(double energy, int elements, int degree) {
+        double error = std::numeric_limits<double>::infinity();
+        if (elements_ > 0) {
+            const double change = std::abs(energy - energy_);
+            // Two energies may be close by accident. By the order of convergence, or 8, the change before tells too.
+            const int order = std::min(2 * (degree - 1), 8);
+            error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, order));
+            change_ = change;
+        }
+        energy_ = energy, elements_ = elements;
+        return error;
+    }
+    void restart() { elements_ = 0, change_ = 0; }
+
+private:
+    double energy_ = 0, change_ = 0;
+    int elements_ = 0;
+};
+
+// A mesh for the shape that has been found on the present one. The jumps that the defect is read from tell less than
+// there is to lose on a coarse mesh: half as many elements again at least.
+std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
+                                int max_elements) {
+    const int elements = space.splines().elements();
+    const std::vector<double> breaks =
+        adapted_breaks(space.splines(), defect, 0.1 * allowed, std::max(coarsest / space.images(), elements));
+    const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (elements + 1) / 2);
+    return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
+}
+
+// Newton on meshes that follow the shape found on the one before, until their energies agree.
+Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveSpace> space, Eigen::VectorXd u,
+                  double gauge, const EquilibriumSettings& settings) {
+    Equilibrium out;
+    const auto end = [&](Stop stop, std::string message) {
+        out.stop = stop, out.message = std::move(message);
+        return out;
+    };
+    MeshComparison compare;
+    bool found = false;
+    for (int round = 0; round < 16; ++round) {
+        StationarySystem system(space, problem, gauge);
+        const int n = space->size(), elements = space->splines().elements();
+        out.space = space, out.x = u.head(n), out.gauge = gauge;
+        out.reference_energy = system.forms().reference_energy(out.x);
+        found = settle(system, u, !found, settings, out);
+        const Eigen::VectorXd x = u.head(n);
+        if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
+        std::vector<double> defect;
+        out.x = x, out.sigma = u[n], out.P = u[n + 1];
+        out.observed = system.forms().observe(x, &defect);
+        if (!found) compare.restart();
+        const double error =
+            found ? compare(out.observed.energy, elements, settings.degree) : std::numeric_limits<double>::infinity();
+        // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
+        const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
+        out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
+        if (out.estimated_error <= settings.accuracy) {
+            if (const auto where = self_intersection(*space, x))
+                return end(Stop::self_intersection,
+                           fmt::format("the stationary shape meets itself at s = {:.4f} and {:.4f}", (*where)[0],
+                                       (*where)[1]));
+            return end(Stop::finished, "");
+        }
+        if (elements >= settings.max_elements)
+            return end(Stop::resolution_lost, fmt::format("{} elements leave an error of {:.1e} of the energy",
+                                                          elements, out.estimated_error));
+        const auto finer =
+            make_space(space->topology(), space->length(),
+                       next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements),
+                       settings.degree);
+        Eigen::VectorXd next(finer->size() + 3);
+        next << finer->prolong(*space, x), u.tail(3);
+        space = finer, u = next;
+    }
+    return end(Stop::solver_failed,
+               fmt::format("Newton's method does not converge ({} iterations); try another start", out.iterations));
+}
+
+}  // namespace
+
+Eigen::VectorXd unknowns(const Equilibrium& shape) {
+    Eigen::VectorXd u(shape.x.size() + 3);
+    u << shape.x, shape.sigma, shape.P, 0;
+    return u;
+}
+
+int negative_directions(const StationaryProblem& problem, const Equilibrium& shape) {
+    const StationarySystem system(shape.space, problem, shape.gauge);
+    return static_cast<int>((system.variation(unknowns(shape)).eigenvalues.array() < 0).count());
+}
+
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
+                             const EquilibriumSettings& settings) {
+    if (start.topology == Topology::tube)
+        throw std::invalid_argument("equilibria of a period need a start that mirrors itself, and half of it");
+    const int images = start.topology == Topology::cell ? 1 : 2;
+    const auto space = make_space(start.topology, start.length,
+                                  equal_breaks(std::max(settings.elements, coarsest) / images), settings.degree);
+    const CurveForms forms(*space, problem.bending);
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + 3), x = fit(*space, start);
+    scale_to(forms, problem.constraints, x);
+    u.head(space->size()) = x;
+    return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
+}
+
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium& nearby,
+                             const EquilibriumSettings& settings) {
+    // Fewer elements first, as the mesh that confirms the first one has more: a chain of shapes keeps its size.
+    const CurveSpace& old = *nearby.space;
+    const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
+    const auto coarser =
+        make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements), settings.degree);
+    Eigen::VectorXd u(coarser->size() + 3);
+    u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.P, 0;
+    const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);
+    if (found.stop != Stop::solver_failed) return found;
+    return solve(problem, nearby.space, unknowns(nearby), nearby.gauge, settings);
+}
+
+}  // namespace tubule::axisym

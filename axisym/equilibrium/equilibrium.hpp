@@ -1,0 +1,110 @@
+// Stationary shapes of the bending energy, free or at given area and volume: E + sigma A + P V stationary.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "axisym/curve/curve_forms.hpp"
+#include "axisym/curve/curve_start.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule::axisym {
+
+// V / (4 pi/3 (A/4 pi)^(3/2)), 1 for a sphere.
+double reduced_volume(double area, double volume);
+
+// What is held fixed. Area and volume each or none; the reduced volume alone, the size being free then.
+struct Constraints {
+    std::optional<double> area, volume, reduced_volume;
+};
+
+struct StationaryProblem {
+    Bending bending;
+    Constraints constraints;
+};
+
+// Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.
+struct Variation {
+    Eigen::VectorXd eigenvalues, lowest;
+};
+
+// The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve, then sigma, P and
+// the force that holds a whole cell in place along the axis (zero in the end). `gauge` is the weight of the gauge
+// energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
+class StationarySystem {
+public:
+    StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
+
+    const CurveSpace& space() const { return *space_; }
+    const std::shared_ptr<const CurveSpace>& space_handle() const { return space_; }
+    const CurveForms& forms() const { return forms_; }
+    const StationaryProblem& problem() const { return problem_; }
+    void set_problem(const StationaryProblem& problem);
+    double gauge() const { return gauge_; }
+    int size() const { return space_->size() + 3; }
+    int sigma() const { return space_->size(); }  // places in u
+    int P() const { return space_->size() + 1; }
+
+    Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
+    // dF/du, with `damping` times the mass matrix added to the Hessian; compressed, of one pattern.
+    Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
+    // E + gauge D + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
+    double merit(const Eigen::VectorXd& u) const;
+    // The second variation of that on the displacements (of coefficients) which keep the constraints and the place;
+    // `lowest` with `vectors` only.
+    Variation variation(const Eigen::VectorXd& u, bool vectors = false) const;
+
+private:
+    Weights lagrangian(const Eigen::VectorXd& u) const;
+
+    std::shared_ptr<const CurveSpace> space_;
+    StationaryProblem problem_;
+    CurveForms forms_;
+    double gauge_;
+    Eigen::VectorXd place_;  // functional of the mean height
+};
+
+struct EquilibriumSettings {
+    double accuracy = 1e-9;  // of the energy, relative to E_ref
+    int degree = 5;
+    int elements = 16;       // to begin with, of a whole cell
+    int max_elements = 400;  // more are never taken
+    double gauge = 0.01;     // weight of the gauge energy relative to E_ref; docs/decisions.md
+    bool descend = true;     // look for a minimum, from any start; if not, for any stationary shape near a good one
+};
+
+struct Equilibrium {
+    std::shared_ptr<const CurveSpace> space;
+    Eigen::VectorXd x;
+    double sigma = 0, P = 0;
+    double gauge = 0;
+    CurveObservation observed;
+    double reference_energy = 0, estimated_error = 0;  // the latter relative to the former
+    int iterations = 0;                                // of Newton, over all meshes
+    // finished; or why it is no equilibrium: solver_failed, resolution_lost, self_intersection.
+    Stop stop = Stop::solver_failed;
+    std::string message;
+};
+
+// From a curve. Without constraints of its own the problem is that of a free membrane. Throws std::invalid_argument
+// for constraints that contradict each other or cannot be met, and for a period that is not half a tube.
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
+                             const EquilibriumSettings& settings = {});
+// From an equilibrium of a nearby problem: its mesh and its parametrisation.
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium& nearby,
+                             const EquilibriumSettings& settings = {});
+
+// u of a StationarySystem on its mesh.
+Eigen::VectorXd unknowns(const Equilibrium& shape);
+
+// Axisymmetric displacements, up to the constraints, that lower the energy: 0 at a minimum.
+int negative_directions(const StationaryProblem& problem, const Equilibrium& shape);
+
+// The same grading with another number of elements.
+std::vector<double> regraded(const std::vector<double>& breaks, int elements);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,305 @@
+#include "axisym/equilibrium/equilibrium_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_measures.hpp"
+#include "axisym/equilibrium/continuation.hpp"
+#include "axisym/equilibrium/equilibrium.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// What [equilibrium] comes to for this start.
+struct Task {
+    Meridian start;
+    StationaryProblem problem;
+    SetParameter set;  // of a branch
+    BranchSettings branch;
+    EquilibriumSettings settings;
+};
+
+double sphere_volume(double area, double reduced) {
+    return reduced * area * std::sqrt(area) / (6 * std::sqrt(pi));
+}
+
+SetParameter setter(int parameter) {
+    if (parameter < static_cast<int>(n_bending_terms))
+        return [parameter](StationaryProblem& p, double value) { p.bending.k[parameter] = value; };
+    switch (parameter) {
+        case vary_H0:
+            return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
+        case vary_area:
+            return [](StationaryProblem& p, double value) { p.constraints.area = value; };
+        case vary_volume:
+            return [](StationaryProblem& p, double value) { p.constraints.volume = value; };
+        default:
+            return [](StationaryProblem& p, double value) {
+                if (p.constraints.area)
+                    p.constraints.volume = sphere_volume(*p.constraints.area, value);
+                else
+                    p.constraints.reduced_volume = value;
+            };
+    }
+}
+
+double start_of(int parameter, const StationaryProblem& p) {
+    if (parameter < static_cast<int>(n_bending_terms)) return p.bending.k[parameter];
+    const Constraints& c = p.constraints;
+    switch (parameter) {
+        case vary_H0:
+            return p.bending.H0;
+        case vary_area:
+            return *c.area;
+        case vary_volume:
+            return *c.volume;
+        default:
+            return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
+    }
+}
+
+Task task_of(const Case& c) {
+    const EquilibriumChoices& e = *c.equilibrium;
+    Task task;
+    try {
+        task.start = start_meridian(c);
+        if (task.start.topology == Topology::tube) task.start = half(task.start);
+    } catch (const std::invalid_argument& error) {
+        throw CaseError(fmt::format("{}: shape: {}", c.path, error.what()));
+    }
+    const auto [area, volume] = area_and_volume(task.start);
+    task.problem.bending = c.energy;
+    Constraints& held = task.problem.constraints;
+    if (e.held == Held::area_and_volume || e.held == Held::area) held.area = e.area.value_or(area);
+    if (e.held == Held::area_and_volume || e.held == Held::volume) held.volume = e.volume.value_or(volume);
+    if (e.held == Held::area_and_volume && e.reduced_volume) held.volume = sphere_volume(*held.area, *e.reduced_volume);
+    if (e.held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    task.settings.accuracy = c.accuracy.energy;
+    task.settings.degree = c.discretisation.order;
+    task.settings.descend = e.descend;
+    if (const BranchChoices& b = e.branch; b.parameter) {
+        task.set = setter(*b.parameter);
+        BranchSettings& branch = task.branch;
+        branch.from = start_of(*b.parameter, task.problem), branch.to = *b.to;
+        branch.shapes = task.settings;
+        const double way = branch.to - branch.from;
+        const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
+        if (way == 0 || steps > 10000)
+            throw CaseError(
+                fmt::format("{}: equilibrium.branch: {} to {} by {} makes {} steps; 1 to 10000 are possible", c.path,
+                            branch.from, branch.to, *b.step, steps));
+        for (int i = 0; i <= steps; ++i)
+            branch.output.push_back(i < steps ? branch.from + i * std::copysign(*b.step, way) : branch.to);
+    }
+    try {  // what contradicts itself is said before anything is computed
+        StationarySystem(std::make_shared<CurveSpace>(task.start.topology, equal_breaks(4), 3, 2, task.start.length),
+                         task.problem, 1);
+    } catch (const std::invalid_argument& error) {
+        throw CaseError(fmt::format("{}: equilibrium: {}", c.path, error.what()));
+    }
+    return task;
+}
+
+// One point of the profile.
+struct Sample {
+    double r, z, H, K;
+};
+
+Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
+    // At a pole the curvature around the axis is that along the profile: just beside it, they agree to rounding.
+    constexpr double aside = 1e-5;
+    const bool south = space.closed() && s < aside, north = space.topology() == Topology::cell && s > 1 - aside;
+    const CurvePoint at = space.evaluate(x, s), c = space.evaluate(x, south ? aside : north ? 1 - aside : s);
+    const auto p = profile_point(c.r, c.r1, c.r2, c.z1, c.z2);
+    return {south || north ? 0 : at.r, at.z, p.H, p.K};
+}
+
+Dissipation dissipation(const Model& model) {
+    switch (model.kind) {
+        case ModelKind::gradient_flow:
+            return Dissipation::gradient_flow;
+        case ModelKind::overdamped:
+            return Dissipation::overdamped;
+        default:  // the reader allows no fluid here
+            return Dissipation::stokes(model.Re, model.gamma);
+    }
+}
+
+class Writer {
+public:
+    Writer(const Case& c, const Task& task, RunObserver& observer)
+        : c_(c), task_(task), observer_(observer), started_(std::chrono::steady_clock::now()) {}
+
+    void operator()(const BranchPoint& point) {
+        const Equilibrium& e = point.shape;
+        StationaryProblem problem = task_.problem;
+        if (task_.set) task_.set(problem, point.parameter);
+        std::vector<ModeRates> modes;
+        if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, dissipation(c_.model));
+        observer_.row(row(point, modes));
+        observer_.frame([&] { return frame(point, modes); });
+        observer_.progress(point.parameter, e.observed.energy, 0);
+        worst_ = std::max(worst_, e.estimated_error);
+        ++count_;
+    }
+
+    int count() const { return count_; }
+    double worst() const { return worst_; }
+
+private:
+    std::vector<double> row(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
+        const Equilibrium& e = point.shape;
+        const CurveObservation& o = e.observed;
+        const ShapeMeasures m = measures(*e.space, e.x);
+        std::vector<double> values{static_cast<double>(count_)};
+        if (task_.set) values.insert(values.end(), {point.parameter, static_cast<double>(point.kind)});
+        values.push_back(o.energy);
+        values.insert(values.end(), o.energy_term.begin(), o.energy_term.end());
+        values.insert(values.end(),
+                      {o.area, o.volume, reduced_volume(o.area, o.volume), e.sigma, e.P,
+                       static_cast<double>(point.index), o.length, m.height, m.r_middle, m.r_max, m.pole_curvature,
+                       hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)))});
+        for (const ModeRates& mode : modes) values.push_back(mode.rates.empty() ? 0 : mode.rates[0]);
+        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+        values.insert(values.end(), {e.estimated_error * e.reference_energy,
+                                     static_cast<double>(e.space->images() * e.space->splines().elements()), seconds});
+        return values;
+    }
+
+    Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
+        const Equilibrium& e = point.shape;
+        constexpr int samples_per_element = 6;
+        const std::vector<double>& breaks = e.space->splines().breaks();
+        std::vector<Sample> samples;
+        for (std::size_t k = 0; k + 1 < breaks.size(); ++k)
+            for (int i = 0; i < samples_per_element; ++i)
+                samples.push_back(
+                    sample(*e.space, e.x, breaks[k] + (breaks[k + 1] - breaks[k]) * i / samples_per_element));
+        samples.push_back(sample(*e.space, e.x, 1));
+        if (e.space->images() == 2) {  // what lies beyond the plane of symmetry
+            const double plane = samples.back().z;
+            for (std::size_t i = samples.size() - 1; i-- > 0;) {
+                Sample image = samples[i];
+                image.z = 2 * plane - image.z;
+                samples.push_back(image);
+            }
+        }
+        Record out;
+        out.time = count_;
+        out.numbers = {{"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"P", e.P}};
+        if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
+        const auto add = [&](const char* name, double Sample::*member) {
+            Array a{name, {samples.size()}, {}};
+            for (const Sample& s : samples) a.data.push_back(s.*member);
+            out.arrays.push_back(std::move(a));
+        };
+        add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K);
+        for (const ModeRates& mode : modes)
+            out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
+        return out;
+    }
+
+    // Moved along the axis such that the mean height over the arc length is zero.
+    static Meridian centred(Meridian m) {
+        if (m.topology != Topology::cell) return m;
+        const ArcLength arc(m);
+        constexpr int points = 400;
+        double mean = 0;
+        for (int i = 0; i < points; ++i) mean += arc.point((i + 0.5) / points)[1] / points;
+        m.at = [at = m.at, mean](double t) {
+            auto p = at(t);
+            p[2] -= mean;
+            return p;
+        };
+        return m;
+    }
+
+    const Case& c_;
+    const Task& task_;
+    RunObserver& observer_;
+    std::chrono::steady_clock::time_point started_;
+    int count_ = 0;
+    double worst_ = 0;
+};
+
+std::string advice_for(Stop stop) {
+    switch (stop) {
+        case Stop::solver_failed:
+            return "begin with a shape nearer to the one looked for, or ask for less accuracy";
+        case Stop::resolution_lost:
+            return "ask for less accuracy; a neck that closes cannot be followed to its end";
+        case Stop::self_intersection:
+            return "the equations hold on, but the surface is none any more";
+        default:
+            return "";
+    }
+}
+
+}  // namespace
+
+std::vector<std::string> equilibrium_series_names(const Case& c) {
+    std::vector<std::string> names{"time"};
+    if (c.equilibrium->branch.parameter) names.insert(names.end(), {"parameter", "special"});
+    names.push_back("energy");
+    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
+    for (const char* name : {"area", "volume", "reduced_volume", "sigma", "P", "negative_directions", "meridian_length",
+                             "height", "r_middle", "r_max", "pole_curvature", "distance_to_start"})
+        names.push_back(name);
+    for (int m = 0; m <= c.equilibrium->modes.value_or(-1); ++m) names.push_back(fmt::format("growth_{}", m));
+    for (const char* name : {"energy_error", "elements", "wall_seconds"}) names.push_back(name);
+    return names;
+}
+
+void check_equilibrium(const Case& c) {
+    task_of(c);
+}
+
+RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
+    const Task task = task_of(c);
+    Writer write(c, task, observer);
+    const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
+    Stop stop = first.stop;
+    std::string message = first.message;
+    std::vector<BranchPoint> points;
+    if (stop != Stop::finished || !task.set) {
+        BranchPoint only;
+        only.shape = first;
+        only.parameter = task.branch.from;
+        if (stop == Stop::finished) only.index = negative_directions(task.problem, first);
+        if (first.observed.area > 0) points.push_back(std::move(only));
+    } else {
+        Branch branch = follow_branch(task.problem, first, task.set, task.branch);
+        points = std::move(branch.points);
+        stop = branch.stop, message = branch.message;
+    }
+    RunSummary s;
+    for (const BranchPoint& point : points) {
+        if (observer.interrupted()) {
+            stop = Stop::interrupted, message = "by a signal";
+            break;
+        }
+        write(point);
+        s.energy = point.shape.observed.energy;
+        s.reference_energy = point.shape.reference_energy;
+        s.elements = point.shape.space->images() * point.shape.space->splines().elements();
+    }
+    s.estimated_error = write.worst();
+    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
+    if (stop == Stop::finished) message = task.set ? "the branch has left its interval" : "the shape is stationary";
+    s.stop = {stop, std::max(write.count() - 1, 0) * 1.0, message, advice_for(stop)};
+    s.effort =
+        fmt::format("{} shape{}, {} elements in the last", write.count(), write.count() == 1 ? "" : "s", s.elements);
+    s.details = {{"shapes", std::int64_t{write.count()}}, {"elements", std::int64_t{s.elements}}};
+    return s;
+}
+
+}  // namespace tubule::axisym

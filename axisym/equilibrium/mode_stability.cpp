@@ -1,0 +1,420 @@
+#include "axisym/equilibrium/mode_stability.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "axisym/splines/pack.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+constexpr int lanes = ProfileSpace::lanes;
+using J = Jet<Pack, 6, 2>;
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// Variables of the quadratic form; those up to w_theta_theta go with cos(m theta), the others with sin.
+enum Variable { W, W_s, W_ss, W_tt, W_t, W_st };
+
+// A point of the disturbed surface in the frame (e_r, e_theta, e_z), and the derivatives there.
+struct Disturbed {
+    J r, s_r, s_z, t_r, t_z, ss_r, ss_z, st_r, st_z, tt_r, tt_z;
+};
+
+// The surface (r + w n_r) e_r + (z + w n_z) e_z. Each argument: value, first and second derivative in s.
+Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], const Pack (&nz)[3]) {
+    const J w = J::variable(Pack(0.0), W), w_s = J::variable(Pack(0.0), W_s), w_ss = J::variable(Pack(0.0), W_ss),
+            w_t = J::variable(Pack(0.0), W_t), w_st = J::variable(Pack(0.0), W_st), w_tt = J::variable(Pack(0.0), W_tt);
+    const auto constant = [](const Pack& value) {
+        J c;
+        c.v = value;
+        return c;
+    };
+    const auto first = [&](const Pack(&x)[3], const Pack(&n)[3]) {
+        return constant(x[1]) + w_s * constant(n[0]) + w * constant(n[1]);
+    };
+    const auto second = [&](const Pack(&x)[3], const Pack(&n)[3]) {
+        return constant(x[2]) + w_ss * constant(n[0]) + 2.0 * (w_s * constant(n[1])) + w * constant(n[2]);
+    };
+    const auto mixed = [&](const Pack(&n)[3]) { return w_st * constant(n[0]) + w_t * constant(n[1]); };
+    Disturbed d;
+    d.r = constant(r[0]) + w * constant(nr[0]);
+    d.s_r = first(r, nr), d.s_z = first(z, nz);
+    d.ss_r = second(r, nr), d.ss_z = second(z, nz);
+    d.t_r = w_t * constant(nr[0]), d.t_z = w_t * constant(nz[0]);
+    d.st_r = mixed(nr), d.st_z = mixed(nz);
+    d.tt_r = w_tt * constant(nr[0]) - d.r, d.tt_z = w_tt * constant(nz[0]);
+    return d;
+}
+
+// E + sigma A + P V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of d_theta^2
+// twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
+J functional_density(const Bending& bending, double sigma, double P, const Disturbed& d) {
+    // Normal d_theta X x d_s X, not of unit length.
+    const J n_r = d.r * d.s_z, n_t = d.t_z * d.s_r - d.t_r * d.s_z, n_z = -(d.r * d.s_r);
+    const J square = n_r * n_r + n_t * n_t + n_z * n_z;
+    const J inverse_area = inverse_sqrt(square), inverse_square = inverse_area * inverse_area;
+    const J E = d.t_r * d.t_r + d.r * d.r + d.t_z * d.t_z, F = d.t_r * d.s_r + d.t_z * d.s_z,
+            G = d.s_r * d.s_r + d.s_z * d.s_z;
+    const J L = d.tt_r * n_r + 2.0 * (d.t_r * n_t) + d.tt_z * n_z, M = d.st_r * n_r + d.s_r * n_t + d.st_z * n_z,
+            N = d.ss_r * n_r + d.ss_z * n_z;
+    const J H = (L * G - 2.0 * (M * F) + N * E) * (inverse_square * inverse_area);
+    const J K = (L * N - M * M) * (inverse_square * inverse_square);
+    const auto f = density(bending, H.v, K.v);
+    J sum = chain(H, K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+    sum.v += sigma;
+    return square * inverse_area * sum + (P / 2) * (d.r * n_r);
+}
+
+}  // namespace
+
+ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium& shape)
+    : problem_(problem), shape_(shape) {
+    const CurveSpace& space = *shape.space;
+    const ProfileSpace& splines = space.splines();
+    // Displacements go along a spline field n that is the normal up to the error of a projection. Only their normal
+    // part matters at a stationary shape, and two derivatives of n are at hand.
+    const auto normal = [&](double s) {
+        const CurvePoint p = space.evaluate(shape.x, s);
+        const double g = std::hypot(p.r1, p.z1);
+        return std::array{p.z1 / g, -p.r1 / g};
+    };
+    const Vector n_r = space.r().project([&](double s) { return normal(s)[0]; });
+    const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
+    std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int group = 0; group < splines.groups(); ++group) {
+            const auto& b = splines.basis(e, group);
+            Pack r[3], z[3], nr[3], nz[3];
+            for (int q = 0; q < lanes; ++q) {
+                const CurvePoint p = space.evaluate(shape.x, b.z[q]);
+                const auto u = space.r().evaluate(n_r.data(), b.z[q]), v = space.z().evaluate(n_z.data(), b.z[q]);
+                r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
+                for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
+            }
+            const J density = functional_density(problem.bending, shape.sigma, shape.P, disturb(r, z, nr, nz));
+            const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
+            for (int q = 0; q < lanes; ++q) {
+                Point p;
+                p.weight = b.weight[q], p.r = r[0][q], p.z = z[0][q], p.g = 1 / base.inverse_speed[q];
+                p.kappa_s = base.kappa_s[q], p.kappa_theta = base.kappa_theta[q], p.H = base.H[q];
+                p.slope = r[1][q] / p.g;
+                p.stretching = (r[1][q] * r[2][q] + z[1][q] * z[2][q]) / (p.g * p.g);
+                p.normal_r = z[1][q] / p.g, p.normal_z = -r[1][q] / p.g;
+                p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
+                for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
+                points_.push_back(p);
+                first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q]});
+            }
+        }
+    set_force(first_variation);
+}
+
+// (force, phi) = -first variation by phi, for all phi of a scalar field.
+void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_variation) {
+    const ProfileSpace& splines = shape_.space->splines();
+    const Field field(splines, shape_.space->scalar_parity());
+    const int n = field.size(), width = splines.width(), per_element = splines.groups() * lanes;
+    Matrix mass = Matrix::Zero(n, n);
+    Vector load = Vector::Zero(n);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto& d = first_variation[k];
+        for (int a = 0; a < width; ++a) {
+            const int i = field.dofs(e)[a];
+            const double sign = field.signs(e)[a], f0 = sign * b.by_spline[q][0][a];
+            load[i] -= p.weight * (d[0] * f0 + sign * (d[1] * b.by_spline[q][1][a] + d[2] * b.by_spline[q][2][a]));
+            for (int c = 0; c < width; ++c)
+                mass(field.dofs(e)[c], i) +=
+                    p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
+        }
+    }
+    const Vector force = Eigen::PartialPivLU<Matrix>(mass).solve(load);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        points_[k].force = 0;
+        for (int a = 0; a < width; ++a)
+            points_[k].force += field.signs(e)[a] * force[field.dofs(e)[a]] * b.by_spline[q][0][a];
+    }
+}
+
+std::vector<Parity> ModeStability::parities(int m) const {
+    const int pole = m % 2 == 0 ? 1 : -1;
+    switch (shape_.space->topology()) {
+        case Topology::cell:
+            return {{pole, pole}};
+        case Topology::half_cell:
+            return {{pole, 1}, {pole, -1}};
+        case Topology::half_tube:
+            return {{1, 1}, {-1, -1}};
+        default:
+            return {{1, 1}};
+    }
+}
+
+ModeRates ModeStability::rates(int m, Dissipation dissipation, int count) const {
+    ModeRates out;
+    out.m = m;
+    for (const Parity& parity : parities(m)) add_rates(m, dissipation, parity, count, out);
+    return out;
+}
+
+namespace {
+
+// Columns that span the vectors orthogonal to all of `fixed`.
+Matrix complement(const Matrix& fixed) {
+    const Eigen::Index n = fixed.rows();
+    if (fixed.cols() == 0) return Matrix::Identity(n, n);
+    Eigen::ColPivHouseholderQR<Matrix> qr(fixed);
+    qr.setThreshold(1e-6);  // area and volume are one constraint for a sphere or a tube, up to the error of the mesh
+    const Matrix q = qr.householderQ();
+    return q.rightCols(n - qr.rank());
+}
+
+void append(Matrix& columns, const Vector& column) {
+    columns.conservativeResize(column.size(), columns.cols() + 1);
+    columns.col(columns.cols() - 1) = column;
+}
+
+// Smallest eigenvalues of A v = lambda M v, with the vectors. By way of the inverse, which finds them to the accuracy
+// of small numbers, however large the others are.
+struct Spectrum {
+    Vector values;
+    Matrix vectors;
+};
+Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
+    double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
+    for (int k = 0; k < 60; ++k, shift *= 4) {
+        const Matrix shifted = A + shift * M;
+        if (Eigen::LLT<Matrix>(shifted).info() != Eigen::Success) continue;
+        const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> eigen(M, shifted);
+        if (eigen.info() != Eigen::Success) break;
+        const int n = static_cast<int>(A.rows()), kept = std::min(count, n);
+        Spectrum out{Vector(kept), Matrix(n, kept)};
+        for (int i = 0; i < kept; ++i) {
+            out.values[i] = 1 / eigen.eigenvalues()[n - 1 - i] - shift;
+            out.vectors.col(i) = eigen.eigenvectors().col(n - 1 - i);
+        }
+        return out;
+    }
+    throw SolveError("the eigenproblem of the second variation is not solved");
+}
+
+}  // namespace
+
+// Under reflection at a plane of symmetry; 0 if the curve ends at none.
+int ModeStability::mirror(Parity parity) const {
+    const Topology t = shape_.space->topology();
+    return t == Topology::cell || t == Topology::tube ? 0 : parity.end;
+}
+
+struct ModeStability::Forms {
+    Matrix second_variation, mass, gradients, source;  // INT |grad f|^2, INT H f w
+    Vector area, volume, mean;
+    Vector rigid[2];  // translation along or across the axis, tilt
+
+    explicit Forms(int n)
+        : second_variation(Matrix::Zero(n, n)),
+          mass(second_variation),
+          gradients(second_variation),
+          source(second_variation),
+          area(Vector::Zero(n)),
+          volume(area),
+          mean(area),
+          rigid{area, area} {}
+};
+
+ModeStability::Forms ModeStability::assemble(int m, const Field& field) const {
+    const ProfileSpace& splines = field.splines();
+    const int width = splines.width(), per_element = splines.groups() * lanes;
+    const double m2 = m * m;
+    Forms forms(field.size());
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
+        const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
+        Eigen::Matrix3d C;
+        C(0, 0) =
+            Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t) - p.force * p.H * n2 * p.r * p.g;
+        C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
+        C(0, 2) = C(2, 0) = Q(W, W_ss) - m2 * Q(W_ss, W_tt);
+        C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);
+        C(1, 2) = C(2, 1) = Q(W_s, W_ss);
+        C(2, 2) = Q(W_ss, W_ss);
+        // Rigid motions as normal displacements over cos(m theta).
+        const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, p.z * p.normal_r - p.r * p.normal_z};
+        for (int a = 0; a < width; ++a) {
+            const int i = field.dofs(e)[a];
+            const double sign = field.signs(e)[a];
+            const Eigen::Vector3d v(sign * b.by_spline[q][0][a], sign * b.by_spline[q][1][a],
+                                    sign * b.by_spline[q][2][a]);
+            const Eigen::Vector3d Cv = p.weight * (C * v);
+            forms.area[i] -= dS * p.H * p.along * v[0];
+            forms.volume[i] += dS * p.along * v[0];
+            forms.mean[i] += dS * v[0];
+            for (int l = 0; l < 2; ++l) forms.rigid[l][i] += dS * p.along * motion[l] * v[0];
+            for (int c = 0; c < width; ++c) {
+                const int j = field.dofs(e)[c];
+                const double other = field.signs(e)[c], f0 = other * b.by_spline[q][0][c],
+                             f1 = other * b.by_spline[q][1][c], f2 = other * b.by_spline[q][2][c];
+                forms.second_variation(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2];
+                forms.mass(j, i) += dS * n2 * f0 * v[0];
+                forms.gradients(j, i) += dS * (f1 * v[1] / (p.g * p.g) + m2 / (p.r * p.r) * f0 * v[0]);
+                forms.source(j, i) += dS * p.H * p.along * f0 * v[0];
+            }
+        }
+    }
+    return forms;
+}
+
+// A basis of the functions that begin with the power m of the distance at a pole. Parity does it for m = 0 and 1; of
+// the others the even ones must vanish, the odd ones be flat.
+Matrix ModeStability::regular(int m, const Field& field) const {
+    const ProfileSpace& splines = field.splines();
+    Matrix at_poles(field.size(), 0);
+    const auto require = [&](int e, double s) {
+        double values[3 * ProfileSpace::max_width];
+        splines.splines(e, s, 2, values);
+        Vector functional = Vector::Zero(field.size());
+        for (int a = 0; a < splines.width(); ++a)
+            functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * splines.width() + a];
+        append(at_poles, functional.normalized());
+    };
+    if (shape_.space->closed() && m >= 2) {
+        require(0, 0);
+        if (shape_.space->topology() == Topology::cell) require(splines.elements() - 1, 1);
+    }
+    return complement(at_poles);
+}
+
+// The dissipation of w nu with the best tangential velocity, as a quadratic form in w. That velocity is grad chi + nu x
+// grad psi, w and chi going with cos(m theta), psi with sin: inextensibility is Lap chi = H w, and psi is free.
+Matrix ModeStability::dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+                                       const Forms& forms) const {
+    if (!dissipation.flows) return dissipation.friction * forms.mass;
+    const bool constants = m == 0 && mirror(parity) >= 0;
+    const Matrix basis = constants ? complement(forms.mean) : regular(m, field);
+    const Matrix L = basis.transpose() * forms.gradients * basis, S = basis.transpose() * forms.source;
+    const Matrix X = -Eigen::LDLT<Matrix>(L).solve(S);  // chi of w, in the basis
+    Matrix M = dissipation.friction * (forms.mass + X.transpose() * L * X);
+    if (dissipation.viscosity == 0) return M;
+
+    // sigma at each point as a linear map of (w, chi, psi): its components ss, theta theta, s theta times sqrt 2.
+    const Parity turned{mirror(parity) == 0      ? parity.start
+                        : shape_.space->closed() ? parity.start
+                                                 : -parity.start,
+                        mirror(parity) == 0 ? parity.end : -parity.end};
+    const Field psi(field.splines(), turned);
+    const ProfileSpace& splines = field.splines();
+    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = splines.width(),
+              per_element = splines.groups() * lanes;
+    Matrix sigma = Matrix::Zero(3 * static_cast<Eigen::Index>(points_.size()), 2 * n + swirls);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
+        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const double root = std::sqrt(p.weight * p.r * p.g), sqrt2 = std::sqrt(2.0), rate = p.slope / p.r, mr = m / p.r;
+        const auto add = [&](int column, double factor, double ss, double tt, double st) {
+            const Eigen::Index row = 3 * static_cast<Eigen::Index>(k);
+            sigma(row, column) += factor * ss;
+            sigma(row + 1, column) += factor * tt;
+            sigma(row + 2, column) += factor * st;
+        };
+        for (int a = 0; a < width; ++a) {
+            const double f = root * b.by_spline[q][0][a], f1 = root * b.by_spline[q][1][a], f_s = f1 / p.g,
+                         f_ss = (root * b.by_spline[q][2][a] - p.stretching * f1) / (p.g * p.g);
+            const double twist = mr * (f_s - rate * f);
+            const int i = field.dofs(e)[a];
+            add(i, -field.signs(e)[a] * p.along * f, p.kappa_s, p.kappa_theta, 0);
+            add(n + i, field.signs(e)[a], f_ss, rate * f_s - mr * mr * f, -sqrt2 * twist);
+            if (swirls > 0)
+                add(2 * n + psi.dofs(e)[a], psi.signs(e)[a], -twist, twist, (mr * mr * f + f_ss - rate * f_s) / sqrt2);
+        }
+    }
+    const Matrix of_w = sigma.leftCols(n) + sigma.middleCols(n, n) * (basis * X);
+    M += 2 * dissipation.viscosity * of_w.transpose() * of_w;
+    if (swirls == 0) return M;
+    // The best psi. Motions of the whole that cost nothing may be among its choices: least squares then.
+    const Matrix basis_psi = regular(m, psi), of_psi = sigma.rightCols(swirls) * basis_psi;
+    const Matrix cross = 2 * dissipation.viscosity * of_psi.transpose() * of_w;
+    const Matrix own = 2 * dissipation.viscosity * of_psi.transpose() * of_psi +
+                       dissipation.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
+    return M - cross.transpose() * Eigen::CompleteOrthogonalDecomposition<Matrix>(own).solve(cross);
+}
+
+// What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
+// rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a tilt are odd, a
+// translation across it is even.
+Matrix ModeStability::fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+                                        const Matrix& M) const {
+    const CurveSpace& space = *shape_.space;
+    Matrix fixed(forms.mean.size(), 0);
+    if (m == 0 && mirror(parity) >= 0) {
+        const Constraints& c = problem_.constraints;
+        if (dissipation.flows || c.area) append(fixed, forms.area.normalized());
+        if (dissipation.flows || c.volume) append(fixed, forms.volume.normalized());
+        if (!dissipation.flows && c.reduced_volume) {
+            // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
+            const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;
+            const double whole = 2 * pi * space.images();
+            append(fixed, (forms.volume - slope * forms.area).normalized());
+            forms.second_variation -=
+                whole * shape_.P * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
+        }
+    }
+    const Eigen::LDLT<Matrix> projection(forms.mass);
+    for (int k = 0; k < 2; ++k) {
+        const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
+        if (!exists || mirror(parity) == (across ? -1 : 1)) continue;
+        const Vector motion = projection.solve(forms.rigid[k]);
+        if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
+        // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.
+        append(fixed, ((dissipation.friction > 0 ? M : forms.mass) * motion).normalized());
+    }
+    return fixed;
+}
+
+void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const {
+    const Field field(shape_.space->splines(), parity);
+    Forms forms = assemble(m, field);
+    const Matrix M = dissipation_form(m, dissipation, parity, field, forms), basis = regular(m, field);
+    const Matrix fixed = fixed_functionals(m, dissipation, parity, forms, M);
+    const Matrix free = basis * complement(basis.transpose() * fixed);
+    const Spectrum found =
+        smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);
+
+    const double fastest_before = out.rates.empty() ? -std::numeric_limits<double>::infinity() : out.rates[0];
+    for (double value : found.values) out.rates.push_back(-value);
+    std::sort(out.rates.begin(), out.rates.end(), std::greater<>());
+    if (static_cast<int>(out.rates.size()) > count) out.rates.resize(count);
+    if (-found.values[0] <= fastest_before) return;
+    const Vector w = free * found.vectors.col(0);
+    constexpr int samples = 200;
+    out.shape.assign(samples + 1, 0);
+    for (int i = 0; i <= samples; ++i) out.shape[i] = field.evaluate(w.data(), static_cast<double>(i) / samples)[0];
+    const double largest = *std::max_element(out.shape.begin(), out.shape.end(),
+                                             [](double x, double y) { return std::abs(x) < std::abs(y); });
+    for (double& value : out.shape) value /= largest;
+}
+
+std::vector<ModeRates> mode_stability(const StationaryProblem& problem, const Equilibrium& shape, int last,
+                                      Dissipation dissipation, int count) {
+    const ModeStability stability(problem, shape);
+    std::vector<ModeRates> out;
+    for (int m = 0; m <= last; ++m) out.push_back(stability.rates(m, dissipation, count));
+    return out;
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,77 @@
+// Stability of a stationary shape against normal displacements w(s) cos(m theta): growth rates by the second variation
+// of E + sigma A + P V and the model's dissipation, one eigenproblem for each m.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "axisym/equilibrium/equilibrium.hpp"
+
+namespace tubule::axisym {
+
+// What the rate of a displacement is paid with: the dissipation 2 viscosity INT |sigma(u)|^2 + friction INT |u|^2
+// (maths 3). Without flow u is w nu alone, and the constraints of the problem hold (for m = 0; for others they hold by
+// themselves). With flow the membrane is locally inextensible, its volume fixed, and the tangential velocity the one of
+// least dissipation.
+struct Dissipation {
+    bool flows = false;
+    double viscosity = 0, friction = 1;  // viscosity 1/Re
+    static const Dissipation gradient_flow, overdamped;
+    static Dissipation stokes(double Re, double gamma) { return {true, 1 / Re, gamma}; }
+};
+inline constexpr Dissipation Dissipation::gradient_flow{};
+inline constexpr Dissipation Dissipation::overdamped{.flows = true};
+
+struct ModeRates {
+    int m = 0;
+    std::vector<double> rates;  // exp(rate t), descending; rigid motions are left out
+    std::vector<double> shape;  // w of the first, at equally spaced s, the largest being 1
+    bool stable() const { return rates.empty() || rates[0] <= 0; }
+};
+
+// The second variation of E + sigma A + P V as a quadratic form in (w, w_s, w_theta, w_ss, w_s_theta, w_theta_theta),
+// at each quadrature point of the shape. A shape that is not stationary moves, and the rates are those of the flow
+// linearised about that motion at this instant, of the gradient flow only (maths 5, last line): the force b on it adds
+// -INT b H w^2 dS to the form of displacements along straight normals.
+class ModeStability {
+public:
+    ModeStability(const StationaryProblem& problem, const Equilibrium& shape);
+
+    // The largest `count` growth rates for this m, of displacements with the period (or closed surface) of the shape;
+    // for half a curve, of those that mirror themselves and those that do so with a change of sign. Throws SolveError
+    // if the eigenproblem is not solved.
+    ModeRates rates(int m, Dissipation dissipation, int count = 3) const;
+
+private:
+    struct Point {
+        double weight, r, g, kappa_s, kappa_theta, H, slope, stretching;  // slope dr/ds of arc length, d log g / d s
+        double normal_r, normal_z, z;
+        double along;              // n . nu, of the displacement w n
+        std::array<double, 21> Q;  // packed, per ds and dtheta
+        double force;              // b and the multipliers: what drives the shape, 0 if it is stationary
+    };
+    // Quadratic and linear forms of one m, per dtheta and over the curve alone, not its mirror image.
+    struct Forms;
+
+    void set_force(const std::vector<std::array<double, 3>>& first_variation);
+    std::vector<Parity> parities(int m) const;
+    int mirror(Parity parity) const;
+    Forms assemble(int m, const Field& field) const;
+    Eigen::MatrixXd regular(int m, const Field& field) const;
+    Eigen::MatrixXd dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+                                     const Forms& forms) const;
+    Eigen::MatrixXd fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+                                      const Eigen::MatrixXd& M) const;
+    void add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const;
+
+    StationaryProblem problem_;
+    Equilibrium shape_;
+    std::vector<Point> points_;  // element by element
+};
+
+// For m = 0 ... last.
+std::vector<ModeRates> mode_stability(const StationaryProblem& problem, const Equilibrium& shape, int last,
+                                      Dissipation dissipation, int count = 3);
+
+}  // namespace tubule::axisym

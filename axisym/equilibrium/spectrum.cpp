@@ -1,0 +1,134 @@
+#include "axisym/equilibrium/spectrum.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+Dissipation dissipation(const Model& model) {
+    switch (model.kind) {
+        case ModelKind::gradient_flow:
+            return Dissipation::gradient_flow;
+        case ModelKind::overdamped:
+            return Dissipation::overdamped;
+        default:
+            return Dissipation::stokes(model.Re, model.gamma);
+    }
+}
+
+// The shape on so many elements, with the multipliers that leave the least force, in the norm (INT b^2 dS)^(1/2).
+Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> sigma, const Meridian& shape,
+                     int elements, double& unbalanced) {
+    constexpr int degree = 5;
+    Equilibrium e;
+    const std::vector<double> breaks = shape.seams.empty()
+                                           ? equal_breaks(elements)
+                                           : graded_breaks(ArcLength(shape).seams(), 1.5 / elements, 0.5 / elements);
+    e.space = std::make_shared<CurveSpace>(shape.topology, breaks, degree, degree - 1, shape.length);
+    e.x = fit(*e.space, shape);
+    const CurveForms forms(*e.space, bending);
+    e.observed = forms.observe(e.x);
+    e.reference_energy = forms.reference_energy(e.x);
+
+    const bool area = kept == Held::area || kept == Held::area_and_volume || kept == Held::reduced_volume,
+               volume = kept == Held::volume || kept == Held::area_and_volume || kept == Held::reduced_volume;
+    std::vector<Eigen::VectorXd> held;
+    if (area && !sigma) held.push_back(forms.gradient({.area = 1}, e.x));
+    if (volume) held.push_back(forms.gradient({.volume = 1}, e.x));
+    const Eigen::MatrixXd mass = forms.mass(e.x);
+    const Eigen::LLT<Eigen::MatrixXd> factors(mass);
+    const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
+    const Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = sigma.value_or(0)}, e.x));
+    Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
+    for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
+    e.sigma = sigma.value_or(0);
+    if (!held.empty()) {
+        // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's
+        // error.
+        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+        solver.setThreshold(1e-6);
+        solver.compute(columns);
+        const Eigen::VectorXd multipliers = solver.solve(-force);
+        if (area && !sigma) e.sigma = multipliers[0];
+        if (volume) e.P = multipliers[multipliers.size() - 1];
+    }
+    const double size = e.observed.length / (2 * pi), gauge = 0.01 * e.reference_energy;
+    // A little resistance, for what is neutral: places, and sizes of an energy that knows none.
+    const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
+    const Eigen::MatrixXd hessian = Eigen::MatrixXd(forms.hessian({1, e.sigma, e.P, gauge}, e.x)) + resistance * mass;
+    const Eigen::VectorXd step =
+        Eigen::PartialPivLU<Eigen::MatrixXd>(hessian).solve(forms.gradient({1, e.sigma, e.P, 0}, e.x));
+    unbalanced = std::sqrt(step.dot(mass * step) / e.observed.area) / size;
+    e.stop = Stop::finished;
+    return e;
+}
+
+// The largest difference of a rate, relative to the larger of it and the slowest rate of all.
+double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>& b) {
+    double slowest = std::numeric_limits<double>::infinity(), largest = 0;
+    for (const ModeRates& mode : b)
+        for (const double rate : mode.rates)
+            if (std::abs(rate) > 0) slowest = std::min(slowest, std::abs(rate));
+    for (std::size_t m = 0; m < b.size(); ++m)
+        for (std::size_t i = 0; i < std::min(a[m].rates.size(), b[m].rates.size()); ++i)
+            largest =
+                std::max(largest, std::abs(a[m].rates[i] - b[m].rates[i]) / std::max(std::abs(b[m].rates[i]), slowest));
+    return largest;
+}
+
+void refuse_what_has_none(const Model& model, int first) {
+    if (model.kind == ModelKind::fluid)
+        throw std::invalid_argument(
+            "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
+    if (first == 0 && model.kind != ModelKind::gradient_flow && !model.keeps_volume.value_or(true))
+        throw std::invalid_argument("the spectrum of a model that flows is that with the volume fixed");
+}
+
+}  // namespace
+
+Held held_by(const Model& model) {
+    if (model.kind != ModelKind::gradient_flow)
+        return model.keeps_volume.value_or(true) ? Held::area_and_volume : Held::area;
+    return model.keeps_volume.value_or(false) ? Held::volume : Held::nothing;
+}
+
+Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
+                  const SpectrumSettings& settings) {
+    refuse_what_has_none(model, settings.first);
+    StationaryProblem problem{bending, {}};
+    Spectrum out;
+    for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
+        const Equilibrium e = balanced(bending, held, settings.sigma, shape, elements, out.unbalanced);
+        Constraints& c = problem.constraints;
+        if (held == Held::area || held == Held::area_and_volume) c.area = e.observed.area;
+        if (held == Held::volume || held == Held::area_and_volume) c.volume = e.observed.volume;
+        if (held == Held::reduced_volume) c.reduced_volume = reduced_volume(e.observed.area, e.observed.volume);
+        const bool last = elements + elements / 2 > settings.max_elements;
+        if (settings.first == 0 && held != Held::nothing && !out.at_rest()) {
+            if (!last) continue;  // perhaps a finer mesh shows it at rest
+            throw std::invalid_argument(
+                "the shape is not at rest: in motion, only the gradient flow with the volume free has a spectrum");
+        }
+        const ModeStability stability(problem, e);
+        std::vector<ModeRates> modes;
+        for (int m = settings.first; m <= settings.last; ++m)
+            modes.push_back(stability.rates(m, dissipation(model), settings.count));
+        const bool first = out.modes.empty();
+        out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
+        out.modes = std::move(modes);
+        out.sigma = e.sigma, out.P = e.P;
+        out.elements = e.space->splines().elements();
+        if (out.estimated_error <= settings.accuracy) break;
+    }
+    return out;
+}
+
+}  // namespace tubule::axisym

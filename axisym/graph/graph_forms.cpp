@@ -1,0 +1,347 @@
+#include "axisym/graph/graph_forms.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "axisym/splines/pack.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+namespace stdx = std::experimental;
+constexpr int lanes = ProfileSpace::lanes;
+constexpr int wide = ProfileSpace::max_width;
+
+// Coefficients of an element, gathered into r, r', r'' at its quadrature points.
+template <int P>
+struct Local {
+    Pack r{0.0}, r1{0.0}, r2{0.0};
+    Local(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
+        for (int a = 0; a <= P; ++a) {
+            const double c = x[dofs[a]];
+            r += c * load(b.by_point[0][a]);
+            r1 += c * load(b.by_point[1][a]);
+            r2 += c * load(b.by_point[2][a]);
+        }
+    }
+};
+
+template <int P>
+Pack gather(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
+    Pack value{0.0};
+    for (int a = 0; a <= P; ++a) value += x[dofs[a]] * load(b.by_point[0][a]);
+    return value;
+}
+
+// The energy per unit of z, with derivatives with respect to (r, r', r'').
+template <int Order>
+Jet<Pack, 3, Order> energy_density(const Bending& bending, const Pack& r, const Pack& r1, const Pack& r2,
+                                   ProfilePoint<Jet<Pack, 3, Order>>& p) {
+    using J = Jet<Pack, 3, Order>;
+    p = graph_point(J::variable(r, 0), J::variable(r1, 1), J::variable(r2, 2));
+    const auto f = density(bending, p.H.v, p.K.v);
+    return p.area * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+}
+
+}  // namespace
+
+Forms::Forms(const ProfileSpace& space, const Bending& bending)
+    : space_(space), bending_(bending), images_(space.cell().images()) {
+    const int w = space.width(), degree = space.degree();
+    if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(space.elements() * w * w);
+    for (int e = 0; e < space.elements(); ++e)
+        for (int b = 0; b < w; ++b)
+            for (int a = 0; a < w; ++a) entries.emplace_back(space.dofs(e)[a], space.dofs(e)[b], 1.0);
+    pattern_.resize(space.size(), space.size());
+    pattern_.setFromTriplets(entries.begin(), entries.end());
+    slots_.reserve(entries.size());
+    for (const auto& t : entries) {
+        const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[t.col()];
+        const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[t.col() + 1];
+        slots_.push_back(static_cast<int>(std::lower_bound(begin, end, t.row()) - pattern_.innerIndexPtr()));
+    }
+    // Squared norm |B_2n|/(2n)! of the Bernoulli spline that is left of a polynomial of degree p + 1 when
+    // its second derivative is approximated by splines of degree p - 2; n = p - 1.
+    const int p = space.degree();
+    const double bernoulli = p == 3 ? 1.0 / 720 : p == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
+    for (int e = 0; e < space.elements(); ++e)
+        defect_scale_.push_back(images_ * bernoulli / 4 *
+                                std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (p - 1)));
+}
+
+template <int P>
+[[gnu::flatten]] bool Forms::residual_kernel(const double* x, const double* v, double* F) const {
+    Pack smallest{std::numeric_limits<double>::infinity()};
+    for (int e = 0; e < space_.elements(); ++e) {
+        const int* dofs = space_.dofs(e);
+        Pack low{0.0}, high{0.0};
+        for (int g = 0; g < space_.groups(); ++g) {
+            const auto& basis = space_.basis(e, g);
+            const Local<P> at(basis, dofs, x);
+            smallest = stdx::min(smallest, at.r);
+            ProfilePoint<Jet<Pack, 3, 1>> p;
+            const auto energy = energy_density<1>(bending_, at.r, at.r1, at.r2, p);
+            const Pack weight = load(basis.weight);
+            const Pack drag = (2 * pi) * at.r * p.inverse_speed.v * gather<P>(basis, dofs, v);
+            // Through memory: a broadcast load is cheaper than taking a lane out of a register.
+            alignas(32) double c[3][lanes];
+            store(weight * (energy.d[0] + drag), c[0]);
+            store(weight * energy.d[1], c[1]);
+            store(weight * energy.d[2], c[2]);
+            for (int q = 0; q < lanes; ++q) {
+                const auto& s = basis.by_spline[q];
+                for (int d = 0; d < 3; ++d) {
+                    low += c[d][q] * load(s[d]);
+                    high += c[d][q] * load(s[d] + lanes);
+                }
+            }
+        }
+        alignas(32) double local[wide];
+        store(low, local);
+        store(high, local + lanes);
+        for (int a = 0; a <= P; ++a) F[dofs[a]] += images_ * local[a];
+    }
+    return stdx::hmin(smallest) > 0;
+}
+
+template <int P>
+[[gnu::flatten]] void Forms::jacobian_kernel(const Bending& bending, const double* x, const double* v, double cj,
+                                             double* values) const {
+    const int w = P + 1;
+    for (int e = 0; e < space_.elements(); ++e) {
+        const int* dofs = space_.dofs(e);
+        Pack local[P + 1][2];
+        for (auto& row : local) row[0] = row[1] = Pack(0.0);
+        for (int g = 0; g < space_.groups(); ++g) {
+            const auto& basis = space_.basis(e, g);
+            const Local<P> at(basis, dofs, x);
+            ProfilePoint<Jet<Pack, 3, 2>> p;
+            const auto energy = energy_density<2>(bending, at.r, at.r1, at.r2, p);
+            const Pack weight = load(basis.weight), rate = gather<P>(basis, dofs, v);
+            // Drag 2 pi (r/g) v and its derivatives in r, r', v.
+            const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
+            const Pack drag_r = drag * rate, drag_r1 = (2 * pi) * weight * at.r * rate * p.inverse_speed.d[1];
+            alignas(32) double c[3][3][lanes];
+            store(weight * energy.dd[0] + drag_r + cj * at.r * drag, c[0][0]);
+            store(weight * energy.dd[1] + drag_r1, c[0][1]);
+            store(weight * energy.dd[1], c[1][0]);
+            store(weight * energy.dd[2], c[0][2]);
+            store(weight * energy.dd[2], c[2][0]);
+            store(weight * energy.dd[3], c[1][1]);
+            store(weight * energy.dd[4], c[1][2]);
+            store(weight * energy.dd[4], c[2][1]);
+            store(weight * energy.dd[5], c[2][2]);
+            for (int q = 0; q < lanes; ++q) {
+                const auto& s = basis.by_spline[q];
+#pragma GCC unroll 8
+                for (int half = 0; half * lanes <= P; ++half) {
+                    Pack column[3];  // c contracted with the splines a, the rows of the local matrix
+#pragma GCC unroll 8
+                    for (int d = 0; d < 3; ++d) {
+                        column[d] = c[0][d][q] * load(s[0] + half * lanes);
+                        for (int k = 1; k < 3; ++k) column[d] += c[k][d][q] * load(s[k] + half * lanes);
+                    }
+#pragma GCC unroll 8
+                    for (int b = 0; b <= P; ++b)
+                        local[b][half] += s[0][b] * column[0] + s[1][b] * column[1] + s[2][b] * column[2];
+                }
+            }
+        }
+        const int* slot = &slots_[static_cast<std::size_t>(e) * w * w];
+        alignas(32) double column[wide];
+#pragma GCC unroll 8
+        for (int b = 0; b <= P; ++b) {
+            store(local[b][0], column);
+            store(local[b][1], column + lanes);
+            for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * column[a];
+        }
+    }
+}
+
+bool Forms::residual(const double* x, const double* v, double* F) const {
+    std::fill_n(F, space_.size(), 0.0);
+    switch (space_.degree()) {
+        case 3:
+            return residual_kernel<3>(x, v, F);
+        case 5:
+            return residual_kernel<5>(x, v, F);
+        default:
+            return residual_kernel<7>(x, v, F);
+    }
+}
+
+void Forms::jacobian_of(const Bending& bending, const double* x, const double* v, double cj, double* values) const {
+    std::fill_n(values, pattern_.nonZeros(), 0.0);
+    switch (space_.degree()) {
+        case 3:
+            return jacobian_kernel<3>(bending, x, v, cj, values);
+        case 5:
+            return jacobian_kernel<5>(bending, x, v, cj, values);
+        default:
+            return jacobian_kernel<7>(bending, x, v, cj, values);
+    }
+}
+
+void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
+    jacobian_of(bending_, x, v, cj, values);
+}
+
+double Forms::energy(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    return observe(x.data(), rest.data()).energy;
+}
+
+Eigen::VectorXd Forms::gradient(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    Eigen::VectorXd out(x.size());
+    residual(x.data(), rest.data(), out.data());
+    return out;
+}
+
+Eigen::SparseMatrix<double> Forms::hessian(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    Eigen::SparseMatrix<double> out = pattern_;
+    jacobian(x.data(), rest.data(), 0, out.valuePtr());
+    return out;
+}
+
+Eigen::SparseMatrix<double> Forms::mass(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    Eigen::SparseMatrix<double> out = pattern_;
+    jacobian_of(Bending{}, x.data(), rest.data(), 1, out.valuePtr());
+    return out;
+}
+
+Eigen::VectorXd Forms::rate(const Eigen::VectorXd& x) const {
+    SparseLu lu;
+    lu.factor(mass(x));
+    return lu.solve(-gradient(x));
+}
+
+template <int P>
+[[gnu::flatten]] Observation Forms::observe_kernel(const double* x, const double* v, double* stiffness) const {
+    Observation o;
+    o.r_min = o.symbol = o.symbol_3d = std::numeric_limits<double>::infinity();
+    o.r_max = -o.r_min;
+    Pack dissipation{0.0}, area{0.0}, volume{0.0}, terms[n_bending_terms];
+    for (auto& t : terms) t = Pack(0.0);
+    for (int e = 0; e < space_.elements(); ++e) {
+        if (stiffness) stiffness[e] = 0;
+        for (int g = 0; g < space_.groups(); ++g) {
+            const auto& basis = space_.basis(e, g);
+            const Local<P> at(basis, space_.dofs(e), x);
+            const auto p = graph_point(at.r, at.r1, at.r2);
+            const Pack weight = load(basis.weight), rate = gather<P>(basis, space_.dofs(e), v);
+            const Pack dA = weight * p.area;
+            area += dA;
+            volume += pi * weight * at.r * at.r;
+            dissipation += (2 * pi) * weight * at.r * p.inverse_speed * rate * rate;
+            for_each_bending_term([&](std::size_t i, const auto& term) {
+                if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
+            });
+            const auto f = density(bending_, p.H, p.K);
+            const auto symbol = [&](const Pack& kappa) { return f.HH + kappa * (2.0 * f.HK + kappa * f.KK); };
+            const Pack s = symbol(p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
+            // Of a parabola in x the minimum over an interval is at an end or at its clamped vertex.
+            const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
+            const Pack vertex = stdx::clamp(-f.HK * f.KK / (f.KK * f.KK + 1e-300), low, high);
+            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(stdx::min(s, stdx::min(symbol(p.kappa_s), symbol(vertex)))));
+            if (stiffness) {
+                const Pack ig2 = p.inverse_speed * p.inverse_speed;
+                stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
+            }
+            for (int q = 0; q < lanes; ++q) {
+                if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];
+                if (at.r[q] > o.r_max) o.r_max = at.r[q], o.z_max = basis.z[q];
+                if (steep[q] > o.steepness) o.steepness = steep[q], o.z_steep = basis.z[q];
+                if (s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
+            }
+        }
+    }
+    o.steepness *= o.r_min;
+    o.area = images_ * stdx::reduce(area);
+    o.volume = images_ * stdx::reduce(volume);
+    o.dissipation = images_ * stdx::reduce(dissipation);
+    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = images_ * stdx::reduce(terms[i]);
+    return o;
+}
+
+Observation Forms::observe(const double* x, const double* v, std::vector<double>* defect) const {
+    double* stiffness = nullptr;
+    if (defect) {
+        defect->resize(space_.elements());
+        stiffness = defect->data();
+    }
+    const auto kernel = [&] {
+        switch (space_.degree()) {
+            case 3:
+                return observe_kernel<3>(x, v, stiffness);
+            case 5:
+                return observe_kernel<5>(x, v, stiffness);
+            default:
+                return observe_kernel<7>(x, v, stiffness);
+        }
+    };
+    const Observation o = kernel();
+    if (!defect) return o;
+    const int n = space_.elements();
+    const auto& breaks = space_.breaks();
+    const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
+    const bool mirror = space_.cell().mirror;
+    // Difference quotient of the highest derivative across the knot between two neighbours. It is odd
+    // under reflection.
+    const auto jump = [&](int e, int f, double left, double right) { return 2 * (right - left) / (size(e) + size(f)); };
+    const double first = space_.top_derivative(x, 0), last = space_.top_derivative(x, n - 1);
+    double here = first, previous = mirror ? jump(0, 0, -first, first) : jump(n - 1, 0, last, first);
+    for (int e = 0; e < n; ++e) {
+        const int f = e + 1 < n ? e + 1 : mirror ? e : 0;
+        const double after = e + 1 < n ? space_.top_derivative(x, e + 1) : mirror ? -last : first;
+        const double next = jump(e, f, here, after);
+        (*defect)[e] *= defect_scale_[e] * (next * next + previous * previous);
+        here = after, previous = next;
+    }
+    return o;
+}
+
+double Forms::reference_energy(const Eigen::VectorXd& x) const {
+    double magnitude = 0;
+    for (int e = 0; e < space_.elements(); ++e)
+        for (int g = 0; g < space_.groups(); ++g)
+            for (int q = 0; q < lanes; ++q) {
+                const auto& basis = space_.basis(e, g);
+                const auto [r, r1, r2] = space_.evaluate(x.data(), e, basis.z[q]);
+                const auto p = graph_point(r, r1, r2);
+                for_each_bending_term([&](std::size_t i, const auto& term) {
+                    magnitude +=
+                        std::abs(bending_.k[i]) * term.magnitude(p.H, p.K, bending_.H0) * p.area * basis.weight[q];
+                });
+            }
+    return std::max(std::abs(energy(x)), images_ * magnitude);
+}
+
+std::array<Eigen::VectorXd, 2> Forms::mode(int n) const {
+    const Cell& cell = space_.cell();
+    std::array<Eigen::VectorXd, 2> out{Eigen::VectorXd::Zero(space_.size()), Eigen::VectorXd::Zero(space_.size())};
+    if (n % cell.copies != 0) return out;  // the cells cancel each other
+    const double q0 = 2 * pi * n / cell.period(), scale = (n == 0 ? 1 : 2) * images_ / cell.period();
+    for (int e = 0; e < space_.elements(); ++e)
+        for (int g = 0; g < space_.groups(); ++g)
+            for (int q = 0; q < lanes; ++q) {
+                const auto& basis = space_.basis(e, g);
+                const double phase = q0 * (basis.z[q] - cell.z0), weight = scale * basis.weight[q];
+                for (int a = 0; a < space_.width(); ++a) {
+                    out[0][space_.dofs(e)[a]] += weight * std::cos(phase) * basis.by_spline[q][0][a];
+                    // The mirror image of a sine cancels it.
+                    if (!cell.mirror) out[1][space_.dofs(e)[a]] += weight * std::sin(phase) * basis.by_spline[q][0][a];
+                }
+            }
+    return out;
+}
+
+}  // namespace tubule::axisym

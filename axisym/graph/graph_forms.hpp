@@ -1,0 +1,79 @@
+// The discrete energy of a profile and its gradient flow: value, gradient and Hessian are three faces
+// of one object, and the mass matrix of the dissipation stands beside them.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+#include "axisym/splines/profile_space.hpp"
+#include "common/energy/bending.hpp"
+
+namespace tubule::axisym {
+
+// What a state is worth, integrated or extremised over the whole period.
+struct Observation {
+    double energy = 0;
+    std::array<double, n_bending_terms> energy_term{};
+    double dissipation = 0;  // INT b^2 dS of the rate handed in: -dE/dt along the flow
+    double area = 0, volume = 0;
+    double r_min = 0, z_min = 0;  // smallest radius at quadrature points, and where
+    double r_max = 0, z_max = 0;
+    double steepness = 0, z_steep = 0;  // largest |r'| r_min / r: O(1) on a catenoidal neck, unbounded at an overhang
+    double symbol = 0, z_symbol = 0;  // smallest principal symbol f_HH + 2 f_HK x + f_KK x^2, x = kappa_theta (maths 2)
+    double symbol_3d = 0;             // the same over all x between the principal curvatures
+};
+
+class Forms {
+public:
+    Forms(const ProfileSpace& space, const Bending& bending);
+
+    const ProfileSpace& space() const { return space_; }
+    const Bending& bending() const { return bending_; }
+
+    double energy(const Eigen::VectorXd& x) const;
+    Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;
+    Eigen::SparseMatrix<double> hessian(const Eigen::VectorXd& x) const;
+    // INT 2 pi (r/g) phi_i phi_j dz (maths 4)
+    Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
+
+    // F = M(x) v + grad E(x), the gradient flow being F(x, x_t) = 0. Arrays of space().size() numbers.
+    // False, with F unusable, if the radius is not positive at a quadrature point.
+    bool residual(const double* x, const double* v, double* F) const;
+    // dF/dx + cj dF/dv, into the values of a matrix with pattern().
+    void jacobian(const double* x, const double* v, double cj, double* values) const;
+    // Compressed columns shared by hessian, mass and jacobian.
+    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+
+    // The rate x_t of the flow at x. Throws SolveError when the mass matrix is singular.
+    Eigen::VectorXd rate(const Eigen::VectorXd& x) const;
+
+    // `defect`, if given, receives for each element the energy lost to the spline there: half the second
+    // variation of the best approximation error, from the jumps of the highest derivative
+    // (docs/decisions.md), over the whole period.
+    Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
+    // E_ref (design): the scale that the asked accuracy refers to.
+    double reference_energy(const Eigen::VectorXd& x) const;
+    // Functionals of the coefficients that give the cosine and sine amplitudes of the mode with n waves
+    // over the period.
+    std::array<Eigen::VectorXd, 2> mode(int n) const;
+
+private:
+    template <int P>
+    bool residual_kernel(const double* x, const double* v, double* F) const;
+    template <int P>
+    void jacobian_kernel(const Bending& bending, const double* x, const double* v, double cj, double* values) const;
+    template <int P>
+    Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
+    void jacobian_of(const Bending& bending, const double* x, const double* v, double cj, double* values) const;
+
+    const ProfileSpace& space_;
+    Bending bending_;
+    double images_;  // cells in the whole period
+    Eigen::SparseMatrix<double> pattern_;
+    std::vector<double> defect_scale_;  // of each element, see observe()
+    std::vector<int> slots_;            // place in pattern_ of the local matrix entries of each element
+};
+
+}  // namespace tubule::axisym

@@ -1,0 +1,29 @@
+// A profile as a record of the result file: what a reader wants to see, and what a run needs to go on.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "axisym/splines/profile_space.hpp"
+#include "common/result/result.hpp"
+
+namespace tubule::axisym {
+
+// Everything a run carries from one step to the next, but for the integrator's history.
+struct RestartState {
+    Cell cell;
+    std::vector<double> breaks;
+    Eigen::VectorXd coefficients, error_total, error_spatial;
+    double reference_energy = 0, energy_start = 0, dissipated = 0, error_max = 0;
+    double time_tolerance = 0, defect = 0, least_symbol = 0;
+};
+
+// Numbers degree, length, energy; arrays knots, coefficients (the spline over the period [0, length]), sampled
+// z, r, H, K, u_n (normal velocity); and the restart state under names that begin with restart_.
+Record frame_record(double time, const ProfileSpace& space, const RestartState& state, const Eigen::VectorXd& rate,
+                    double energy);
+
+// Throws std::runtime_error if the record is no frame of this tier.
+RestartState restart_state(const Record& record);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,248 @@
+#include "axisym/integration/flow.hpp"
+
+#include <fmt/format.h>
+#include <idas/idas.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sunlinsol/sunlinsol_klu.h>
+#include <sunmatrix/sunmatrix_sparse.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace tubule::axisym {
+
+FlowCounters& FlowCounters::operator+=(const FlowCounters& o) {
+    steps += o.steps, residuals += o.residuals, jacobians += o.jacobians;
+    newton_iterations += o.newton_iterations, error_failures += o.error_failures, newton_failures += o.newton_failures;
+    return *this;
+}
+
+struct Flow::Impl {
+    FlowSystem system;
+    SUNContext context = nullptr;
+    N_Vector x = nullptr, v = nullptr, slope = nullptr, dissipated = nullptr, scratch = nullptr, weights = nullptr;
+    SUNMatrix jacobian = nullptr;
+    SUNLinearSolver solver = nullptr;
+    SUNNonlinearSolver newton = nullptr;
+    double first_correction = 0;  // of the iteration that is under way
+    void* ida = nullptr;
+    double time = 0;
+    int guard = -1;
+    std::string message;
+
+    explicit Impl(FlowSystem s) : system(std::move(s)) {}
+    ~Impl() {
+        IDAFree(&ida);
+        if (newton) SUNNonlinSolFree(newton);
+        SUNLinSolFree(solver);
+        SUNMatDestroy(jacobian);
+        for (N_Vector n : {x, v, slope, dissipated, scratch, weights}) N_VDestroy(n);
+        SUNContext_Free(&context);
+    }
+};
+
+namespace {
+
+double* data(N_Vector n) {
+    return N_VGetArrayPointer(n);
+}
+
+template <class Impl>
+int residual(double, N_Vector x, N_Vector v, N_Vector F, void* user) {
+    return static_cast<Impl*>(user)->system.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
+}
+
+void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
+    std::copy_n(pattern.outerIndexPtr(), pattern.cols() + 1, SUNSparseMatrix_IndexPointers(J));
+    std::copy_n(pattern.innerIndexPtr(), pattern.nonZeros(), SUNSparseMatrix_IndexValues(J));
+}
+
+template <class Impl>
+int jacobian(double, double cj, N_Vector x, N_Vector v, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector,
+             N_Vector) {
+    const FlowSystem& system = static_cast<Impl*>(user)->system;
+    set_pattern(*system.pattern, J);  // IDA zeroes the whole matrix before each call
+    system.jacobian(data(x), data(v), cj, SUNSparseMatrix_Data(J));
+    return 0;
+}
+
+template <class Impl>
+int dissipation(double t, N_Vector x, N_Vector v, N_Vector rate, void* user) {
+    auto* self = static_cast<Impl*>(user);
+    // The only place where IDA shows the rates of the accepted corrector: what it returns are slopes of its dense
+    // output.
+    N_VScale(1, v, self->v);
+    data(rate)[0] = self->system.dissipation(t, data(x), data(v));
+    return 0;
+}
+
+template <class Impl>
+int guard_values(double t, N_Vector x, N_Vector v, double* values, void* user) {
+    auto* self = static_cast<Impl*>(user);
+    const Guards guards = self->system.guards(t, data(x), data(v));
+    std::copy(guards.begin(), guards.end(), values);
+    return 0;
+}
+
+// As IDA's own test, but for the first correction, which it may take for the last.
+template <class Impl>
+int has_converged(SUNNonlinearSolver newton, N_Vector, N_Vector correction, double tolerance, N_Vector weights,
+                  void* user) {
+    auto* self = static_cast<Impl*>(user);
+    const double size = N_VWrmsNorm(correction, weights);
+    int count = 0;
+    SUNNonlinSolGetCurIter(newton, &count);
+    if (count == 0) {
+        self->first_correction = size;
+        return size <= 1e-4 * tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
+    }
+    if (size <= 0.1 * tolerance) return SUN_NLS_SUCCESS;  // as small as rounding lets it become, perhaps
+    const double rate = std::pow(size / self->first_correction, 1.0 / count);
+    if (rate > 0.9) return SUN_NLS_CONV_RECVR;
+    return rate / (1 - rate) * size <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
+}
+
+template <class Impl>
+void keep_message(int, const char*, const char*, char* text, void* user) {
+    static_cast<Impl*>(user)->message = text;
+}
+
+void require(int status, const char* what) {
+    if (status < 0) throw std::runtime_error(fmt::format("IDA refused {} (status {})", what, status));
+}
+
+}  // namespace
+
+Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+           const TimeControl& control)
+    : impl_(std::make_unique<Impl>(std::move(system))) {
+    Impl& s = *impl_;
+    static_assert(sizeof(sunindextype) == sizeof(std::int64_t) || sizeof(sunindextype) == sizeof(int));
+    s.time = t0;
+    const int n = static_cast<int>(x0.size());
+    require(SUNContext_Create(nullptr, &s.context), "a context");
+    s.x = N_VNew_Serial(n, s.context);
+    s.v = N_VNew_Serial(n, s.context);
+    s.slope = N_VNew_Serial(n, s.context);
+    s.scratch = N_VNew_Serial(n, s.context);
+    std::copy_n(x0.data(), n, data(s.x));
+    std::copy_n(v0.data(), n, data(s.v));
+    s.ida = IDACreate(s.context);
+    IDASetErrHandlerFn(s.ida, keep_message<Impl>, &s);
+    require(IDASetUserData(s.ida, &s), "the user data");
+    require(IDAInit(s.ida, residual<Impl>, t0, s.x, s.v), "the initial state");
+    s.weights = N_VNew_Serial(n, s.context);
+    N_VConst(control.absolute, s.weights);
+    for (Eigen::Index i = 0; i < s.system.scale.size(); ++i) data(s.weights)[i] *= s.system.scale[i];
+    require(IDASVtolerances(s.ida, control.relative, s.weights), "the tolerances");
+    if (s.system.differential.size() > 0) {
+        std::copy_n(s.system.differential.data(), n, data(s.scratch));
+        require(IDASetId(s.ida, s.scratch), "the kinds of unknowns");
+        require(IDASetSuppressAlg(s.ida, true), "the error test");
+    }
+    require(IDASetMaxOrd(s.ida, control.max_order), "the order");
+    // Newton much more exact than the error test asks, and a Jacobian never far off: fewer steps and fewer
+    // failures, and errors that follow the tolerance (docs/decisions.md).
+    require(IDASetNonlinConvCoef(s.ida, control.newton), "the Newton tolerance");
+    require(IDASetDeltaCjLSetup(s.ida, 0.1), "the Jacobian's life");
+    require(IDASetInitStep(s.ida, control.first_step), "the first step");
+    s.jacobian = SUNSparseMatrix(n, n, s.system.pattern->nonZeros(), CSC_MAT, s.context);
+    set_pattern(*s.system.pattern, s.jacobian);
+    s.solver = SUNLinSol_KLU(s.x, s.jacobian, s.context);
+    require(SUNLinSol_KLUSetOrdering(s.solver, s.system.banded ? 2 : 0), "the ordering");
+    require(IDASetLinearSolver(s.ida, s.solver, s.jacobian), "the linear solver");
+    require(IDASetJacFn(s.ida, jacobian<Impl>), "the Jacobian");
+    if (control.two_iterations) {
+        s.newton = SUNNonlinSol_Newton(s.x, s.context);
+        require(IDASetNonlinearSolver(s.ida, s.newton), "the nonlinear solver");
+        require(SUNNonlinSolSetConvTestFn(s.newton, has_converged<Impl>, &s), "the test of convergence");
+    }
+    require(IDARootInit(s.ida, n_guards, guard_values<Impl>), "the guards");
+    require(IDASetNoInactiveRootWarn(s.ida), "the guards");
+    s.dissipated = N_VNew_Serial(1, s.context);
+    N_VConst(0, s.dissipated);
+    require(IDAQuadInit(s.ida, dissipation<Impl>, s.dissipated), "the dissipation integral");
+}
+
+Flow::~Flow() = default;
+
+Flow::Outcome Flow::advance(double t_end) {
+    Impl& s = *impl_;
+    require(IDASetStopTime(s.ida, t_end), "the end time");
+    const int status = IDASolve(s.ida, t_end, &s.time, s.x, s.slope, IDA_ONE_STEP);
+    if (status == IDA_TSTOP_RETURN) return Outcome::end;
+    if (status == IDA_ROOT_RETURN) {
+        N_VScale(1, s.slope, s.v);  // the corrector's rates are those of the step's end, beyond the guard
+        std::array<int, n_guards> found{};
+        IDAGetRootInfo(s.ida, found.data());
+        s.guard =
+            static_cast<int>(std::find_if(found.begin(), found.end(), [](int f) { return f != 0; }) - found.begin());
+        return Outcome::guard;
+    }
+    return status < 0 ? Outcome::failed : Outcome::step;
+}
+
+double Flow::time() const {
+    return impl_->time;
+}
+const double* Flow::x() const {
+    return data(impl_->x);
+}
+const double* Flow::v() const {
+    return data(impl_->v);
+}
+
+void Flow::interpolate(double t, double* x, double* v) const {
+    const auto n = N_VGetLength(impl_->x);
+    for (int k = 0; k < 2; ++k) {
+        require(IDAGetDky(impl_->ida, t, k, impl_->scratch), "dense output");
+        std::copy_n(data(impl_->scratch), n, k == 0 ? x : v);
+    }
+}
+
+Eigen::VectorXd Flow::acceleration() const {
+    if (order() < 2) return Eigen::VectorXd::Zero(N_VGetLength(impl_->x));
+    require(IDAGetDky(impl_->ida, impl_->time, 2, impl_->scratch), "the acceleration");
+    return Eigen::Map<const Eigen::VectorXd>(data(impl_->scratch), N_VGetLength(impl_->x));
+}
+
+double Flow::dissipated(double t) const {
+    require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
+    return data(impl_->dissipated)[0];
+}
+
+double Flow::step_size() const {
+    double h = 0;
+    IDAGetLastStep(impl_->ida, &h);
+    return h;
+}
+
+int Flow::order() const {
+    int k = 0;
+    IDAGetLastOrder(impl_->ida, &k);
+    return k;
+}
+
+int Flow::tripped() const {
+    return impl_->guard;
+}
+std::string Flow::failure() const {
+    return impl_->message;
+}
+
+FlowCounters Flow::counters() const {
+    FlowCounters c;
+    IDAGetNumSteps(impl_->ida, &c.steps);
+    IDAGetNumResEvals(impl_->ida, &c.residuals);
+    IDAGetNumJacEvals(impl_->ida, &c.jacobians);
+    IDAGetNumErrTestFails(impl_->ida, &c.error_failures);
+    IDAGetNonlinSolvStats(impl_->ida, &c.newton_iterations, &c.newton_failures);
+    return c;
+}
+
+}  // namespace tubule::axisym

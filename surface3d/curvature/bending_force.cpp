@@ -1,0 +1,83 @@
+#include "surface3d/curvature/bending_force.hpp"
+
+#include <set>
+
+#include "common/geometry/profile_point.hpp"
+#include "surface3d/fem/projection.hpp"
+
+namespace tubule::surface3d {
+
+Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
+                    const Bending& bending) {
+    // Summed up cell by cell, so that the answer does not depend on the number of threads.
+    constexpr int n = static_cast<int>(n_bending_terms) + 5;
+    Eigen::Matrix<double, n, Eigen::Dynamic> of_cell(n, space.cells());
+    const Tabulation& table = space.tabulation();
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        const auto H = space.gather(curvature.H, cell), K = space.gather(curvature.K, cell);
+        Eigen::Matrix<double, n, 1> sum = Eigen::Matrix<double, n, 1>::Zero();
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const double dS = table.weight[q] * p.area, h = H.dot(table.value.col(q)), k = K.dot(table.value.col(q));
+            double magnitude = 0;
+            for_each_bending_term([&](std::size_t i, const auto& term) {
+                sum[i] += dS * bending.k[i] * term.value(h, k, bending.H0);
+                magnitude += std::abs(bending.k[i]) * term.magnitude(h, k, bending.H0);
+            });
+            // The flux of (x, y, 0)/2, which also holds for a period of a tube.
+            const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
+            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude);
+        }
+        of_cell.col(cell) = sum;
+    });
+    const Eigen::Matrix<double, n, 1> total = of_cell.rowwise().sum();
+    Observables o;
+    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = total[i];
+    o.area = total[n - 5], o.volume = total[n - 4], o.integral_H2 = total[n - 3], o.integral_K = total[n - 2];
+    o.magnitude = total[n - 1];
+    return o;
+}
+
+int euler_characteristic(const CurvedMesh& mesh) {
+    std::set<int> vertices;
+    for (int cell = 0; cell < mesh.triangles(); ++cell)
+        for (int c = 0; c < 3; ++c) vertices.insert(mesh.node(cell, c));
+    return static_cast<int>(vertices.size()) - mesh.triangles() / 2;  // every triangle has three halves of an edge
+}
+
+double gauss_bonnet_defect(const Observables& o, const CurvedMesh& mesh) {
+    return o.integral_K - 2 * pi * euler_characteristic(mesh);
+}
+
+VectorField bending_force(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
+                          const Bending& bending) {
+    const Tabulation& table = space.tabulation();
+    VectorField force = VectorField::Zero(3, space.size());
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), normals = space.gather(curvature.normal, cell);
+        const CellColumns<6> tensors = space.gather(curvature.B, cell);
+        const auto H = space.gather(curvature.H, cell), K = space.gather(curvature.K, cell);
+        CellColumns<3> out = CellColumns<3>::Zero(3, space.width());
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const CellColumns<3> grad = gradients(p, table, q);
+            const auto phi = table.value.col(q);
+            const double h = H.dot(phi), k = K.dot(phi);
+            const Eigen::Vector3d nu = (normals * phi).normalized();
+            const Eigen::Matrix3d B = tensor(tensors * phi);
+            const CurvatureJet<double> f = density(bending, h, k);
+
+            const Eigen::Vector3d grad_H = grad * H, grad_K = grad * K;
+            const Eigen::Vector3d grad_fK = f.HK * grad_H + f.KK * grad_K;
+            const Eigen::Vector3d s = f.HH * grad_H + f.HK * grad_K + h * grad_fK - B * grad_fK;
+            const double c = (h * h - 2 * k) * f.H + h * k * f.K - h * f.f;
+            const double dS = table.weight[q] * p.area;
+            out += (dS * nu) * (s.transpose() * grad) - (dS * (B * s + c * nu)) * phi.transpose();
+        }
+        for (int a = 0; a < space.width(); ++a) force.col(space.node(cell, a)) += out.col(a);
+    });
+    return force;
+}
+
+}  // namespace tubule::surface3d

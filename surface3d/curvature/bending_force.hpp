@@ -1,0 +1,40 @@
+// Energies of a curved mesh and the bending force on it, from recovered curvatures.
+#pragma once
+
+#include <array>
+
+#include "common/energy/bending.hpp"
+#include "surface3d/curvature/curvature.hpp"
+
+namespace tubule::surface3d {
+
+// Integrals over the surface; of one period where it is periodic.
+struct Observables {
+    std::array<double, n_bending_terms> energy_term{};
+    double energy = 0, area = 0, volume = 0;
+    double integral_H2 = 0, integral_K = 0;
+    double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this
+};
+
+// The energy is INT f(H, K) dS with the recovered fields H, K.
+Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
+                    const Bending& bending);
+
+// Vertices - edges + triangles: 2 for a sphere, 0 for a torus or a periodic tube.
+int euler_characteristic(const CurvedMesh& mesh);
+
+// INT K dS - 2 pi chi, which a surface has not: how far the curvatures are from belonging to one.
+double gauss_bonnet_defect(const Observables& o, const CurvedMesh& mesh);
+
+// 16 pi, for no closed surface has less INT H^2 (Willmore): a run below it is spurious.
+inline constexpr double willmore_bound = 16 * 3.14159265358979323846;
+
+// (b, phi_a e_d) for node a and direction d, one column a node: the weak form (maths 2)
+//   (b, v) = (grad f_H + (HP-B) grad f_K, grad w) - (|B|^2 f_H + H K f_K - H f, w),   w = v.nu,
+// with the recovered normal and curvatures, and grad w = SUM nu_d grad v_d - B v. It belongs to the energy of the
+// smooth surface: it is not the derivative of observe().energy, which a change of curvature reaches through the
+// recovery, but the two approach each other at the order of the recovered gradients or better (docs/curvature.md).
+VectorField bending_force(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
+                          const Bending& bending);
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,86 @@
+#include "surface3d/curvature/surface_modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <stdexcept>
+
+#include "common/geometry/profile_point.hpp"
+#include "common/shapes/sphere.hpp"
+#include "surface3d/fem/surface_space.hpp"
+#include "surface3d/mesh/reference_triangle.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+// Calls visit(X, X_xi, X_eta, weight) at the points of a rule on every cell.
+template <class Visit>
+void for_each_point(const CurvedMesh& mesh, Visit&& visit) {
+    const Tabulation table(mesh.order, quadrature(12));
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int q = 0; q < table.points(); ++q)
+            visit(Eigen::Vector3d(X * table.value.col(q)), Eigen::Vector3d(X * table.d[0].col(q)),
+                  Eigen::Vector3d(X * table.d[1].col(q)), table.weight[q]);
+    }
+}
+
+}  // namespace
+
+CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells) {
+    const auto points = std::find_if(frame.arrays.begin(), frame.arrays.end(),
+                                     [](const Array& array) { return array.name == "points"; });
+    if (points == frame.arrays.end() || points->data.size() < 3 * cells.nodes)
+        throw std::invalid_argument("the frame has no points on its mesh");
+    CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
+    for (std::size_t i = 0; i < cells.nodes; ++i)
+        mesh.nodes.emplace_back(Eigen::Map<const Eigen::Vector3d>(&points->data[3 * i]));
+    return mesh;
+}
+
+double tube_mode_amplitude(const CurvedMesh& tube, int n, int m) {
+    if (!(tube.period > 0)) throw std::invalid_argument("a closed surface has no waves along z");
+    std::complex<double> with = 0, against = 0;
+    for_each_point(tube, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
+        const double r2 = X[0] * X[0] + X[1] * X[1], theta = std::atan2(X[1], X[0]);
+        const double theta_xi = (X[0] * X_xi[1] - X[1] * X_xi[0]) / r2,
+                     theta_eta = (X[0] * X_eta[1] - X[1] * X_eta[0]) / r2;
+        const double part = weight * std::sqrt(r2) * (theta_xi * X_eta[2] - theta_eta * X_xi[2]),
+                     phase = 2 * pi * n * X[2] / tube.period;
+        with += part * std::polar(1.0, -phase - m * theta);
+        against += part * std::polar(1.0, -phase + m * theta);
+    });
+    const double scale = 1 / (pi * tube.period);
+    if (n == 0 && m == 0) return scale / 2 * with.real();
+    // A ring wave, and one without waves around, are their own counterparts.
+    return scale * (n == 0 || m == 0 ? std::abs(with) : std::hypot(std::abs(with), std::abs(against)));
+}
+
+double sphere_mode_amplitude(const CurvedMesh& surface, int l, int m) {
+    if (surface.period > 0) throw std::invalid_argument("a tube has no spherical harmonics");
+    if (l == 1 || l < 0 || m < 0 || m > l)
+        throw std::invalid_argument("a wave of a closed surface has l >= 2 and 0 <= m <= l; l = 1 is its place");
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    double area = 0;
+    for_each_point(surface, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
+        const double dS = weight * X_xi.cross(X_eta).norm();
+        area += dS, middle += dS * X;
+    });
+    middle /= area;
+    double mean = 0, re = 0, im = 0;
+    for_each_point(surface, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
+        const Eigen::Vector3d x = X - middle;
+        const double rho = x.norm(), part = weight * rho * x.dot(X_xi.cross(X_eta)) / (rho * rho * rho);
+        const Eigen::Vector3d at = x / rho;
+        mean += part / (4 * pi);
+        re += part * real_harmonic(l, m, Vector3<double>(at));
+        if (m == 0) return;
+        const double c = std::cos(pi / (2 * m)), s = std::sin(pi / (2 * m));  // turned back by a quarter wave: Im Y
+        im += part * real_harmonic(l, m, Vector3<double>(c * at[0] + s * at[1], c * at[1] - s * at[0], at[2]));
+    });
+    if (l == 0) return mean;
+    // INT (Re Y)^2 is 1 for m = 0, else 1/2.
+    return std::hypot(re, im) * (m == 0 ? 1 : 2) / mean;
+}
+
+}  // namespace tubule::surface3d

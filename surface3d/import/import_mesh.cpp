@@ -1,0 +1,184 @@
+#include "surface3d/import/import_mesh.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <unordered_map>
+
+#include "surface3d/import/import_formats.hpp"
+#include "surface3d/import/import_text.hpp"
+
+namespace tubule::surface3d {
+
+namespace {
+
+constexpr std::size_t corners_max = 1000;  // of a polygon: cutting costs the cube of it
+
+std::string contents(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw MeshError(fmt::format("{}: {}", path.string(), std::strerror(errno)));
+    if (std::filesystem::is_directory(path)) throw MeshError(path.string() + ": is a directory");
+    std::string data{std::istreambuf_iterator<char>(file), {}};
+    if (file.bad()) throw MeshError(path.string() + ": cannot be read to its end");
+    if (data.empty()) throw MeshError(path.string() + ": is empty");
+    return data;
+}
+
+FileMesh read_file(const std::filesystem::path& path) {
+    const std::string extension = path.extension().string(), name = path.string();
+    const auto reader = is_keyword(extension, ".obj")   ? read_obj
+                        : is_keyword(extension, ".off") ? read_off
+                        : is_keyword(extension, ".ply") ? read_ply
+                        : is_keyword(extension, ".stl") ? read_stl
+                                                        : nullptr;
+    if (!reader) throw MeshError(fmt::format("{}: the extension must be .obj, .off, .ply or .stl", name));
+    return reader(name, contents(path));
+}
+
+// Checks each face's vertices and cuts what has more than three.
+void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& out) {
+    const std::int64_t vertices = std::int64_t(file.points.size());
+    for (const std::vector<FileCorner>& face : file.faces) {
+        if (face.size() > corners_max) {
+            throw MeshError(
+                at(name, face[0].place) +
+                fmt::format("a face of {} vertices; at most {} can be cut into triangles", face.size(), corners_max));
+        }
+        std::vector<Eigen::Vector3d> corners;
+        for (std::size_t i = 0; i < face.size(); ++i) {
+            const auto [vertex, place] = face[i];
+            if (vertex < 0 || vertex >= vertices) {
+                throw MeshError(at(name, place) + fmt::format("the face needs vertex {}, but vertices are {} to {}",
+                                                              vertex + file.first, file.first,
+                                                              vertices - 1 + file.first));
+            }
+            for (std::size_t j = 0; j < i; ++j) {
+                if (face[j].vertex == vertex) {
+                    throw MeshError(at(name, place) + fmt::format("vertex {} is twice in one face, a degenerate one",
+                                                                  vertex + file.first));
+                }
+            }
+            corners.push_back(file.points[vertex]);
+        }
+        auto cut = face.size() == 3 ? std::vector<std::array<int, 3>>{{0, 1, 2}} : cut_polygon(corners);
+        if (cut.empty()) {
+            throw MeshError(at(name, face[0].place) +
+                            fmt::format("a face of {} vertices that crosses itself or has no area", face.size()));
+        }
+        for (const auto& [a, b, c] : cut) {
+            out.mesh.triangles.push_back({int(face[a].vertex), int(face[b].vertex), int(face[c].vertex)});
+            out.names.triangle_place.push_back(face[0].place);
+        }
+    }
+}
+
+using Cell = std::array<std::int64_t, 3>;
+
+struct CellHash {
+    std::size_t operator()(const Cell& cell) const {
+        std::uint64_t hash = 0;
+        for (const std::int64_t i : cell) hash = (hash ^ std::uint64_t(i)) * 0x9E3779B97F4A7C15u, hash ^= hash >> 29;
+        return hash;
+    }
+};
+
+// For each point the first one at the same place, or within `weld` of it.
+std::vector<int> representatives(const std::vector<Eigen::Vector3d>& points, double weld) {
+    std::unordered_multimap<Cell, int, CellHash> cells;
+    std::vector<int> first(points.size());
+    const int reach = weld > 0 ? 1 : 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        Cell home;
+        for (int d = 0; d < 3; ++d) {
+            // + 0.0 makes the two zeros one.
+            home[d] = weld > 0 ? std::int64_t(std::floor(points[i][d] / weld))
+                               : std::bit_cast<std::int64_t>(points[i][d] + 0.0);
+        }
+        first[i] = int(i);
+        for (int n = 0; n < (reach ? 27 : 1); ++n) {
+            const Cell cell{home[0] + reach * (n % 3 - 1), home[1] + reach * (n / 3 % 3 - 1),
+                            home[2] + reach * (n / 9 - 1)};
+            const auto [begin, end] = cells.equal_range(cell);
+            for (auto it = begin; it != end; ++it) {
+                if ((points[it->second] - points[i]).norm() <= weld) first[i] = std::min(first[i], it->second);
+            }
+        }
+        if (first[i] == int(i)) cells.emplace(home, int(i));
+    }
+    return first;
+}
+
+void merge_vertices(ImportedMesh& out, double weld) {
+    TriangleMesh& mesh = out.mesh;
+    const std::vector<int> exact = representatives(mesh.points, 0);
+    const std::vector<int> merged = weld > 0 ? representatives(mesh.points, weld) : exact;
+    std::vector<int> number(mesh.points.size());
+    std::vector<Eigen::Vector3d> points;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+        if (merged[i] != int(i)) continue;
+        number[i] = int(points.size());
+        points.push_back(mesh.points[i]);
+        out.names.vertex_number.push_back(std::int64_t(i) + out.names.first);
+    }
+    std::vector<std::array<int, 3>> triangles;
+    std::vector<Place> places;
+    const auto collapsed = [](const std::vector<int>& to, const std::array<int, 3>& t) {
+        return to[t[0]] == to[t[1]] || to[t[1]] == to[t[2]] || to[t[2]] == to[t[0]];
+    };
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const std::array<int, 3>& old = mesh.triangles[t];
+        // One that had no area before stays, to be named and refused.
+        if (collapsed(merged, old) && !collapsed(exact, old)) continue;
+        triangles.push_back({number[merged[old[0]]], number[merged[old[1]]], number[merged[old[2]]]});
+        places.push_back(out.names.triangle_place[t]);
+    }
+    const std::size_t lost = mesh.triangles.size() - triangles.size();
+    if (lost > 0)
+        out.notes.push_back(fmt::format("{} triangles collapsed by welding vertices and were dropped.", lost));
+    mesh.points = std::move(points);
+    mesh.triangles = std::move(triangles);
+    out.names.triangle_place = std::move(places);
+}
+
+}  // namespace
+
+std::string triangle_name(const MeshNames& names, std::size_t triangle) {
+    std::string name = fmt::format("triangle {}", std::int64_t(triangle) + names.first);
+    if (names.triangle_place.empty()) return name;
+    const Place& place = names.triangle_place[triangle];
+    return name + (place.line ? fmt::format(" (line {})", place.line) : fmt::format(" (byte {})", place.byte));
+}
+
+std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::size_t vertex) {
+    const std::int64_t number =
+        names.vertex_number.empty() ? std::int64_t(vertex) + names.first : names.vertex_number[vertex];
+    const Eigen::Vector3d& x = mesh.points[vertex];
+    return fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", number, x[0], x[1], x[2]);
+}
+
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld) {
+    if (!(weld >= 0) || !std::isfinite(weld))
+        throw MeshError(fmt::format("{}: weld must be a number >= 0, not {}", path.string(), weld));
+    const FileMesh file = read_file(path);
+    if (file.faces.empty()) throw MeshError(path.string() + ": there are no faces in it");
+    double size = 0;
+    for (const Eigen::Vector3d& x : file.points) size = std::max(size, x.lpNorm<Eigen::Infinity>());
+    if (weld > 0 && weld < 1e-15 * size) {
+        throw MeshError(
+            fmt::format("{}: weld = {:g} is below the rounding of coordinates up to {:g}", path.string(), weld, size));
+    }
+    ImportedMesh out;
+    out.names.file = path.string();
+    out.names.first = file.first;
+    out.mesh.points = file.points;
+    add_triangles(file, path.string(), out);
+    merge_vertices(out, weld);
+    return out;
+}
+
+}  // namespace tubule::surface3d

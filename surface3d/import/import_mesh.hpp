@@ -1,0 +1,48 @@
+// Closed surfaces from files: OBJ, OFF, PLY (ascii, binary of both byte orders) and STL (ascii, binary).
+// The way of a mesh: read_mesh -> close_mesh (import_check.hpp) -> fit_surface (import_fit.hpp).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "surface3d/mesh/triangle_mesh.hpp"
+
+namespace tubule::surface3d {
+
+// A mesh that cannot be used; what() begins with the file and, where the file has them, line and column
+// ("scan.obj:12:5: ..."), or the byte ("scan.stl: byte 134: ...").
+struct MeshError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Where in its file something stands: line and column from 1 in text, line = 0 and a byte from 0 in binary.
+struct Place {
+    std::size_t line = 0, column = 0, byte = 0;
+};
+
+// What the elements of a mesh are called in messages. Triangles are named by number and place, vertices by number
+// and coordinates, both counted as the file does (OBJ from 1, the others from 0).
+struct MeshNames {
+    std::string file = "mesh";
+    std::int64_t first = 0;                   // number of the first vertex and triangle
+    std::vector<std::int64_t> vertex_number;  // empty: as in memory
+    std::vector<Place> triangle_place;        // empty: without
+};
+std::string triangle_name(const MeshNames& names, std::size_t triangle);
+std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::size_t vertex);
+
+struct ImportedMesh {
+    TriangleMesh mesh;
+    MeshNames names;
+    std::vector<std::string> notes;  // what was changed on the way, in whole sentences
+};
+
+// The triangles of a file, its format told by the extension (.obj .off .ply .stl, in either case). Polygons become
+// triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and
+// triangles that collapse by that are dropped, with a note. Throws MeshError, never returning half a file.
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0);
+
+}  // namespace tubule::surface3d

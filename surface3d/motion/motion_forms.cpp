@@ -1,0 +1,365 @@
+#include "surface3d/motion/motion_forms.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tubule::surface3d {
+namespace {
+
+// Whether the density depends on H, on K: told from a point of no symmetry.
+struct Dependence {
+    bool H, K;
+};
+Dependence dependence(const Bending& bending) {
+    const CurvatureJet<double> f = density(bending, bending.H0 + 0.7310, 0.3170);
+    return {f.H != 0, f.K != 0};
+}
+
+// Taylor-Hood where the surface flows.
+int pressure_order(const MotionLaw& law, const CurvedMesh& mesh) {
+    return !law.inextensible ? 0 : law.flows ? mesh.order - 1 : mesh.order;
+}
+
+}  // namespace
+
+MotionUnknowns::MotionUnknowns(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending)
+    : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K, pressure_order(law, mesh)) {
+    int next = law.components() * nodes();
+    if (dependence(bending).H) H = std::exchange(next, next + nodes());
+    if (dependence(bending).K) K = std::exchange(next, next + nodes());
+    if (law.inextensible) p = next;
+}
+
+namespace {
+
+using Frame = Eigen::Matrix<double, 3, 2>;
+
+// What the forms of one cell are made of, stacked over its quadrature points: one column a function, one row a point
+// (two or three where there are components in the tangent plane).
+struct CellTables {
+    Eigen::MatrixXd phi, grad;  // functions of P_k, gradients
+    Eigen::MatrixXd psi;        // pressure
+    Eigen::MatrixXd psi_grad;
+    Eigen::MatrixXd normal, normal_grad;  // v.nu, G(v) = grad(v.nu)
+    Eigen::MatrixXd strain, divergence;   // sigma(v) as (11, 22, sqrt(2) 12), div_P v
+};
+
+struct CellWork {
+    CellTables t;
+    CellMatrix advection;                  // (c.grad phi_b, phi_a), c = u* - w* along the surface
+    Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
+    Eigen::MatrixXd block;
+    Eigen::VectorXd rhs, flux, load, force;
+};
+
+class Assembler {
+public:
+    Assembler(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+              const StepBase& base)
+        : space_(space),
+          unknowns_(unknowns),
+          law_(law),
+          bending_(bending),
+          base_(base),
+          table_(space.tabulation()),
+          pressure_table_(space.tabulation(unknowns.p < 0 ? 1 : unknowns.last_mesh().order)),
+          n_(space.width()),
+          nv_(law.components() * n_),
+          H_(unknowns.H < 0 ? -1 : nv_),
+          K_(unknowns.K < 0 ? -1 : nv_ + (H_ < 0 ? 0 : n_)),
+          p_(unknowns.p < 0 ? -1 : unknowns.width() - pressure_table_.functions()) {}
+
+    void add_cell(int cell, CellWork& work, StepSystem& system) const;
+
+private:
+    // The state at a point.
+    struct Point {
+        double dS, width, H, K, B2, trace;
+        Eigen::Vector3d normal;         // continuous
+        Frame e;                        // orthonormal, tangential
+        Eigen::Matrix<double, 2, 3> B;  // e^T B
+        Eigen::Matrix2d S;              // HP - B
+        CurvatureJet<double> f;
+    };
+
+    void size(CellWork& work) const;
+    Point point(const SurfacePoint<double>& p, const CellColumns<3>& gradient, const CellColumns<3>& normals, int cell,
+                int q) const;
+    void fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const;
+    void add_advection(const std::vector<Point>& at, int cell, CellWork& work) const;
+    void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
+    void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
+    void add_pressure(const std::vector<Point>& at, CellWork& work) const;
+    void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
+
+    const SurfaceSpace& space_;
+    const MotionUnknowns& unknowns_;
+    const MotionLaw& law_;
+    const Bending& bending_;
+    const StepBase& base_;
+    const Tabulation& table_;
+    Tabulation pressure_table_;
+    int n_, nv_, H_, K_, p_;  // nodes and velocities of a cell, first columns of its blocks
+};
+
+void Assembler::size(CellWork& work) const {
+    const int Q = table_.points(), w = unknowns_.width();
+    CellTables& t = work.t;
+    t.phi.resize(Q, n_), t.grad.resize(2 * Q, n_);
+    t.normal.resize(Q, nv_), t.normal_grad.resize(2 * Q, nv_);
+    if (law_.flows) t.strain.resize(3 * Q, nv_);
+    if (p_ >= 0) {
+        t.divergence.resize(Q, nv_), t.psi.resize(Q, pressure_table_.functions());
+        if (!law_.flows) t.psi_grad.resize(2 * Q, pressure_table_.functions());
+    }
+    work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
+    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w), work.force.setZero(w);
+}
+
+Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
+                                  const CellColumns<3>& normals, int cell, int q) const {
+    Point at;
+    const auto phi = table_.value.col(q);
+    at.dS = table_.weight[q] * p.area;
+    at.width = triangle_width(p);
+    at.H = at.K = 0;
+    for (int a = 0; a < n_; ++a) {
+        at.H += phi[a] * base_.fields.H[space_.node(cell, a)];
+        at.K += phi[a] * base_.fields.K[space_.node(cell, a)];
+    }
+    at.normal = (normals * phi).normalized();
+    const Eigen::Matrix3d B = shape_operator(p, gradient, normals);
+    at.e.col(0) = p.tangent[0].normalized();
+    at.e.col(1) = p.normal.cross(at.e.col(0));
+    at.B = at.e.transpose() * B;
+    at.trace = B.trace();
+    at.B2 = B.squaredNorm();
+    at.S = at.trace * Eigen::Matrix2d::Identity() - at.B * at.e;
+    at.f = density(bending_, at.H, at.K);
+    return at;
+}
+
+void Assembler::fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const {
+    const auto phi = table_.value.col(q);
+    const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_cell_nodes> g = at.e.transpose() * gradient;
+    t.phi.row(q) = phi.transpose();
+    t.grad.middleRows<2>(2 * q) = g;
+    if (p_ >= 0) t.psi.row(q) = pressure_table_.value.col(q).transpose();
+    if (!law_.flows) {
+        t.normal.row(q) = phi.transpose();
+        t.normal_grad.middleRows<2>(2 * q) = g;
+        if (p_ >= 0) {
+            t.divergence.row(q) = -at.H * phi.transpose();
+            t.psi_grad.middleRows<2>(2 * q) = g;  // the pressure is P_k as well
+        }
+        return;
+    }
+    for (int d = 0; d < 3; ++d) {
+        const auto columns = Eigen::seqN(d * n_, n_);
+        const double e1 = at.e(d, 0), e2 = at.e(d, 1);
+        t.normal(q, columns) = at.normal[d] * phi.transpose();
+        t.normal_grad(Eigen::seqN(2 * q, 2), columns) = at.normal[d] * g - at.B.col(d) * phi.transpose();
+        t.strain(3 * q, columns) = e1 * g.row(0);
+        t.strain(3 * q + 1, columns) = e2 * g.row(1);
+        t.strain(3 * q + 2, columns) = (e1 * g.row(1) + e2 * g.row(0)) / std::sqrt(2.0);
+        if (p_ >= 0) t.divergence(q, columns) = e1 * g.row(0) + e2 * g.row(1);
+    }
+}
+
+void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& work) const {
+    work.advection.setZero(n_, n_);
+    if (law_.inertia == 0) return;
+    const CellTables& t = work.t;
+    CellColumns<3> across(3, n_);
+    for (int a = 0; a < n_; ++a) {
+        const int i = space_.node(cell, a);
+        for (int d = 0; d < 3; ++d)
+            across(d, a) = base_.velocity[d * unknowns_.nodes() + i] - base_.mesh_velocity(d, i);
+    }
+    for (int q = 0; q < table_.points(); ++q) {
+        const Eigen::Vector2d c = at[q].e.transpose() * (across * table_.value.col(q));
+        work.advection.noalias() +=
+            (at[q].dS * t.phi.row(q).transpose()) * (c.transpose() * t.grad.middleRows<2>(2 * q));
+    }
+}
+
+// inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (sigma(u), sigma(v))
+void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
+    const CellTables& t = work.t;
+    const int Q = table_.points();
+    const double rate = law_.inertia / base_.te, drag = rate + law_.friction;
+    CellMatrix scalar = CellMatrix::Zero(n_, n_);
+    for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
+    if (drag != 0) scalar.noalias() += drag * (t.phi.transpose() * work.weighted1);
+    if (law_.inertia != 0) {
+        scalar += law_.inertia * work.advection;
+        CellColumns<3> past(3, n_);
+        for (int a = 0; a < n_; ++a)
+            for (int d = 0; d < 3; ++d) past(d, a) = base_.past[d * unknowns_.nodes() + space_.node(cell, a)];
+        for (int q = 0; q < Q; ++q) {
+            const Eigen::Vector3d bar = past * table_.value.col(q);
+            for (int d = 0; d < 3; ++d)
+                work.rhs.segment(d * n_, n_) += (rate * bar[d]) * work.weighted1.row(q).transpose();
+        }
+    }
+    for (int d = 0; d < law_.components(); ++d) work.block.block(d * n_, d * n_, n_, n_) += scalar;
+    if (law_.viscosity == 0) return;
+    Eigen::MatrixXd weighted = t.strain;
+    for (int q = 0; q < Q; ++q) weighted.middleRows<3>(3 * q) *= 2 * law_.viscosity * at[q].dS;
+    work.block.topLeftCorner(nv_, nv_).noalias() += t.strain.transpose() * weighted;
+}
+
+// -(grad f_H + (HP-B) grad f_K, G(v)) + (|B|^2 f_H + H K f_K - H f, v.nu), linear in H and K about those of X*
+void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& work) const {
+    const CellTables& t = work.t;
+    const int Q = table_.points();
+    const auto add = [&](int columns, const auto& gradient, const auto& value) {
+        if (columns < 0) return;
+        for (int q = 0; q < Q; ++q) {
+            work.weighted2.middleRows<2>(2 * q) = -at[q].dS * (gradient(at[q]) * t.grad.middleRows<2>(2 * q));
+            work.weighted1.row(q) = at[q].dS * value(at[q]) * t.phi.row(q);
+        }
+        auto block = work.block.block(0, columns, nv_, n_);
+        block.noalias() += t.normal_grad.transpose() * work.weighted2;
+        block.noalias() += t.normal.transpose() * work.weighted1;
+    };
+    const auto in_H = [](const Point& s) { return s.B2 * s.f.HH + s.trace * s.K * s.f.HK - s.trace * s.f.H; };
+    const auto in_K = [](const Point& s) { return s.B2 * s.f.HK + s.trace * s.K * s.f.KK - s.trace * s.f.K; };
+    add(
+        H_, [](const Point& s) { return Eigen::Matrix2d(s.f.HH * Eigen::Matrix2d::Identity() + s.f.HK * s.S); }, in_H);
+    add(
+        K_, [](const Point& s) { return Eigen::Matrix2d(s.f.HK * Eigen::Matrix2d::Identity() + s.f.KK * s.S); }, in_K);
+    for (int q = 0; q < Q; ++q) {
+        const Point& s = at[q];
+        double known = s.B2 * s.f.H + s.trace * s.K * s.f.K - s.trace * s.f.f;
+        if (H_ >= 0) known -= in_H(s) * s.H;
+        if (K_ >= 0) known -= in_K(s) * s.K;
+        work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
+        work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
+        work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
+    }
+    if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
+    if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
+}
+
+// -(p, div_P v) and -(div_P u, q); where nothing flows u = (u.nu) nu - grad p/friction.
+void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const {
+    if (p_ < 0) return;
+    const CellTables& t = work.t;
+    const int n_p = pressure_table_.functions();
+    Eigen::MatrixXd weighted = t.psi;
+    for (int q = 0; q < table_.points(); ++q) {
+        weighted.row(q) *= -at[q].dS;
+        work.load.segment(p_, n_p) -= weighted.row(q).transpose();
+    }
+    const Eigen::MatrixXd block = t.divergence.transpose() * weighted;
+    work.block.block(0, p_, nv_, n_p) += block;
+    work.block.block(p_, 0, n_p, nv_) += block.transpose();
+    if (law_.flows) return;
+    Eigen::MatrixXd slope = t.psi_grad;
+    for (int q = 0; q < table_.points(); ++q) slope.middleRows<2>(2 * q) *= -at[q].dS / law_.friction;
+    work.block.block(p_, p_, n_p, n_p).noalias() += t.psi_grad.transpose() * slope;
+}
+
+// (H, phi) + te (c.grad (H - H*), phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with
+// c = u* - w* along the surface if there is inertia, else 0, L_H on the left and of X* - Xbar and u* - w* taken
+// 1 + stiffer |B| (width) times, and what a velocity makes of them:
+//   L_H(v) = (grad(v.nu), grad phi) - (|B|^2 v.nu, phi)
+//   L_K(v) = ((HP-B) grad(v.nu), grad phi) - (H K v.nu, phi)
+// div(HP-B) = 0 makes the second the transpose of K's force, as the first is of H's.
+void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const {
+    const CellTables& t = work.t;
+    const int Q = table_.points();
+    // u* te - w* te + X* - Xbar, of which the normal part counts.
+    CellColumns<3> moved(3, n_);
+    CellColumns<1> along(1, n_);  // where nothing flows: te u*.nu
+    for (int a = 0; a < n_; ++a) {
+        const int i = space_.node(cell, a);
+        moved.col(a) = base_.displacement.col(i) - base_.te * base_.mesh_velocity.col(i);
+        along[a] = 0;
+        if (law_.flows)
+            for (int d = 0; d < 3; ++d) moved(d, a) += base_.te * base_.velocity[d * unknowns_.nodes() + i];
+        else
+            along[a] = base_.te * base_.velocity[i];
+    }
+    const auto add = [&](int rows, const Eigen::VectorXd& known, const auto& gradient, const auto& value) {
+        if (rows < 0) return;
+        for (int q = 0; q < Q; ++q) {
+            const Point& s = at[q];
+            const auto phi = table_.value.col(q);
+            const auto g = t.grad.middleRows<2>(2 * q);
+            const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_cell_nodes> Sg = gradient(s) * g;
+            const Eigen::Vector3d d = moved * phi;
+            const Eigen::Vector2d slope = g * (moved.transpose() * s.normal + along.transpose()) - s.B * d;
+            const double height = s.normal.dot(d) + along.dot(phi);
+            work.rhs.segment(rows, n_) += s.dS * (Sg.transpose() * slope - value(s) * height * phi);
+            work.weighted2.middleRows<2>(2 * q) = (base_.te * s.dS) * Sg;
+            work.weighted1.row(q) = (base_.te * s.dS * value(s)) * t.phi.row(q);
+        }
+        auto block = work.block.block(rows, 0, n_, nv_);
+        block.noalias() += work.weighted2.transpose() * t.normal_grad;
+        block.noalias() -= work.weighted1.transpose() * t.normal;
+        for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
+        CellMatrix own = base_.te * work.advection;
+        own.noalias() += t.phi.transpose() * work.weighted1;
+        work.block.block(rows, rows, n_, n_) += own;
+        work.rhs.segment(rows, n_).noalias() += own * space_.gather(known, cell);
+    };
+    add(
+        H_, base_.fields.H,
+        [&](const Point& s) {
+            const double more = base_.stiffer * std::sqrt(s.B2) * s.width;
+            return Eigen::Matrix2d((1 + more) * Eigen::Matrix2d::Identity());
+        },
+        [](const Point& s) { return s.B2; });
+    add(
+        K_, base_.fields.K, [](const Point& s) { return s.S; }, [](const Point& s) { return s.trace * s.K; });
+}
+
+void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
+    size(work);
+    const CellColumns<3> X = cell_nodes(*base_.mesh, cell), normals = space_.gather(base_.fields.normal, cell);
+    std::vector<Point> at;
+    at.reserve(table_.points());
+    for (int q = 0; q < table_.points(); ++q) {
+        const SurfacePoint<double> p = tangent_point(X, table_, q);
+        const CellColumns<3> gradient = gradients(p, table_, q);
+        at.push_back(point(p, gradient, normals, cell, q));
+        fill_tables(at.back(), gradient, q, work.t);
+    }
+    add_advection(at, cell, work);
+    add_momentum(at, cell, work);
+    add_bending(at, cell, work);
+    add_pressure(at, work);
+    add_curvature_evolution(at, cell, work);
+    unknowns_.add(system.A, cell, work.block);
+    if (law_.inertia != 0) space_.add(system.advection, cell, work.advection);
+    const int* numbers = unknowns_.of_cell(cell);
+    for (int i = 0; i < unknowns_.width(); ++i) {
+        system.b[numbers[i]] += work.rhs[i];
+        system.flux[numbers[i]] += work.flux[i];
+        system.pressure_load[numbers[i]] += work.load[i];
+        system.force[numbers[i]] += work.force[i];
+    }
+}
+
+}  // namespace
+
+void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+              const StepBase& base, StepSystem& system) {
+    if (system.A.size() == 0) system.A = unknowns.pattern();
+    std::fill_n(system.A.valuePtr(), system.A.nonZeros(), 0.0);
+    if (law.inertia != 0 && system.advection.size() == 0) system.advection = space.pattern();
+    std::fill_n(system.advection.valuePtr(), system.advection.nonZeros(), 0.0);
+    system.b.setZero(unknowns.size());
+    system.flux.setZero(unknowns.size());
+    system.pressure_load.setZero(unknowns.size());
+    system.force.setZero(unknowns.size());
+    const Assembler assembler(space, unknowns, law, bending, base);
+    space.for_each_cell([&](int cell) {
+        static thread_local CellWork work;
+        assembler.add_cell(cell, work, system);
+    });
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,48 @@
+// One step of the moving surface as a linear system: unknowns, matrix and right-hand side.
+#pragma once
+
+#include <vector>
+
+#include "common/energy/bending.hpp"
+#include "surface3d/fem/field_unknowns.hpp"
+#include "surface3d/motion/motion_fields.hpp"
+#include "surface3d/motion/motion_law.hpp"
+
+namespace tubule::surface3d {
+
+// Which fields a law has, and the numbers of their unknowns.
+struct MotionUnknowns : FieldUnknowns {
+    MotionUnknowns(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending);
+
+    int H = -1, K = -1, p = -1;  // first number of each, or -1 where there is none; the velocity begins at 0
+};
+
+// What a step is linearised about: the surface X* that is expected at its end, and what is known of its past. Over the
+// step, X = Xbar + te w and u_t = inertia (u - ubar): of backward differences of any order.
+struct StepBase {
+    const CurvedMesh* mesh;     // X*
+    MotionFields fields;        // of X*
+    VectorField displacement;   // X* - Xbar
+    VectorField mesh_velocity;  // w*, expected
+    Eigen::VectorXd velocity;   // u*, expected, as numbered in MotionUnknowns; of one or three components
+    Eigen::VectorXd past;       // ubar
+    double te = 0;              // the step, effectively
+    double stiffer = 0;         // L_H is taken by this * |B| (width of a triangle) of itself more than it is
+};
+
+struct StepSystem {
+    Eigen::SparseMatrix<double> A;
+    Eigen::VectorXd b;
+    Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
+    Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
+    Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
+    Eigen::SparseMatrix<double>
+        advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia
+};
+
+// H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in
+// both. The equations stand in docs/surface_motion.md.
+void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+              const StepBase& base, StepSystem& system);
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,122 @@
+#include "surface3d/motion/motion_measures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr int n_sums = 15;
+using Sums = Eigen::Matrix<double, n_sums, 1>;
+
+// Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p|^2.
+Sums integrals(const MotionStepper& stepper, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
+               const VectorField& rate) {
+    const SurfaceSpace& space = stepper.space();
+    const Tabulation& table = space.tabulation();
+    Eigen::Matrix<double, n_sums, Eigen::Dynamic> of_cell(n_sums, space.cells());
+    const bool slips = !stepper.law().flows && stepper.law().inextensible;
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), U = space.gather(u, cell), A = space.gather(rate, cell);
+        Sums sum = Sums::Zero();
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const CellColumns<3> grad = gradients(p, table, q);
+            const Eigen::Vector3d v = U * table.value.col(q), a = A * table.value.col(q);
+            const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - p.normal * p.normal.transpose();
+            const Eigen::Matrix3d G = P * (U * grad.transpose()), sigma = (G + G.transpose()) / 2;
+            Sums here;
+            here << v.squaredNorm(), 2 * sigma.squaredNorm(), G.squaredNorm(), G.trace() * G.trace(), a.squaredNorm(),
+                v, p.x.cross(v), p.x, slips ? (grad * space.gather(s.p, cell)).squaredNorm() : 0;
+            sum += table.weight[q] * p.area * here;
+        }
+        of_cell.col(cell) = sum;
+    });
+    return of_cell.rowwise().sum();
+}
+
+// Of the narrowest place: the curvature around a neck is that which all nodes of a cell have, as single ones may be
+// off.
+void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
+    m.neck_radius = std::numeric_limits<double>::infinity();
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        double hoop = std::numeric_limits<double>::infinity();
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a) {
+            const double H = m.fields.H[mesh.node(cell, a)], K = m.fields.K[mesh.node(cell, a)];
+            hoop = std::min(hoop, K < 0 ? std::sqrt(H * H / 4 - K) - H / 2 : 0);
+        }
+        if (hoop * m.neck_radius > 1) m.neck_radius = 1 / hoop, m.narrowest = mesh.position(cell, 0);
+    }
+}
+
+// The quadratic in x is smallest at one of the principal curvatures or in between.
+void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
+    m.symbol = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < mesh.size(); ++i) {
+        const double H = m.fields.H[i], K = m.fields.K[i], half = std::sqrt(std::max(H * H / 4 - K, 0.0));
+        const CurvatureJet<double> f = density(bending, H, K);
+        const auto at = [&](double x) { return f.HH + 2 * f.HK * x + f.KK * x * x; };
+        double least = std::min(at(H / 2 - half), at(H / 2 + half));
+        if (f.KK > 0) least = std::min(least, at(std::clamp(-f.HK / f.KK, H / 2 - half, H / 2 + half)));
+        if (!(least >= m.symbol)) m.symbol = least, m.least_symbol = mesh.nodes[i];
+    }
+}
+
+}  // namespace
+
+MotionMeasures measure(MotionStepper& stepper, const MotionState& s, const Bending& bending) {
+    const MotionLaw& law = stepper.law();
+    const SurfaceSpace& space = stepper.space();
+    const CurvedMesh mesh = stepper.mesh(s.X);
+    MotionMeasures m;
+    m.fields = stepper.fields(mesh);
+    m.bending = observe(space, mesh, {m.fields.normal, {}, m.fields.H, m.fields.K}, bending);
+    m.velocity = stepper.velocity(s, m.fields);
+    VectorField rate = VectorField::Zero(3, mesh.size());
+    if (law.inertia != 0 && s.step > 0)
+        for (int d = 0; d < 3; ++d)
+            rate.row(d) = (s.u - s.u_past).segment(d * mesh.size(), mesh.size()).transpose() / s.step;
+    const Sums sum = integrals(stepper, s, mesh, m.velocity, rate);
+    m.kinetic = law.inertia * sum[0] / 2;
+    m.dissipation = law.viscosity * sum[1] + law.friction * sum[0];
+    if (!law.flows) {  // without an error of the projection of -grad p
+        const Eigen::RowVectorXd load = stepper.flux(s.u, mesh, m.fields).transpose();
+        m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
+    }
+    m.acceleration = law.inertia * sum[4] / 2;
+    m.speed = m.velocity.colwise().norm().maxCoeff();
+    m.stretching = sum[2] > 0 ? std::sqrt(sum[3] / sum[2]) : 0;
+    m.momentum = sum.segment<3>(5), m.angular_momentum = sum.segment<3>(8);
+    m.centre = sum.segment<3>(11) / m.bending.area;
+    m.r_min = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& x : mesh.nodes) {
+        const double r = mesh.period > 0 ? x.head<2>().norm() : (x - m.centre).norm();
+        m.r_min = std::min(m.r_min, r), m.r_max = std::max(m.r_max, r);
+    }
+    m.quality = mesh_quality(mesh);
+    m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
+    measure_neck(mesh, m);
+    measure_symbol(mesh, bending, m);
+    return m;
+}
+
+double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields) {
+    const Tabulation& table = space.tabulation();
+    Eigen::Matrix2Xd of_cell(2, space.cells());
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), normals = space.gather(fields.normal, cell);
+        const auto nodal = space.gather(fields.H, cell);
+        Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const double H = nodal.dot(table.value.col(q));
+            const double other = shape_operator(p, gradients(p, table, q), normals).trace();
+            sum += table.weight[q] * p.area * Eigen::Vector2d((H - other) * (H - other), H * H);
+        }
+        of_cell.col(cell) = sum;
+    });
+    return of_cell.row(0).sum() / of_cell.row(1).sum();
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,35 @@
+// What is measured of a moving surface: energies, balances, shape and mesh.
+#pragma once
+
+#include "surface3d/curvature/bending_force.hpp"
+#include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/motion/motion_step.hpp"
+
+namespace tubule::surface3d {
+
+struct MotionMeasures {
+    Observables bending;  // with H and K of `fields`, to which the force belongs
+    MotionFields fields;
+    VectorField velocity;     // at the nodes
+    double kinetic = 0;       // inertia INT |u|^2/2
+    double dissipation = 0;   // INT 2 viscosity |sigma|^2 + friction |u|^2
+    double acceleration = 0;  // inertia INT |d_t u|^2 /2: kinetic energy that a unit of time would make
+    double speed = 0;         // largest |u|
+    double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
+    Eigen::Vector3d momentum, angular_momentum, centre;
+    double r_min = 0, r_max = 0;  // distances from the axis of a tube; from the centre of a closed surface
+    MeshQuality quality;
+    MeshTurn turn;
+    double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
+    Eigen::Vector3d narrowest;     // where that is
+    double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
+    Eigen::Vector3d least_symbol;  // where it is
+};
+
+// `stepper` made the state; its projection is brought to the surface of the state.
+MotionMeasures measure(MotionStepper& stepper, const MotionState& state, const Bending& bending);
+
+// INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.
+double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,104 @@
+// One run of a moving surface on a mesh and to a tolerance as given: steps by error, new meshes where they are needed,
+// and the reason why it ends.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+#include "surface3d/motion/paper_scheme.hpp"
+#include "surface3d/run/motion_checks.hpp"
+#include "surface3d/run/motion_frame.hpp"
+#include "surface3d/run/motion_run.hpp"
+#include "surface3d/run/motion_settings.hpp"
+#include "surface3d/run/motion_trace.hpp"
+
+namespace tubule::surface3d {
+
+using Clock = std::chrono::steady_clock;
+
+// Whether a run is to stop here and go on another time.
+std::optional<StopReport> find_pause(const Case& c, RunObserver& watch, Clock::time_point started, double time);
+
+class MotionAttempt {
+public:
+    // Of a run for comparison nothing is written but checkpoints. Of the time limit, what has gone by since `started`
+    // is used. All references must outlive the attempt.
+    MotionAttempt(const Case& c, RunObserver& watch, const MotionSettings& settings, const MotionTrace* coarser,
+                  Clock::time_point started);
+
+    // One of the first two, then go().
+    void begin();
+    void resume(const Restart& restart);
+    void go();
+
+    RunSummary summary;
+    MotionTrace trace;
+    // Largest ones, absolute: of the energy from the coarser run; of the balance with what dissipates, which shows what
+    // both runs of a pair lose alike.
+    double difference() const { return memory_.error; }
+    double defect() const { return memory_.defect; }
+
+private:
+    // What became of a trial step: nothing to say if it is taken.
+    struct Refusal {
+        double shrink = 0.25;  // the next trial is so much shorter
+        StopReport report;     // if no step is short enough
+    };
+
+    // The start.
+    void make_stepper(const CurvedMesh& mesh);
+    void set_moving();
+    void look();
+
+    // A step.
+    std::optional<StopReport> step();
+    std::optional<Refusal> attempt(double tau);
+    std::optional<StopReport> impossible(const Observables& o, const VectorField& X) const;
+    std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
+    void take(const MotionStep& next, const MotionMeasures& m);
+    void set_next_step(double tau, double asked, double error);
+    bool wants_new_mesh() const;
+    void make_new_mesh();
+
+    // Reasons to stop.
+    std::optional<StopReport> check_state() const;
+    std::optional<StopReport> check_crossing(bool at_output);
+    std::optional<StopReport> check_progress();
+    double what_may_change() const;
+
+    // What is written.
+    void compare();
+    void write_row();
+    void write_frame();
+    void write_checkpoint();
+    void summarise(const StopReport& stop);
+    Record record() const;
+
+    bool reported() const { return memory_.settings.role == Role::reported; }
+    double seconds() const;
+    double length() const;
+    double total() const { return now_.bending.energy + now_.kinetic; }
+    double defect_now() const { return total() - memory_.total_start + memory_.dissipated; }
+    double left_until_output() const { return outputs_[next_output_] - state_.time; }
+
+    const Case& case_;
+    RunObserver& watch_;
+    const MotionTrace* coarser_;
+    Clock::time_point started_;
+    std::unique_ptr<MotionStepper> stepper_;
+    std::unique_ptr<PaperStepper> paper_;  // makes the steps instead where the case says so
+    MotionState state_;
+    MotionMeasures now_;
+    MotionMemory memory_;
+    Crawl crawl_;
+    std::optional<StopReport> early_;  // nothing can be begun, or nothing is left to do
+    std::vector<double> outputs_;
+    std::size_t next_output_ = 0;
+    double error_now_ = 0, last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
+};
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,99 @@
+#include "surface3d/run/motion_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "surface3d/run/guards.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+// Measured choices: docs/decisions.md, "Surfaces in motion".
+constexpr double creep = 10;        // increase since its lowest, of the asked accuracy
+constexpr double climb = 0.25;      // increase of the energy in a step, of the asked accuracy
+constexpr double most_drift = 0.1;  // of the volume, of the asked accuracy
+constexpr double worst_quality = 0.03, sharpest_turn = 2;
+constexpr int most_crawling = 100;
+constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere
+constexpr double least_fall = 0.1;       // or of the energy, of the asked accuracy
+
+std::string where(const Eigen::Vector3d& x) {
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
+}
+
+}  // namespace
+
+bool can_go_on(Stop reason) {
+    return reason == Stop::interrupted || reason == Stop::time_limit;
+}
+
+std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
+    if (!(m.symbol > 0))
+        return StopReport{Stop::ill_posed, time,
+                          "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
+                          "no resolution helps: the energy does not resist short waves there"};
+    if (!(m.neck_radius >= r_min))
+        return StopReport{Stop::pinch_off, time,
+                          fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
+                          "lower accuracy.r_min to follow the neck further"};
+    if (!(m.turn.angle <= sharpest_turn))
+        return StopReport{m.turn.saddle ? Stop::pinch_off : Stop::resolution_lost, time,
+                          fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
+                                      m.turn.saddle ? "a neck closes" : "the surface is too sharp", where(m.turn.where),
+                                      m.turn.angle),
+                          m.turn.saddle ? "more elements follow the neck further" : "use more elements"};
+    if (!(m.quality.worst > worst_quality))
+        return StopReport{Stop::mesh_lost, time,
+                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),
+                                      m.quality.worst),
+                          "use more elements or a shorter discretisation.relaxation"};
+    return std::nullopt;
+}
+
+std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step) {
+    if (rise <= climb * asked) return std::nullopt;
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the energy rises by {:.3g} of E_ref in a step of {:.3g}, which it cannot", rise, step),
+        "use more elements or, if given, a smaller discretisation.step"};
+}
+
+std::optional<StopReport> find_slow_rise(double rise, double asked, double time) {
+    if (rise <= creep * asked) return std::nullopt;
+    return StopReport{Stop::resolution_lost, time,
+                      fmt::format("the energy has risen by {:.3g} of E_ref, little by little, which it cannot", rise),
+                      "use more elements or, if given, a smaller discretisation.step"};
+}
+
+std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
+                                                 double time) {
+    auto found = find_impossible_curvature(o, mesh, allowed);
+    if (found) found->time = time, found->advice = "use more elements, or another discretisation.order";
+    return found;
+}
+
+std::optional<StopReport> find_drift(double change, double asked, double time) {
+    if (std::abs(change) <= most_drift * asked) return std::nullopt;
+    if (!std::isfinite(change))
+        return StopReport{Stop::resolution_lost, time, "the volume is not a number", "use more elements"};
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the volume has drifted by {:.3g} of itself, as where on so few triangles it cannot be "
+                    "told from the area, which is kept",
+                    std::abs(change)),
+        "use more elements"};
+}
+
+std::optional<StopReport> Crawl::look(double time, double step, double tiny, double lowest_energy, double asked) {
+    if (time > (1 + least_progress) * time_ || lowest_energy < energy_ - least_fall * asked) {
+        time_ = time, energy_ = lowest_energy, steps_ = 0;
+        return std::nullopt;
+    }
+    if (++steps_ <= most_crawling || step >= tiny) return std::nullopt;
+    return StopReport{Stop::solver_failed, time, fmt::format("stuck with steps of {:.2g}", step),
+                      "ask for less accuracy, or use more elements"};
+}
+
+}  // namespace tubule::surface3d

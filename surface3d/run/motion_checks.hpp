@@ -1,0 +1,46 @@
+// Why a run in motion stops before its end: judgements on what was measured. Each is silent while all is well, and
+// speaks where a number is none. The guards of single surfaces are in guards.hpp.
+#pragma once
+
+#include <cmath>
+#include <optional>
+
+#include "common/solve/stop.hpp"
+#include "surface3d/motion/motion_measures.hpp"
+
+namespace tubule::surface3d {
+
+// Whether the run was stopped from outside, and can be resumed as if it had not been.
+bool can_go_on(Stop reason);
+
+// What lies in the shape and its triangles, so that no shorter step would help: an energy that does not resist short
+// waves, a neck thinner than r_min, normals that turn too far from node to node, a degenerate triangle.
+std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time);
+
+// The energy, kinetic energy included, can only fall. A step that raises it by more than a quarter of the accuracy
+// asked is refused; many small rises stop a run once they come to ten times that accuracy. All relative to E_ref, the
+// rise over many steps since the lowest energy.
+std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step);
+std::optional<StopReport> find_slow_rise(double rise, double asked, double time);
+
+// INT H^2 or INT K off by more than `allowed` (find_impossible_curvature), with advice for a motion.
+std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
+                                                 double time);
+
+// Where area and volume are one condition, the area alone is kept: the relative change of the volume since the start.
+// Where they are two, steps that miss the volume are refused.
+std::optional<StopReport> find_drift(double change, double asked, double time);
+
+// Steps that lead nowhere: a hundred in which neither time goes on by a thousandth nor the lowest energy falls by a
+// tenth of the accuracy asked, while steps are shorter than `tiny`. A run that follows a singularity by shorter and
+// shorter steps is none, as its energy falls.
+class Crawl {
+public:
+    std::optional<StopReport> look(double time, double step, double tiny, double lowest_energy, double asked);
+
+private:
+    int steps_ = 0;  // since the last progress
+    double time_ = 0, energy_ = HUGE_VAL;
+};
+
+}  // namespace tubule::surface3d

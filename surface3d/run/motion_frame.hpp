@@ -1,0 +1,49 @@
+// Moving surfaces as records of the result file, and as what a run goes on from.
+#pragma once
+
+#include "common/result/result.hpp"
+#include "surface3d/motion/motion_measures.hpp"
+#include "surface3d/run/motion_settings.hpp"
+
+namespace tubule::surface3d {
+
+// Beside the state of the surface, what a run has to remember.
+struct MotionMemory {
+    MotionSettings settings;
+    double next_step = 0, relaxation = 0;
+    double least_variation = 0;                // of H, see MotionControl
+    double area = 0, volume = 0;               // at the start
+    double total_start = 0, lowest_total = 0;  // energy with kinetic energy, then and since
+    double dissipated = 0, corrected = 0, reference_energy = 0;
+    double dissipation_past = 0;  // rate at the step before
+    double error = 0;             // largest difference from the coarser run
+    double defect = 0;            // largest defect of the dissipation identity
+    double moved = 0;             // the nodes, at most, since the last look for self-intersection
+    int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
+};
+
+// Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest
+// of the state under names that begin with restart_.
+Record motion_record(const MotionStepper& stepper, const MotionState& state, const MotionMeasures& measures,
+                     const Bending& bending, const MotionMemory& memory, std::size_t mesh_number);
+
+struct MotionRestart {
+    MotionState state;
+    MotionMemory memory;
+};
+
+// Throws std::runtime_error if the record does not hold such a state.
+MotionRestart motion_restart(const Record& record);
+
+SurfaceCells cells_of(const CurvedMesh& mesh);
+CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points);
+
+// One column a node.
+template <class Columns>
+Array array(const std::string& name, const Columns& nodal) {
+    Array out{name, {static_cast<std::size_t>(nodal.cols())}, {nodal.data(), nodal.data() + nodal.size()}};
+    if (nodal.rows() > 1) out.shape.push_back(nodal.rows());
+    return out;
+}
+
+}  // namespace tubule::surface3d

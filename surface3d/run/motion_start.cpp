@@ -1,0 +1,47 @@
+#include "surface3d/run/motion_start.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tubule::surface3d {
+namespace {
+
+// Measured choices: docs/decisions.md, "Surfaces in motion".
+constexpr double relaxes_in = 0.2;  // of the time that the shape needs to change
+// Variations of H that are no more than this, or than so many times what two ways to find it differ, are none.
+constexpr double same_everywhere = 1e-9, times_noise = 4;
+
+// The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.
+double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
+    const double R = (closed ? 3 : 2) * std::abs(o.volume) / o.area;
+    const double drive = std::max(std::abs(o.energy), o.magnitude) / o.area;
+    return (law.friction * R * R + law.viscosity) / drive + std::sqrt(law.inertia * R * R / drive);
+}
+
+}  // namespace
+
+double begin_time(const Case& c) {
+    return c.handover ? c.handover->time : 0;
+}
+
+VectorField start_velocity(const Case& c, const StartMesh& start) {
+    if (start.velocity.size() > 0 || !c.velocity.rotates) return start.velocity;
+    VectorField u = VectorField::Zero(3, start.mesh.size());
+    for (int i = 0; i < start.mesh.size(); ++i) {
+        const Eigen::Vector3d& x = start.mesh.nodes[i];
+        u.col(i) = c.velocity.omega * Eigen::Vector3d(-x.y(), x.x(), 0);
+    }
+    return u;
+}
+
+void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
+    const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
+    const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
+    memory.area = o.area, memory.volume = o.volume;
+    memory.reference_energy = c.handover ? c.handover->reference_energy : std::max(std::abs(o.energy), o.magnitude);
+    memory.relaxation =
+        c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0));
+    memory.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,17 @@
+// What a run in motion takes from its start and remembers.
+#pragma once
+
+#include "surface3d/run/motion_frame.hpp"
+#include "surface3d/run/start.hpp"
+
+namespace tubule::surface3d {
+
+double begin_time(const Case& c);
+
+// Velocities at the nodes; none at rest.
+VectorField start_velocity(const Case& c, const StartMesh& start);
+
+// Area, volume, reference energy, relaxation of the mesh, how well H is known.
+void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);
+
+}  // namespace tubule::surface3d
