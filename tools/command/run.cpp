@@ -1,7 +1,6 @@
 // tubule run CASE... : runs cases, each into a result file.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
