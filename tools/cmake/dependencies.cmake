@@ -1,4 +1,4 @@
-# What the libraries Tubule::common and Tubule::axisym need; read by our build and by that of those who use them.
+# What the libraries Tubule::common, Tubule::axisym and Tubule::surface3d need; read by our build and by that of those who use them.
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(SUNDIALS 6.4 REQUIRED COMPONENTS idas nvecserial sunmatrixsparse sunlinsolklu)
 find_package(SuiteSparse REQUIRED COMPONENTS KLU CHOLMOD UMFPACK)
