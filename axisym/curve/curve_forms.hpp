@@ -13,11 +13,11 @@
 
 namespace tubule::axisym {
 
-// The functional energy E + area A + volume V + gauge D of the whole cell or period, by its weights.
+// The functional energy E + area A + volume V + gauge J of the whole cell or period, by its weights.
 //   E = INT f(H, K) dS        V = INT pi r^2 z' ds
-//   D = 1/2 INT (d log g/ds)^2 ds, g = |X'|
-// E, A and V do not depend on the parametrisation; D vanishes for one in proportion to arc length, which every shape
-// has. So E + alpha D has the stationary shapes of E, and a Hessian that is regular along the curve.
+//   J = 1/2 INT (d log g/ds)^2 ds, g = |X'|, theory.md (4.9)
+// E, A and V do not depend on the parametrisation; J vanishes for one in proportion to arc length, which every shape
+// has. So E + alpha J has the stationary shapes of E, and a Hessian that is regular along the curve.
 struct Weights {
     double energy = 0, area = 0, volume = 0, gauge = 0;
 };
@@ -33,7 +33,7 @@ struct CurveObservation {
     double g_min = std::numeric_limits<double>::infinity(), g_max = 0;  // speeds |X'|
     double curvature = 0, s_curvature = 0;                              // largest |kappa_s| or |kappa_theta|
     // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
-    // curvatures (maths 2).
+    // curvatures: theory.md (2.14).
     double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
 };
 
@@ -62,7 +62,7 @@ public:
     // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
     // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
     CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* defect = nullptr) const;
-    // E_ref (design): the scale that the asked accuracy refers to.
+    // E_ref, the scale that the asked accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
 
 private:

@@ -1,4 +1,5 @@
-// Laws of motion of a profile curve as one differential-algebraic system F(y, y') = 0 (maths 3, 4).
+// Laws of motion of a profile curve as one differential-algebraic system F(y, y') = 0:
+// theory.md (4.10), (4.11), (4.12), (4.13).
 #pragma once
 
 #include <Eigen/Core>
@@ -37,14 +38,14 @@ struct MotionLayout {
 };
 
 // In weak form, for all test displacements phi, velocities v, and pressures q (dS = 2 pi r g ds):
-//   ((X_t - u).nu, phi.nu) + c dD[phi] = 0            the curve goes with u, its parameter stays even (gauge D)
-//   (u_t + c u_s/g + ..., v) + 2/Re (sigma(u), sigma(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
+//   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve goes with u, its parameter stays even (gauge J)
+//   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
 //   (q, div u) = 0,  dV[u] = 0
 // with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
-// has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + lambda dV[phi] + c dD[phi] = 0.
+// has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + lambda dV[phi] + c dJ[phi] = 0.
 class CurveMotion {
 public:
-    // `gauge` is the weight c of D; area and volume those to be kept. The space must outlive the motion.
+    // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
     CurveMotion(const CurveSpace& space, const Bending& bending, const MotionLaw& law, double gauge, double area,
                 double volume);
     CurveMotion(const CurveMotion&) = delete;

@@ -52,7 +52,7 @@ public:
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     // dF/du, with `damping` times the mass matrix added to the Hessian; compressed, of one pattern.
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
-    // E + gauge D + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
+    // E + gauge J + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
     double merit(const Eigen::VectorXd& u) const;
     // The second variation of that on the displacements (of coefficients) which keep the constraints and the place;
     // `lowest` with `vectors` only.

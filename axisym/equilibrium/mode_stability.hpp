@@ -10,10 +10,10 @@
 
 namespace tubule::axisym {
 
-// What the rate of a displacement is paid with: the dissipation 2 viscosity INT |sigma(u)|^2 + friction INT |u|^2
-// (maths 3). Without flow u is w nu alone, and the constraints of the problem hold (for m = 0; for others they hold by
-// themselves). With flow the membrane is locally inextensible, its volume fixed, and the tangential velocity the one of
-// least dissipation.
+// What the rate of a displacement is paid with: the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2
+// theory.md (3.14). Without flow u is w nu alone, and the constraints of the problem hold (for m = 0; for others they
+// hold by themselves). With flow the membrane is locally inextensible, its volume fixed, and the tangential velocity
+// the one of least dissipation.
 struct Dissipation {
     bool flows = false;
     double viscosity = 0, friction = 1;  // viscosity 1/Re
@@ -32,7 +32,7 @@ struct ModeRates {
 
 // The second variation of E + sigma A + P V as a quadratic form in (w, w_s, w_theta, w_ss, w_s_theta, w_theta_theta),
 // at each quadrature point of the shape. A shape that is not stationary moves, and the rates are those of the flow
-// linearised about that motion at this instant, of the gradient flow only (maths 5, last line): the force b on it adds
+// linearised about that motion at this instant, of the gradient flow only, theory.md (8.8): the force b on it adds
 // -INT b H w^2 dS to the form of displacements along straight normals.
 class ModeStability {
 public:

@@ -21,8 +21,8 @@ struct Observation {
     double r_min = 0, z_min = 0;  // smallest radius at quadrature points, and where
     double r_max = 0, z_max = 0;
     double steepness = 0, z_steep = 0;  // largest |r'| r_min / r: O(1) on a catenoidal neck, unbounded at an overhang
-    double symbol = 0, z_symbol = 0;  // smallest principal symbol f_HH + 2 f_HK x + f_KK x^2, x = kappa_theta (maths 2)
-    double symbol_3d = 0;             // the same over all x between the principal curvatures
+    double symbol = 0, z_symbol = 0;    // smallest principal symbol, theory.md (2.14), for x = kappa_theta
+    double symbol_3d = 0;               // the same over all x between the principal curvatures
 };
 
 class Forms {
@@ -35,7 +35,7 @@ public:
     double energy(const Eigen::VectorXd& x) const;
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;
     Eigen::SparseMatrix<double> hessian(const Eigen::VectorXd& x) const;
-    // INT 2 pi (r/g) phi_i phi_j dz (maths 4)
+    // INT 2 pi (r/g) phi_i phi_j dz: theory.md (4.4)
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
     // F = M(x) v + grad E(x), the gradient flow being F(x, x_t) = 0. Arrays of space().size() numbers.
@@ -53,7 +53,7 @@ public:
     // variation of the best approximation error, from the jumps of the highest derivative
     // (docs/decisions.md), over the whole period.
     Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
-    // E_ref (design): the scale that the asked accuracy refers to.
+    // E_ref, the scale that the asked accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
     // Functionals of the coefficients that give the cosine and sine amplitudes of the mode with n waves
     // over the period.

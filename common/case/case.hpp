@@ -27,7 +27,7 @@ enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
 
 using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
 
-// The law of motion (maths 3).
+// The law of motion: theory.md 3.
 struct Model {
     ModelKind kind = ModelKind::gradient_flow;
     double Re = 1;                     // stokes, fluid: 1/Re is the viscosity

@@ -1,4 +1,4 @@
-// Pointwise geometry of a surface of revolution, from its profile curve (r(s), z(s)) (maths 4).
+// Pointwise geometry of a surface of revolution, from its profile curve (r(s), z(s)): theory.md (4.5), (4.6).
 #pragma once
 
 #include "common/geometry/jet.hpp"

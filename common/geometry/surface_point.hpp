@@ -1,4 +1,4 @@
-// Pointwise geometry of a surface from a parametrisation X(u, v) (maths 1).
+// Pointwise geometry of a surface from a parametrisation X(u, v): theory.md (1.7).
 #pragma once
 
 #include <Eigen/Core>

@@ -27,7 +27,7 @@ struct RunObserver {
 struct RunSummary {
     StopReport stop;
     double energy = 0;            // at the stop
-    double reference_energy = 0;  // E_ref (design): asked and estimated errors are relative to it
+    double reference_energy = 0;  // E_ref, theory.md (11.1): asked and estimated errors are relative to it
     double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref
     bool as_accurate_as_asked = true;
     int elements = 0;  // at the stop; of a tube over one period

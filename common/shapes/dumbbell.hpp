@@ -1,4 +1,4 @@
-// Shape "dumbbell": the surface on which the paper validates its curvatures (maths 7): the unit sphere with its
+// Shape "dumbbell": the surface on which the paper validates its curvatures, theory.md (7.9): the unit sphere with its
 // parallels scaled by 1/4 + 3/4 z^2.
 #pragma once
 

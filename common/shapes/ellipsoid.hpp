@@ -23,7 +23,7 @@ Vector3<S> position(const Ellipsoid& e, const Vector3<S>& p) {
 inline double volume(const Ellipsoid& e) {
     return 4 * pi / 3 * e.a * e.b * e.c;
 }
-// INT K^2 dS (maths 7).
+// INT K^2 dS: theory.md (7.3).
 inline double integral_K2(const Ellipsoid& e) {
     const double a = e.a * e.a, b = e.b * e.b, c = e.c * e.c;
     return 4 * pi * (3 * (a * a + b * b + c * c) + 2 * (a * b + b * c + c * a)) / (15 * a * b * c);

@@ -31,7 +31,7 @@ inline double area(const Torus& t) {
 inline double volume(const Torus& t) {
     return 2 * pi * pi * t.radius * t.tube_radius * t.tube_radius;
 }
-// INT H^2 dS and INT K^2 dS (maths 7).
+// INT H^2 dS and INT K^2 dS: theory.md (7.1).
 inline double integral_H2(const Torus& t) {
     const double a = t.tube_radius, c = t.radius;
     return 4 * pi * pi * c * c / (a * std::sqrt(c * c - a * a));

@@ -70,7 +70,7 @@ std::vector<Complex> cubic_roots(double c2, double c1, double c0) {
     return roots;
 }
 
-// What resists in Stokes flow, over Q R^2: the braces of maths 5 (c).
+// The denominator of theory.md (5.10): what resists in Stokes flow, over Q R^2.
 double stokes_drag(const Model& model, double R, double q, int m) {
     const double mu = 1 / model.Re, Q = q * q + m * m / (R * R), twist = model.gamma + mu * Q, around = m / R;
     const double drag = model.gamma * (Q * R * R + 1) + 4 * mu * q * q;
@@ -131,7 +131,7 @@ Growth growth(const UniformTube& tube, const Model& model, double q, int m) {
     // A radius, or a place, that is kept.
     const bool rigid = q == 0 && m < 2;
     if (model.kind != ModelKind::fluid) return {{rigid || G == 0 ? 0.0 : -mobility(tube, model, q, m) * G}};
-    // maths 5 (d), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
+    // theory.md (5.12), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
     // gamma, s [(a A + B)(a + D) - C] + Q R^2 G (a + D) = 0. Without C the factor a + D belongs to a swirl without a
     // wave.
     const double mu = 1 / model.Re, gamma = model.gamma, A = Q * R * R + 1, B = 4 * mu * q * q, D = mu * Q,

@@ -1,11 +1,7 @@
-// Small waves on straight tubes and on spheres: exact linear theory (maths 5, 6), for any density f(H, K).
+// Small waves on straight tubes and on spheres: exact linear theory for any density f(H, K), theory.md 5, theory.md 6.
 //
 // A tube is r = R + a cos(q z + m theta), a sphere r = R + a Y_l^m, with a(t) = a(0) exp(s t). Density, its derivatives
-// and the radius are those of the unperturbed surface. Where maths 5 and 6 have 2 k42 for f_KK and leave f_HK out, the
-// formulas here hold for both, from the linearised force of maths 2: tube, with Q = q^2 + m^2/R^2, Z = Q - 1/R^2,
-//   s = -[F2 Z^2 - 2 f_HK Z q^2/R + f_KK q^4/R^2 + (f + F1/R) Z - 2 F1 q^2/R]      gradient flow,
-// and sphere, with L = l(l+1) - 2,
-//   s = -(L/R^2)[f_HH L/R^2 - 2 f_HK L/R^3 + f_KK L/R^4 + f - f_K/R^2].
+// and the radius are those of the unperturbed surface.
 #pragma once
 
 #include <complex>
@@ -36,12 +32,11 @@ double radius_rate(const UniformSphere& sphere);
 // The tension at which a tube is at rest without a difference of pressure: that of models that leave the volume free.
 double tension_of_free_volume(const Bending& energy, double radius);
 
-// P = sigma0 R^2/(2 k20) + (c^2 - 1)/2, c = H0 R (maths 5); with other terms, (f + F1/R + sigma0) R^2/F2, which is the
-// same for k20 alone. Not finite where F2 = 0.
+// Sigma of theory.md (5.20): (f + f_H/R + sigma0) R^2/f_HH. Not finite where f_HH = 0.
 double reduced_tension(const UniformTube& tube);
 
-// G of maths 5 as a polynomial of q: the gradient flow's -s, and what drives the other models. A wave grows where G <
-// 0.
+// G of theory.md (5.8) as a polynomial of q: the gradient flow's -s, and what drives the other models. A wave grows
+// where G < 0.
 struct Stiffness {
     double q4 = 0, q2 = 0, q0 = 0;
     double operator()(double q) const { return (q4 * q * q + q2) * q * q + q0; }
@@ -61,7 +56,7 @@ Growth growth(const UniformSphere& sphere, const Model& model, int l);
 // Of a sphere's tangential swirls, which leave its shape alone; for fluid and Stokes flow with friction.
 double toroidal_rate(const UniformSphere& sphere, const Model& model, int l);
 
-// M of the amplitude equations (maths 5, TRAP): models without inertia move as a' = -M G a. For a fluid, of a''.
+// M of theory.md (5.16), (5.18): models without inertia move as a' = -M G a. For a fluid, of a''.
 double mobility(const UniformTube& tube, const Model& model, double q, int m);
 
 // Where the principal symbol f_HH + 2 f_HK x + f_KK x^2 is not positive, waves grow the faster the shorter they are:

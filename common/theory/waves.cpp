@@ -80,7 +80,7 @@ Motion prepared(const UniformTube& tube, const Model& model, double length, cons
     return motion;
 }
 
-// minus p0 of maths 5 (TRAP).
+// -p0 of theory.md (5.17), (5.19).
 double tension(const Motion& motion, const double* y) {
     if (!motion.tension_is_outcome) return motion.tube.tension;
     double above = 0, below = 0;

@@ -1,4 +1,4 @@
-// Several small waves of a tube in time, by integrating the ordinary differential equations of maths 5.
+// Several small waves of a tube in time, by integrating theory.md (5.7), (5.16), (5.18).
 #pragma once
 
 #include <optional>
@@ -20,9 +20,10 @@ struct WaveState {
 };
 
 // The waves at each of `times` (ascending, from 0), to about 1e-10 of the largest amplitude.
-//   Gradient flow: the radius drifts (maths 5), unless the model keeps the volume; amplitudes are multiplied by
+//   Gradient flow: the radius drifts, theory.md (5.3), unless the model keeps the volume; amplitudes are multiplied by
 //     exp INT s dt. The tension is that of the tube, constant.
-//   Other models: the radius stays. Volume fixed: the tension is what keeps SUM w c a^2 constant (TRAP), and is given
+//   Other models: the radius stays. Volume fixed: the tension is what keeps SUM Z a^2 constant, theory.md (5.14), and
+//   is given
 //     back; that of the tube does not matter. Volume free: tension_of_free_volume, constant.
 //   Fluids with m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
 // The equations leave out squares of amplitudes. Throws std::invalid_argument for waves without meaning (n = m = 0,
@@ -30,7 +31,8 @@ struct WaveState {
 std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times);
 
-// The tension that the constraints ask for at the start (TRAP); fluids, overdamped and Stokes flow of fixed volume.
+// The tension that the constraints ask for at the start, theory.md (5.17), (5.19); fluids, overdamped and Stokes flow
+// of fixed volume.
 double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves);
 
 bool keeps_volume(const Model& model);

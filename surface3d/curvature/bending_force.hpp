@@ -29,7 +29,7 @@ double gauss_bonnet_defect(const Observables& o, const CurvedMesh& mesh);
 // 16 pi, for no closed surface has less INT H^2 (Willmore): a run below it is spurious.
 inline constexpr double willmore_bound = 16 * 3.14159265358979323846;
 
-// (b, phi_a e_d) for node a and direction d, one column a node: the weak form (maths 2)
+// (b, phi_a e_d) for node a and direction d, one column a node: the weak form theory.md (2.9)
 //   (b, v) = (grad f_H + (HP-B) grad f_K, grad w) - (|B|^2 f_H + H K f_K - H f, w),   w = v.nu,
 // with the recovered normal and curvatures, and grad w = SUM nu_d grad v_d - B v. It belongs to the energy of the
 // smooth surface: it is not the derivative of observe().energy, which a change of curvature reaches through the

@@ -41,7 +41,7 @@ struct CellTables {
     Eigen::MatrixXd psi;        // pressure
     Eigen::MatrixXd psi_grad;
     Eigen::MatrixXd normal, normal_grad;  // v.nu, G(v) = grad(v.nu)
-    Eigen::MatrixXd strain, divergence;   // sigma(v) as (11, 22, sqrt(2) 12), div_P v
+    Eigen::MatrixXd strain, divergence;   // D(v) as (11, 22, sqrt(2) 12), div_P v
 };
 
 struct CellWork {
@@ -183,7 +183,7 @@ void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& 
     }
 }
 
-// inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (sigma(u), sigma(v))
+// inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (D(u), D(v))
 void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();

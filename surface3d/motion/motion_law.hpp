@@ -1,11 +1,11 @@
-// The laws of motion of maths 3, as what a step of tier 2 has to solve for.
+// The laws of motion, theory.md (3.1), as what a step of tier 2 has to solve for.
 #pragma once
 
 #include "common/case/case.hpp"
 
 namespace tubule::surface3d {
 
-//   inertia (d_t u + grad_w u) = (2 viscosity) div sigma(u) - friction u - grad p - p H nu + b nu - lambda nu
+//   inertia (d_t u + grad_w u) = (2 viscosity) div D(u) - friction u - grad p - p H nu + b nu - lambda nu
 // Where nothing flows, u.nu is all that is unknown of u; its tangential part is -grad p/friction or zero.
 struct MotionLaw {
     bool flows = true;         // the tangential velocity has inertia or viscosity: u has three components

@@ -22,7 +22,7 @@ struct MotionMeasures {
     MeshTurn turn;
     double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
     Eigen::Vector3d narrowest;     // where that is
-    double symbol = 0;             // smallest f_HH + 2 f_HK x + f_KK x^2, x between the principal curvatures (maths 2)
+    double symbol = 0;             // smallest principal symbol, theory.md (2.14), x between the principal curvatures
     Eigen::Vector3d least_symbol;  // where it is
 };
 

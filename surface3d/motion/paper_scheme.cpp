@@ -52,7 +52,7 @@ struct Point {
     CellColumns<2> grad;
     OfVelocity<1> along;        // v.nu
     OfVelocity<2> tilt, slope;  // nu . grad_C v; grad(v.nu)
-    OfVelocity<3> strain;       // sigma(v) as (11, 22, sqrt(2) 12)
+    OfVelocity<3> strain;       // D(v) as (11, 22, sqrt(2) 12)
 };
 
 Point point(const CellFields& here, const Tabulation& table, const Tabulation& pressure, int q) {
@@ -126,7 +126,7 @@ void add_inertia(const Point& at, const MotionLaw& law, double tau, CellSystem& 
     }
 }
 
-// (2/Re) (sigma(u), grad_P v)
+// (2/Re) (D(u), grad_P v)
 void add_viscosity(const Point& at, const MotionLaw& law, CellSystem& s) {
     if (law.viscosity == 0) return;
     s.block(s.u, s.u, 3 * s.n, 3 * s.n).noalias() += (2 * law.viscosity * at.dS) * at.strain.transpose() * at.strain;

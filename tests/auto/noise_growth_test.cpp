@@ -84,7 +84,7 @@ TEST(NoiseGrowth, errorOfCurvedRatesIsTold) {
 }
 
 TEST(WaveRates, inertiaOnlySlowsWavesThatGrow) {
-    // Against the fluid's dispersion relation (maths 5 (d)): exact for m = 0, where all models flow alike, an upper
+    // Against the fluid's dispersion relation theory.md (5.12): exact for m = 0, where all models flow alike, an upper
     // bound for others. The friction belongs to the Stokes flow.
     for (const double Re : {0.3, 3.0, 30.0})
         for (const int m : {0, 1, 2})

@@ -80,7 +80,7 @@ TEST(Convergence, inTimeToo) {
 }
 
 TEST(DissipationIdentity, closesAtTightTolerance) {
-    // Theorem: E(t) - E(0) + INT INT b^2 dS dt = 0 for the discrete flow on any mesh (maths 3).
+    // Theorem: E(t) - E(0) + INT INT b^2 dS dt = 0 for the discrete flow on any mesh: theory.md (3.12).
     for (const Bending& material :
          {bending(0.2, -2), bending(0.2, -2, 0, 0.06), bending(0.2, -2, 0.02, 0), bending(0.05, 0.5, 0.01, 0.02)}) {
         Case c = tube_case(material, 1, 2, {{0.25, 1}, {0.08, 2, 0, 0.9}}, 0.2, {0.01, 0.1});

@@ -179,12 +179,12 @@ TEST(CurveForms, sphere) {
     EXPECT_NEAR(o.gauge, 0, 1e-14);
     EXPECT_NEAR(o.r_max, R, 1e-3);
     EXPECT_NEAR(o.curvature, 1 / R, 1e-6);
-    EXPECT_NEAR(o.symbol, 0.4 + 12 * 0.03 * h * h + 2 * 0.06 / (R * R), 1e-6);  // maths 2, x = -1/R in all directions
+    EXPECT_NEAR(o.symbol, 0.4 + 12 * 0.03 * h * h + 2 * 0.06 / (R * R), 1e-6);  // theory.md (2.14), x = -1/R
     EXPECT_NEAR(o.symbol_3d, o.symbol, 1e-6);
 }
 
 TEST(CurveForms, closedShapesWithExactValues) {
-    // Exact: maths 7.
+    // Exact: theory.md (7.1), (7.3), (7.4).
     const double a = 1, c = 1.5;
     const auto spheroid = observe(meridian(Ellipsoid{a, a, c}), bending(1, 0, 0, 1), 80);
     const double H2 = 4 * pi *
@@ -214,7 +214,7 @@ TEST(CurveForms, closedShapesWithExactValues) {
 }
 
 TEST(CurveForms, capsule) {
-    // Exact: maths 7. Curvature jumps at the seams, so knots of the least smoothness there.
+    // Exact: theory.md (7.7), (7.8). Curvature jumps at the seams, so knots of the least smoothness there.
     const Capsule capsule{0.5, 2};
     const ArcLength arc(meridian(capsule));
     ASSERT_EQ(arc.seams().size(), 2u);

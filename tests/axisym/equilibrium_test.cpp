@@ -217,7 +217,7 @@ TEST(Equilibrium, fewerConstraints) {
 }
 
 TEST(Equilibrium, halfPeriodsOfTubes) {
-    // Exact: a free tube without perturbation to hold on to relaxes to the radius 1/|H0|, E = 0 (maths 5).
+    // Exact: a free tube without perturbation to hold on to relaxes to the radius 1/|H0|, E = 0: theory.md (5.3).
     const auto tube =
         find_equilibrium({bending(0.125, -1, 0, 0.06), {}}, half(meridian(Tube{1.3, 5, {{0.2, 1, 0, 0}}})));
     ASSERT_EQ(tube.stop, Stop::finished) << tube.message;

@@ -111,7 +111,7 @@ TEST(Forms, residualTellsWhenTheRadiusIsNotPositive) {
 
 TEST(Forms, uniformTubeIsExact) {
     // Exact: a tube of radius R and length L has H = -1/R, K = 0, area 2 pi R L, volume pi R^2 L; its rate is
-    // dR/dt = -(f + f_H/R)/R (maths 5); E_ref = area (k20 (H^2 + H0^2) + k40 (H - H0)^4).
+    // dR/dt = -(f + f_H/R)/R, theory.md (5.3); E_ref = area (k20 (H^2 + H0^2) + k40 (H - H0)^4).
     const double R = 0.8, L = 2, k20 = 0.2, H0 = -2, k40 = 0.03, h = -1 / R - H0;
     const double f = k20 * h * h + k40 * h * h * h * h, fH = 2 * k20 * h + 4 * k40 * h * h * h;
     for (int degree : {3, 5, 7})
@@ -202,8 +202,8 @@ TEST(StrongForce, vanishesOnTheCliffordTorus) {
 }
 
 TEST(StrongForce, ofSphereAndTube) {
-    // Exact: dE/dt = -INT b^2 with E = 4 pi R^2 f gives b = -(2/R)(f + f_H/R - k42/R^4) for spheres (maths 6; in f
-    // without k42), b = -(f + f_H/R)/R for tubes (maths 5).
+    // Exact: dE/dt = -INT b^2 with E = 4 pi R^2 f gives b = -(2/R)(f + f_H/R - k42/R^4) for spheres, theory.md (6.2)
+    // (in f without k42), b = -(f + f_H/R)/R for tubes, theory.md (5.3).
     const double R = 1.3, H0 = -0.6;
     for (double z : {0.0, 0.4}) {
         Series s;

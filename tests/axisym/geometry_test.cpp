@@ -92,7 +92,7 @@ TEST(ProfilePoint, graphIsTheCurveWithUnitZ1AndDoesNotDependOnTheParameter) {
     EXPECT_NEAR(p.H, g.H, 1e-14);
     EXPECT_NEAR(p.K, g.K, 1e-14);
     EXPECT_NEAR(p.area, g.area * z1, 1e-13);
-    // maths: g = sqrt(1 + r'^2), H = (r''/g^2 - 1/r)/g, K = -r''/(r g^4)
+    // theory.md (4.1): g = sqrt(1 + r'^2), H = (r''/g^2 - 1/r)/g, K = -r''/(r g^4)
     const double speed = std::sqrt(1 + slope * slope);
     EXPECT_NEAR(g.H, (second / (speed * speed) - 1 / r) / speed, 1e-14);
     EXPECT_NEAR(g.K, -second / (r * std::pow(speed, 4)), 1e-14);

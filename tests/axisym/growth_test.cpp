@@ -25,13 +25,13 @@ struct Density {
     }
 };
 
-// maths 5, gradient flow: dR/dt of the tube
+// theory.md (5.3): dR/dt of the tube
 double drift(const Material& m, double R) {
     const Density d(m, R);
     return -(d.f + d.F1 / R) / R;
 }
 
-// maths 5 (a), m = 0: growth rate of exp(i q z)
+// theory.md (5.6), m = 0: growth rate of exp(i q z)
 double growth(const Material& m, double R, double q) {
     const Density d(m, R);
     const double Z = q * q - 1 / (R * R);
@@ -124,13 +124,13 @@ void expect_radius(const Material& m, double R0, double end, double R_end) {
 }
 
 TEST(Drift, withoutSpontaneousCurvature) {
-    // maths 7: R^4 = R0^4 + 4 k20 t
+    // theory.md (7.12): R^4 = R0^4 + 4 k20 t
     expect_radius({0.2, 0, 0, 0.1}, 1, 1.5, std::pow(1 + 4 * 0.2 * 1.5, 0.25));
     expect_radius({0.2, 0, 0, 0}, 0.3, 20, std::pow(std::pow(0.3, 4) + 4 * 0.2 * 20, 0.25));
 }
 
 TEST(Drift, withSpontaneousCurvature) {
-    // maths 7: v - ln|v| = 2 k20 H0^4 t + const with v = 1 - H0^2 R^2, solved for R by bisection.
+    // theory.md (7.11): v - ln|v| = 2 k20 H0^4 t + const with v = 1 - H0^2 R^2, solved for R by bisection.
     const auto radius_at = [](double k20, double H0, double R0, double t) {
         const auto F = [&](double R) {
             const double v = 1 - H0 * H0 * R * R;
@@ -150,7 +150,8 @@ TEST(Drift, withSpontaneousCurvature) {
 }
 
 TEST(Drift, withFourthOrderTerm) {
-    // k20 = 0 = H0: f = k40/R^4, dR/dt = 3 k40/R^5, so R^6 = R0^6 + 18 k40 t; else the ODE of maths 5.
+    // k20 = 0 = H0: f = k40/R^4, dR/dt = 3 k40/R^5, so theory.md (7.13) holds: R^6 = R0^6 + 18 k40 t; else
+    // the ODE theory.md (5.3).
     expect_radius({0, 0, 0.05, 0}, 0.8, 2, std::pow(std::pow(0.8, 6) + 18 * 0.05 * 2, 1.0 / 6));
     const Material m{0.1, -1.5, 0.04, 0};
     expect_radius(m, 1, 1, base_at(m, 1, 1, 1).R);

@@ -59,7 +59,7 @@ TEST(Guards, startBelowTheFloor) {
 }
 
 TEST(Guards, illPosedFromTheStart) {
-    // maths 2: f_HH = 2 k20 + 12 k40 (H-H0)^2 < 0 on the tube r = 1.
+    // theory.md (2.14), (2.15): f_HH = 2 k20 + 12 k40 (H-H0)^2 < 0 on the tube r = 1.
     const Outcome o = run_case(tube_case(bending(0.2, -2, -0.1), 1, 2, {{0.1, 1}}, 1));
     EXPECT_STOP(o, Stop::ill_posed);
     EXPECT_EQ(o.summary.stop.time, 0);
@@ -69,8 +69,8 @@ TEST(Guards, illPosedFromTheStart) {
 }
 
 TEST(Guards, illPosedOnTheWay) {
-    // maths 2: 2 k20 + 2 k42/r^2 vanishes at r = sqrt(-k42/k20) on a tube, here sqrt(0.4). The shrinking tube gets
-    // there at the time of v - ln|v| = 2 k20 H0^4 t + const, v = 1 - H0^2 R^2 (maths 7).
+    // theory.md (2.14): 2 k20 + 2 k42/r^2 vanishes at r = sqrt(-k42/k20) on a tube, here sqrt(0.4). The shrinking tube
+    // gets there at the time of v - ln|v| = 2 k20 H0^4 t + const, v = 1 - H0^2 R^2: theory.md (7.11).
     const auto F = [](double R) { return 1 - 4 * R * R - std::log(4 * R * R - 1); };
     const double R = std::sqrt(0.4), time = (F(R) - F(1)) / (2 * 0.2 * 16);
     const Outcome tube = run_case(tube_case(bending(0.2, -2, 0, -0.08), 1, 2, {}, 5));
@@ -119,7 +119,7 @@ TEST(Guards, overhang) {
 }
 
 TEST(Guards, warnsOfAThreeDimensionalLoss) {
-    // maths 2: in the direction x between kappa_theta and kappa_s; k40 = 0, k42 < 0: at larger |kappa_s|.
+    // theory.md (2.14): in the direction x between kappa_theta and kappa_s; k40 = 0, k42 < 0: at larger |kappa_s|.
     const Outcome o = run_case(tube_case(bending(0.2, -1, 0, -0.05), 1, 2, {{0.25, 1}}, 0.001));
     EXPECT_STOP(o, Stop::finished);
     ASSERT_EQ(o.summary.warnings.size(), 1u);

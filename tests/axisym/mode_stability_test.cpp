@@ -1,4 +1,5 @@
-// Growth rates of non-axisymmetric modes against closed forms (maths 5, 6) and an independent computation.
+// Growth rates of non-axisymmetric modes against closed forms (theory.md 5, theory.md 6) and an independent
+// computation.
 #include "axisym/equilibrium/mode_stability.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ StationaryProblem fixed(const Bending& law, const Equilibrium& e) {
     return {law, {e.observed.area, e.observed.volume, std::nullopt}};
 }
 
-// All terms at work; f, F1, F2 of maths 5 and 6.
+// All terms at work; f, F1 = f_H, F2 = f_HH as in theory.md (5.6), (6.3).
 struct Law {
     double k20 = 0.3, H0 = -0.4, k40 = 0.02, k42 = 0.15, sigma = 0.7;
     Bending bending() const { return axisym::bending(k20, H0, k40, k42); }
@@ -39,7 +40,7 @@ struct Law {
 
 TEST(ModeStability, sphere) {
     // Exact: gradient flow s_l = -(L/R^2)[F2 L/R^2 + f + k42 (2 Lam - 5)/R^4 + sigma], overdamped Lam/(Lam + 4) of that
-    // (maths 6 with p0 = -sigma), for every m <= l; l = 1 is rigid, l = 0 excluded by the constraints.
+    // theory.md (6.3) with the tension sigma, for every m <= l; l = 1 is rigid, l = 0 excluded by the constraints.
     const Law law;
     const double R = 1.2, h = -2 / R - law.H0;
     const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4)), P = b0 - 2 * law.sigma / R;
@@ -81,7 +82,7 @@ TEST(ModeStability, convergesWithTheOrderOfTheEnergy) {
 
 TEST(ModeStability, tube) {
     // Exact: gradient flow s = -[F2 Z^2 + (f + F1/R + sigma) Z - 2 F1 q^2/R + 2 k42 q^4/R^2], overdamped Q R^2/(Q R^2 +
-    // 1) of that (maths 5 with p0 = -sigma); twice for each q > 0.
+    // 1) of that, theory.md (5.8), (5.9); twice for each q > 0.
     const Law law;
     const double R = 0.8, length = 3, h = -1 / R - law.H0;
     const double b0 = -(law.f(h) + law.F1(h) / R) / R, P = b0 - law.sigma / R;
@@ -108,7 +109,7 @@ TEST(ModeStability, tube) {
 }
 
 TEST(ModeStability, stokesFlow) {
-    // Exact (maths 5, 6, with p0 = -sigma, G = -s of the gradient flow with tension): sphere s = -Lam G/[gamma (Lam +
+    // Exact: theory.md (6.6), (5.10), G = -s of the gradient flow with tension: sphere s = -Lam G/[gamma (Lam +
     // 4) + 4 mu L/R^2]; tube s = -Q R^2 G / {gamma (Q R^2 + 1) + 4 mu q^2 - 4 mu^2 q^2 (m/R)^2/(gamma + mu Q)}.
     const Law law;
     for (const double gamma : {0.0, 0.8}) {
@@ -165,8 +166,8 @@ TEST(ModeStability, stokesFlow) {
 }
 
 TEST(ModeStability, shapesThatMove) {
-    // Exact: the same rates without tension (maths 5, 6): of the flow linearised about a sphere or a tube that shrinks
-    // or grows. Nothing is held, so the change of radius counts, l = 0 or q = m = 0: d(dR/dt)/dR.
+    // Exact: the same rates without tension, theory.md (5.6), (6.3): of the flow linearised about a sphere or a tube
+    // that shrinks or grows. Nothing is held, so the change of radius counts, l = 0 or q = m = 0: d(dR/dt)/dR.
     const Law law;
     const Bending energy = law.bending();
     {

@@ -58,7 +58,7 @@ const std::string spheroid =
     "a = 0.6\nb = 0.6\nc = 1.2\n[time]\nend = 0.5\n";
 
 TEST(CurveRun, spheresFollowTheirOde) {
-    // maths 6: R^6 = R0^6 + 12 (k42 + 16 k40) t for H0 = 0.
+    // theory.md (6.4): R^6 = R0^6 + 12 (k42 + 16 k40) t for H0 = 0.
     const Outcome o = run_text(
         "[energy]\nk20 = 1.0\nk40 = 0.02\nk42 = 0.1\n[shape]\nkind = \"sphere\"\nradius = 1.0\n[time]\nend = 1.0\n"
         "[accuracy]\nenergy = 1e-6\n");
@@ -67,7 +67,7 @@ TEST(CurveRun, spheresFollowTheirOde) {
 }
 
 TEST(CurveRun, wavesOfASphereDecay) {
-    // maths 6 (a), with k40 = k42 = H0 = 0, where the radius is stationary: F2 = 2, f = 4 at R = 1.
+    // theory.md (6.3), with k40 = k42 = H0 = 0, where the radius is stationary: F2 = 2, f = 4 at R = 1.
     for (const int l : {2, 3, 4}) {
         const double L = l * (l + 1) - 2, rate = -L * (2 * L + 4), t = -0.5 / rate, amplitude = 1e-4;
         const Outcome o =
@@ -90,13 +90,13 @@ TEST(CurveRun, wavesOfASphereDecay) {
     }
 }
 
-// The amplitude equations of maths 5 for the modes n = 1, 2 of a tube of radius 1, by Runge and Kutta.
+// The amplitude equations theory.md (5.16), (5.18) for the modes n = 1, 2 of a tube of radius 1, by Runge and Kutta.
 struct Waves {
     double k20 = 1, k42 = 0.1, length = 6, Re = 2, gamma = 0.3;
     ModelKind model;
     double Q(int k) const { return std::pow(2 * pi * (k + 1) / length, 2); }
     double c(int k) const { return Q(k) - 1; }
-    // -s of the gradient flow, maths 5 (a): h = -1, f = k20, F1 = -2 k20, F2 = 2 k20, R = 1, H0 = 0.
+    // -s of the gradient flow, theory.md (5.6): h = -1, f = k20, F1 = -2 k20, F2 = 2 k20, R = 1, H0 = 0.
     double G(int k) const {
         const double Z = c(k), q2 = Q(k);
         return 2 * k20 * Z * Z + (k20 - 2 * k20) * Z + 4 * k20 * q2 + 2 * k42 * q2 * q2;
@@ -186,7 +186,7 @@ TEST(CurveRun, lawsOfConservation) {
 }
 
 TEST(CurveRun, rotationOfATubeDecaysWithFriction) {
-    // A straight tube in rigid rotation stays straight, and omega falls as exp(-gamma t) (maths 3).
+    // A straight tube in rigid rotation stays straight, and omega falls as exp(-gamma t): theory.md (3.15).
     const Outcome o = run_text(
         "[energy]\nk20 = 1.0\n[model]\nkind = \"fluid\"\ngamma = 0.5\n[velocity]\ninitial = \"rotation\"\nomega = 0.7\n"
         "[shape]\nkind = \"tube\"\nradius = 1.0\nlength = 3.0\n[time]\nend = 2.0\n[accuracy]\nenergy = 1e-7\n");
@@ -318,7 +318,7 @@ TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
 }
 
 TEST(CurveRun, theFluidStartsAsTheOverdampedModelMoves) {
-    // Initial acceleration of the fluid at rest = velocity of the overdamped model (maths 3).
+    // Initial acceleration of the fluid at rest = velocity of the overdamped model: theory.md (3.8).
     const Meridian m = half(meridian(Ellipsoid{0.6, 0.6, 1.2}));
     const CurveSpace space(Topology::half_cell, equal_breaks(16), 5, 4);
     const Eigen::VectorXd x = fit(space, m);

@@ -66,7 +66,7 @@ TEST(CurveMotion, jacobianIsTheDerivative) {
         }
 }
 
-// The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |sigma(u)|^2 dS.
+// The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |D(u)|^2 dS.
 double inf_sup(const CurveSpace& space, const Vector& x) {
     const CurveMotion motion(space, {}, {.viscosity = 0.5, .friction = 1, .keeps_volume = false, .lagrangian = true}, 1,
                              1, 1);

@@ -61,7 +61,7 @@ inline Series cosine(double amplitude, double q, double phase, double z) {
     return out;
 }
 
-// The strong forces of maths 2 on the surface of revolution of r(z):
+// The strong forces theory.md (2.10), (2.11), (2.12) on the surface of revolution of r(z):
 //   b20 = -2 k20 [Lap H + (H-H0)(|B|^2 - H(H-H0)/2)]
 //   b40 = -k40 [12 div((H-H0)^2 grad H) + (H-H0)^3 ((3H+H0)H - 8K)]
 //   b42 = -k42 [2 div((HP-B) grad K) + H K^2]

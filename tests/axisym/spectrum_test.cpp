@@ -28,9 +28,8 @@ Model model(ModelKind kind, double Re = 1, double gamma = 0) {
 }
 
 TEST(Dispersion, theGraphsLinearisedOperator) {
-    // Closed forms (maths 5 (a), m = 0, q = 0 included: d(dR/dt)/dR) against the eigenvalues of the discrete Jacobian
-    // at a tube, whose radius drifts: dF/dx w + s M w = 0. Errors are relative to
-    // the rate, or to 1.
+    // Closed forms, theory.md (5.6) (m = 0, q = 0 included: d(dR/dt)/dR), against the eigenvalues of the discrete
+    // Jacobian at a tube, whose radius drifts: dF/dx w + s M w = 0. Errors are relative to the rate, or to 1.
     for (const UniformTube& tube : {UniformTube{bending(0.3, -0.4, 0.02, 0.15), 0.8}, UniformTube{bending(0.2), 1},
                                     UniformTube{bending(0.2, -1.5, 0, 0.06), 0.6}}) {
         const double length = 3;
@@ -176,8 +175,9 @@ std::vector<double> equally_spaced(double end, int n) {
 }
 
 TEST(Growth, fittedToRunsAtThePreferredRadius) {
-    // H0 = -1/R, radius at rest: s = -(2 k20/R^4)[(1 + kappa) x^2 - 2 x + 1] (maths 5): grows for k42 < 0, neutral at
-    // q R = 1 for k42 = 0, decays for k42 > 0. Amplitudes stay below 3e-5 of R, so that their squares are below 1e-9.
+    // H0 = -1/R, radius at rest: s = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], theory.md (5.27): grows for k42 < 0,
+    // neutral at q R = 1 for k42 = 0, decays for k42 > 0. Amplitudes stay below 3e-5 of R, so that their squares are
+    // below 1e-9.
     for (const auto& [k42, length, end] : {std::tuple{-0.1, 2 * pi, 5.0}, {0.05, 2 * pi, 10.0}, {0.0, 9.0, 6.0}}) {
         Case c = tube_case(bending(0.2, -1, 0, k42), 1, length, {{1e-5, 1, 0, 0.3}}, end, equally_spaced(end, 12));
         explicitly(c, 24, 1e-12, 7);
@@ -194,8 +194,8 @@ TEST(Growth, fittedToRunsAtThePreferredRadius) {
 }
 
 TEST(Growth, fittedToAFlowWithFreeVolume) {
-    // Models that flow keep the area. With the volume free too, the tension is known (P = 0) and a single wave follows
-    // maths 5 (b), (c); a fluid its fastest root, after the others have died.
+    // Models that flow keep the area. With the volume free too, the tension is known, theory.md (5.5), and a single
+    // wave follows theory.md (5.9), (5.10); a fluid its fastest root, after the others have died.
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {
         const double length = 9, end = kind == ModelKind::fluid ? 30 : 10;
         Case c = tube_case(bending(1, -1.3, 0, 0.05), 1, length, {{1e-4, 1, 0, 0}}, end, equally_spaced(end, 20));

@@ -38,7 +38,7 @@ X = (2 * math.pi / LENGTH) ** 2  # q^2 of the wave
 
 
 def flattening_rate(c):
-    """maths 5 (b), q = 0, m = 2, R = k20 = 1: G = 18 + 6 P; P makes G = 0 for the wave of m = 0 (TRAP)."""
+    """theory.md (5.9), q = 0, m = 2, R = k20 = 1: G = 18 + 6 Sigma; Sigma makes G = 0 for the wave of m = 0."""
     return -0.8 * (18 + 6 * -(X * X + 2 * c * X + 1) / (X - 1))
 
 
@@ -69,7 +69,8 @@ class Confirm(ProgramTest):
         # Linear theory leaves out squares of the amplitude 0.1; and its tension falls while the wave is used up.
         self.assertAlmostEqual(float(flattens["rate"]) / flattening_rate(0), 1, delta=0.15)
         self.assertAlmostEqual(float(flattens["rate"]) / float(flattens["linear_rate"]), 1, delta=0.15)
-        # SUM (Q - 1) a^2 is kept (TRAP): no more than all of it can go from the wave to the ellipse, where Q - 1 = 3.
+        # SUM (Q - 1) a^2 is kept, theory.md (5.14): no more than all of it can go from the wave to the ellipse, where
+        # Q - 1 = 3.
         most = AMPLITUDE * math.sqrt((X - 1) / 3)
         self.assertTrue(0.7 * most < float(flattens["amplitude"]) < 1.1 * most, flattens["amplitude"])
 

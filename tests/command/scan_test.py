@@ -476,8 +476,9 @@ class Shown(ScanTest):
         self.assertIn("longest unduloid, L|H\u2080| = 2\u03c0", picture.read_text())
 
     def test_pearling_and_buckling(self):
-        """maths 5 with P = 0 (free volume), c = H0 R, x = q^2: neutral where (1 + k42/k20) x^2 + 2 c x + 1 = 0, m = 0,
-        and where (1 + k42/k20) x + 2 (1 + c) = 0, m = 1. No wave with m = 2 grows, as P > -3 and c > -5/2."""
+        """theory.md (5.21), (5.23) with Sigma = 0 (free volume), c = H0 R, x = q^2: neutral where
+        (1 + k42/k20) x^2 + 2 c x + 1 = 0, m = 0, and where (1 + k42/k20) x + 2 (1 + c) = 0, m = 1. No wave
+        with m = 2 grows, as Sigma > -3 and c > -5/2, theory.md (5.24)."""
         case = CASE.replace("[shape]", '[model]\nkind = "overdamped"\nvolume = "free"\n[shape]')
         self.write("free.toml", case.replace('parametrisation = "graph"', ""))
         self.scan("free.toml", "--over", "shape.length=3:12:7", "--over", f"{K42}=0:1:5", "--set", "time.end=1e-9")

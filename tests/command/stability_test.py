@@ -77,9 +77,9 @@ energy = 1e-8
 """
 
 
-def rate_at_rest(q, k20=0.2, kappa=-0.2):
-    """maths 5 at H0 = -1/R, R = 1, P = 0: s = -2 k20 [(1 + kappa) x^2 - 2 x + 1], x = q^2."""
-    return -2 * k20 * ((1 + kappa) * q**4 - 2 * q**2 + 1)
+def rate_at_rest(q, k20=0.2, beta=-0.2):
+    """theory.md (5.27) at R = 1: s = -2 k20 [(1 + beta) x^2 - 2 x + 1], x = q^2."""
+    return -2 * k20 * ((1 + beta) * q**4 - 2 * q**2 + 1)
 
 
 class Stability(ProgramTest):
@@ -109,11 +109,12 @@ class Stability(ProgramTest):
 
     def test_words(self):
         out, _ = self.tubule("stability", self.tube)
-        # Fastest at x = 1/(1 + kappa): q = 1.118034, rate 2 k20 (1/(1 + kappa) - 1) = 0.1.
+        # theory.md (5.27): fastest at x = 1/(1 + beta): q = 1.118034, rate 2 k20 (1/(1 + beta) - 1) = 0.1.
         self.assertIn("fastest of all with m = 0: q = 1.118034 (length 5.61985), rate 0.1\n", out)
         self.assertIn("beyond the threshold of: pearling\n", out)
         self.assertIn("no wave with m = 0 grows for k42 >= 0\n", out)
-        # Buckling: P < -2 (1 + c) = 0, the tension being 2 k20 P; rings: P < -3.
+        # theory.md (5.23), (5.24) at c = -1: buckling below the reduced tension 0, rings below -3; the tension is 2 k20
+        # times that.
         lines = [line.split() for line in out.splitlines()]
         buckling = next(line for line in lines if line[:2] == ["buckling", "1"])
         self.assertAlmostEqual(float(buckling[4]), 0, delta=1e-12)
@@ -134,7 +135,7 @@ class Stability(ProgramTest):
     def test_models(self):
         fluid = self.write("fluid.toml", FLUID)
         one = self.json(fluid)["models"][0]
-        # A single wave is frozen by area and volume: that decides the tension (maths 5, TRAP).
+        # A single wave is frozen by area and volume: that decides the tension: theory.md (5.15).
         frozen = next(w for w in one["waves"] if (w["m"], w["n"]) == (0, 1))
         self.assertAlmostEqual(frozen["rate"], 0, delta=1e-9)
         self.assertEqual(len(next(w for w in one["waves"] if (w["m"], w["n"]) == (1, 1))["roots"]), 3)
@@ -157,7 +158,7 @@ class Stability(ProgramTest):
     def test_spheres(self):
         case = self.write("sphere.toml", '[energy]\nk20 = 1.0\n[shape]\nkind = "sphere"\nradius = 1.0\n[time]\nend = 1.0\n')
         case.write_text('tier = "axisym"\n' + case.read_text())
-        # maths 6, H0 = 0: s = -L (2 L + 4).
+        # theory.md (6.3), H0 = 0: s = -L (2 L + 4).
         rows = {row["l"]: float(row["rate"]) for row in self.table(case)}
         for l in (2, 3, 4):
             L = l * (l + 1) - 2
@@ -224,7 +225,8 @@ class Stability(ProgramTest):
 
     def test_fits_of_moving_surfaces(self):
         case = self.write("moving.toml", SURFACE)
-        # maths 5 at H0 = -1/R, P = 0, k20 = 1/2, kappa = 0.1: s = -Z^2 - kappa x^2, x = q^2 = 3 (ring: 0), Z = x + m^2 - 1.
+        # theory.md (5.6) at H0 = -1/R, k20 = 1/2, beta = 0.1: s = -Z^2 - beta x^2, x = q^2 = 3 (ring:
+        # 0), Z = x + m^2 - 1.
         # Asked: the error with about 200 cubic triangles (found: 4.9e-4, 6.6e-4, 2.5e-3), and that it falls by 2.2 from
         # 100 to 200 (found: by 3.4, 3.7, 3.0; fourth order in the mesh width would be 4).
         waves = {"1,0": (-4.9, 1e-3), "1,1": (-9.9, 1.5e-3), "0,2": (-9.0, 4e-3)}

@@ -97,7 +97,7 @@ PointResult straight() {
     return p;
 }
 
-// maths 5 (b) at P = 0, where f + F1/R + sigma0 = 0: R = k20 = 1, h = -1 - H0 = 1, F1 = F2 = 2.
+// theory.md (5.9) at Sigma = 0, where f + f_H/R + sigma0 = 0: R = k20 = 1, h = -1 - H0 = 1, f_H = f_HH = 2.
 double rate(int n, int m) {
     const double q = 2 * pi * n / 12, Q = q * q + m * m, Z = Q - 1;
     const double F2 = 2, F1 = 2, k42 = 4, G = F2 * Z * Z - 2 * F1 * q * q + 2 * k42 * q * q * q * q;
@@ -112,8 +112,8 @@ TEST(Confirm, knowsTheFastestWavesThatFit) {
         for (int n = wave.m < 2 ? 1 : 0; n < 10; ++n) most = std::max(most, rate(n, wave.m));
         EXPECT_NEAR(wave.rate, most, 1e-12 * std::abs(most)) << wave.m;
     }
-    EXPECT_LT(waves[0].rate, 0);  // k42 > 3 k20: it does not pearl (maths 5, thresholds) ...
-    EXPECT_GT(waves[1].rate, 0);  // ... but buckle, as P = 0 < -2 (1 + c) = 2
+    EXPECT_LT(waves[0].rate, 0);  // k42 > 3 k20: it does not pearl, theory.md (5.22) ...
+    EXPECT_GT(waves[1].rate, 0);  // ... but buckle, theory.md (5.23), as Sigma = 0 < -2 (1 + c) = 2
 }
 
 TEST(Confirm, makesACaseInThreeDimensions) {

@@ -44,7 +44,7 @@ end = 1e-3
 def expected_start():
     """Energies k20 INT (H-H0)^2 dS, k22 INT H^2 K dS of the perturbed tube, and E_ref of the asked accuracy.
 
-    Geometry of a graph r(z), maths: g = sqrt(1+r'^2), H = (r''/g^2 - 1/r)/g, K = -r''/(r g^4), dS = 2 pi r g dz.
+    Geometry of a graph r(z), theory.md (4.1), (4.2): H = (r''/g^2 - 1/r)/g, K = -r''/(r g^4), dS = 2 pi r g dz.
     The trapezoidal rule is exact to rounding for a smooth periodic integrand.
     """
     n = 2048

@@ -12,7 +12,7 @@ namespace tubule::surface3d {
 namespace {
 
 TEST(Surface, KnowsAFourthTerm) {
-    // On a sphere of radius R all gradients vanish: b = -(|B|^2 f_H + H K f_K - H f), maths 2, with f = H^2 K.
+    // On a sphere of radius R all gradients vanish: b = -(|B|^2 f_H + H K f_K - H f), theory.md (2.13), f = H^2 K.
     const double R = 1.5, H = -2 / R, K = 1 / (R * R), area = 4 * pi * R * R;
     const double f = H * H * K, b = -(2 * K * (2 * H * K) + H * K * (H * H) - H * f);
     const Sphere sphere{.radius = R, .modes = {}};

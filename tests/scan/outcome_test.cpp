@@ -65,8 +65,8 @@ TEST(Outcome, OfRuns) {
 }
 
 // A tube that is unstable, with so small a wave that nothing seems to move: H0 = 0 is stable, but at rest H0 = -1 with
-// k42 < 0 is not for x = q^2R^2 near 1 (maths 5: the window closes for k42 < 0). Time.stationary alone would call it
-// uniform; the energy falls in a direction, so that the run goes on.
+// k42 < 0 is not for x = q^2R^2 near 1, theory.md (5.26): the window closes for k42 < 0. Time.stationary alone would
+// call it uniform; the energy falls in a direction, so that the run goes on.
 TEST(Outcome, ASaddleIsNoRest) {
     const Case c = tube(-0.05, -1, 2 * std::numbers::pi, 1e-5, 1e4);
     const PointResult p = run_point(c, false, never);

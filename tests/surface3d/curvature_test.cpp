@@ -61,7 +61,7 @@ TEST(Curvature, ComparedOnesHaveTheirOrders) {
 }
 
 TEST(Curvature, EnergiesOfThePerturbedSphere) {
-    // maths 7; 5120 triangles of order 3, 1e-5 relative.
+    // theory.md (7.10); 5120 triangles of order 3, 1e-5 relative.
     const CurvedMesh mesh = mapped_mesh(icosphere(16), 3, map_of(perturbed_sphere()));
     const SurfaceSpace space(mesh);
     const Observables o = observe(space, mesh, recover(space, mesh), {.k = {1, 0, 1}});

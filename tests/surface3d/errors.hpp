@@ -9,7 +9,7 @@
 
 namespace tubule::surface3d {
 
-// The perturbed sphere 1 + 0.5 Re Y_5^3 and its integrals (maths 7).
+// The perturbed sphere 1 + 0.5 Re Y_5^3 and its integrals: theory.md (7.10).
 inline Sphere perturbed_sphere() {
     return {.radius = 1, .modes = {{0.5, 5, 3}}};
 }

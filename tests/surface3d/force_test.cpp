@@ -80,7 +80,7 @@ TEST(BendingForce, ApproachesTheRateOfTheDiscreteEnergy) {
 }
 
 TEST(BendingForce, VanishesOnTheCliffordTorus) {
-    // maths 7: b20 = 0 pointwise for radius = sqrt(2) tube_radius, H0 = 0.
+    // theory.md (7.2): b20 = 0 pointwise for radius = sqrt(2) tube_radius, H0 = 0.
     const Torus torus{std::sqrt(2.0), 1};
     const Bending bending{.k = {1, 0, 0}};
     for (const auto& [k, order, bound] : {std::tuple{3, 4.0, 0.1}, {4, 5.0, 0.02}}) {
@@ -95,8 +95,8 @@ TEST(BendingForce, VanishesOnTheCliffordTorus) {
 }
 
 TEST(BendingForce, VanishesOnASphereAtItsEquilibriumRadius) {
-    // maths 6: dR/dt ~ f + F1/R - k42/R^4, at h = -2/R - H0. With H0 = -1: k20 (2/R - 1)(-1) - k42/R^4, which vanishes
-    // at R = 1 for k42 = -k20; and, without k42, at R = 2.
+    // theory.md (6.2): dR/dt ~ f + f_H/R - k42/R^4, f without k42, at h = -2/R - H0. With H0 = -1: k20 (2/R - 1)(-1) -
+    // k42/R^4, which vanishes at R = 1 for k42 = -k20; and, without k42, at R = 2.
     for (const auto& [radius, bending] :
          {std::pair{2.0, Bending{.k = {1, 0, 0}, .H0 = -1}}, {1.0, Bending{.k = {1, 0, -1}, .H0 = -1}}})
         for (const auto& [k, order, bound] : {std::tuple{2, 3.0, 1e-2}, {3, 4.0, 5e-5}, {4, 5.0, 1e-5}}) {
@@ -110,8 +110,7 @@ TEST(BendingForce, VanishesOnASphereAtItsEquilibriumRadius) {
 }
 
 TEST(BendingForce, IsThePapersTermByTerm) {
-    // On a sphere of radius R, where all gradients vanish, the strong forms of maths 2 (checked there against the
-    // paper's, its misprints corrected):
+    // On a sphere of radius R, where all gradients vanish, the strong forms theory.md (2.10), (2.11), (2.12):
     //   b20 = -2 (H-H0)(|B|^2 - H(H-H0)/2),  b40 = -(H-H0)^3 ((3H+H0)H - 8K),  b42 = -H K^2;
     // paired with v = nu they are b times the area.
     const double R = 1.5, H = -2 / R, K = 1 / (R * R), H0 = -0.5, h = H - H0, B2 = 2 / (R * R);

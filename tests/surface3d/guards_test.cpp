@@ -212,7 +212,7 @@ TEST(Crawl, FollowsASingularity) {
     }
 }
 
-// maths 6: on a sphere and on a straight tube, area and volume are one condition.
+// theory.md 6: on a sphere and on a straight tube, area and volume are one condition.
 TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
     const Bending bending{.k = {1, 0, 0}, .H0 = 0};
     for (const bool tube : {false, true}) {

@@ -131,7 +131,7 @@ TEST(Shapes, HaveTheIntegralsTheyClaim) {
     EXPECT_NEAR(integrate_exactly(ball, map_of(ellipsoid), flux) / volume(ellipsoid), 1, 1e-10);
     EXPECT_NEAR(integrate_exactly(ball, map_of(ellipsoid), K2) / integral_K2(ellipsoid), 1, 1e-9);
 
-    // maths 7: INT H^2 of a spheroid.
+    // theory.md (7.4): INT H^2 of a spheroid.
     for (const auto& [a, c] : {std::pair{1.0, 1.5}, {0.7, 2.0}}) {
         const double exact = 4 * pi *
                              (7.0 / 3 + 2 * a * a / (3 * c * c) +
@@ -139,7 +139,7 @@ TEST(Shapes, HaveTheIntegralsTheyClaim) {
         EXPECT_NEAR(integrate_exactly(icosphere(16), map_of(Ellipsoid{a, a, c}), H2) / exact, 1, 1e-9) << c;
     }
 
-    // maths 7: the paper's validation surface and perturbed sphere.
+    // theory.md (7.9), (7.10): the paper's validation surface and perturbed sphere.
     EXPECT_NEAR(integrate_exactly(ball, map_of(Dumbbell{}), one), Dumbbell::exact_area, 1e-9);
     EXPECT_NEAR(integrate_exactly(ball, map_of(Dumbbell{}), flux), Dumbbell::exact_volume, 1e-9);
     EXPECT_NEAR(integrate_exactly(ball, map_of(perturbed_sphere()), one), perturbed_area, 1e-7);

@@ -112,8 +112,8 @@ Fall fall_of(int order, const Gap& gap) {
 }
 
 TEST(MotionForce, ApproachesTheRateOfTheDiscreteEnergy) {
-    // maths 2: (b, v) = -dE[v], up to the error of the fields; E is INT f(H, K) with the fields that the force is made
-    // of. An error in any part of the form would stay with refinement.
+    // theory.md (2.9): (b, v) = -dE[v], up to the error of the fields; E is INT f(H, K) with the fields that the force
+    // is made of. An error in any part of the form would stay with refinement.
     for (const Bending& bending : energies) {
         const Fall fall = fall_of(4, [&](const CurvedMesh& mesh) {
             const VectorField v = smooth_at(mesh);
@@ -163,8 +163,8 @@ TEST(MotionForce, IsTheNegativeResidualOfTheStepAtRest) {
 }
 
 TEST(CurvatureEvolution, IsThatOfASurfaceThatMoves) {
-    // maths 2: dH = Lap w + |B|^2 w, dK = div((HP-B) grad w) + H K w for a displacement w nu: tested with a smooth
-    // function against differences of the fields of displaced surfaces.
+    // theory.md (2.4), (2.5): dH = Lap w + |B|^2 w, dK = div((HP-B) grad w) + H K w for a displacement w nu: tested
+    // with a smooth function against differences of the fields of displaced surfaces.
     const double te = 0.3;
     for (const MotionLaw& law : {gradient_flow, fluid}) {
         double H_rate = 0, K_rate = 0, of_H = 0, of_K = 0;

@@ -91,7 +91,8 @@ end = 0.05
 )";
 
 TEST(MotionRun, EveryModelKeepsWhatItMust) {
-    // maths 3: the dissipation identity within the asked accuracy; area and volume to 1e-8 at every accepted step.
+    // theory.md (3.12), (3.13), (3.14): the dissipation identity within the asked accuracy; area and volume to 1e-8 at
+    // every accepted step.
     for (const std::string kind : {"gradient-flow", "overdamped", "stokes", "fluid"}) {
         SCOPED_TRACE(kind);
         const Outcome o = run_case(wavy, {"model.kind=" + kind});
@@ -129,7 +130,7 @@ TEST(MotionTrace, InterpolatesStepsOfAnyLength) {
 }
 
 TEST(MotionRun, ATubeGrowsOnNewMeshes) {
-    // maths 7: R^4 = 1 + 4 t. Long steps, on triangles that become long and thin, and a new mesh at R = 7.
+    // theory.md (7.12): R^4 = 1 + 4 t. Long steps, on triangles that become long and thin, and a new mesh at R = 7.
     const Outcome o = run_case(R"(
 [energy]
 k20 = 1.0
@@ -216,7 +217,7 @@ end = 0.015
 }
 
 TEST(MotionRun, FluidsKeepTheirMomenta) {
-    // maths 3: they fall as exp(-gamma t). From rest they stay zero, however coarse and uneven the mesh.
+    // theory.md (3.15): they fall as exp(-gamma t). From rest they stay zero, however coarse and uneven the mesh.
     for (const double gamma : {0.0, 2.0}) {
         const Outcome o = run_case(wavy, {"model.kind=fluid", "model.gamma=" + std::to_string(gamma)});
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
@@ -262,7 +263,7 @@ TEST(MotionRun, GradientFlowOfFixedVolume) {
 }
 
 TEST(MotionRun, AnInextensibleSphereIsRigid) {
-    // maths 6: area and volume leave it nothing to do. There lambda and the pressure are the same condition.
+    // theory.md 6: area and volume leave it nothing to do. There lambda and the pressure are the same condition.
     for (const std::string kind : {"overdamped", "stokes", "fluid"}) {
         SCOPED_TRACE(kind);
         const Outcome o = run_case(
@@ -277,7 +278,7 @@ TEST(MotionRun, AnInextensibleSphereIsRigid) {
 }
 
 TEST(MotionGuards, IllPosed) {
-    // maths 2: f_HH + f_KK x^2 = 2 k20 + 2 k42 x^2 with x = -1 on the unit sphere: negative for k42 < -k20.
+    // theory.md (2.14): f_HH + f_KK x^2 = 2 k20 + 2 k42 x^2 with x = -1 on the unit sphere: negative for k42 < -k20.
     const std::string sphere =
         "[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n"
         "[discretisation]\nelements = 80\norder = 3\nstep = 0.05\n";
@@ -411,8 +412,8 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
 }
 
 TEST(MotionRun, NothingIsRefinedThatNoMeshCures) {
-    // maths 2: f_HH + f_KK K = 2 k20 + 2 k42 < 0 on a unit sphere. Four times the triangles again and again: ten
-    // minutes.
+    // theory.md (2.14): f_HH + f_KK x^2 = 2 k20 + 2 k42 < 0 on a unit sphere. Four times the triangles again and again:
+    // ten minutes.
     const Outcome o = run_case(R"(
 [energy]
 k20 = 1.0

@@ -1,5 +1,5 @@
-// Steps of the moving surface against exact solutions (maths 3, 5, 6): spheres and tubes in gradient flow, waves of
-// tubes that flow, balances of momentum.
+// Steps of the moving surface against exact solutions (theory.md 3, theory.md 5, theory.md 6): spheres and tubes in
+// gradient flow, waves of tubes that flow, balances of momentum.
 #include "motion.hpp"
 
 #include <gtest/gtest.h>
@@ -78,7 +78,8 @@ TEST(Alpha, KnowsTheErrorOfItsSteps) {
     EXPECT_NEAR(alpha_numbers(1, 0, 1).error, -1.0 / 12, 1e-12);
 }
 
-// Radius of a sphere and amplitude of a wave of it, as the exact linear theory has them at time `end` (maths 6).
+// Radius of a sphere and amplitude of a wave of it, as the exact linear theory has them at time `end`: theory.md (6.2),
+// (6.3).
 struct SphereAt {
     double radius, amplitude;
 };
@@ -102,7 +103,7 @@ double radius(const CurvedMesh& mesh) {
 }
 
 TEST(SphereFlow, RadiusFollowsItsEquation) {
-    // maths 6 (a); without k20 also R^6 = 1 + 12 (k42 + 16 k40) t in closed form.
+    // theory.md (6.2); without k20 also (6.4): R^6 = 1 + 12 (k42 + 16 k40) t in closed form.
     EXPECT_NEAR(sphere_at(1, {.k = {0, 0.02, 0.1}}, 1).radius, std::pow(1 + 12 * 0.42, 1.0 / 6), 1e-12);
     const double end = 0.4, exact = sphere_at(end, all_terms, 1).radius;
     const auto error = [&](Scheme scheme, int steps, double uneven) {  // steps in turn short and so many times as long
@@ -142,7 +143,7 @@ TEST(SphereFlow, VelocityConvergesWithTheMesh) {
 }
 
 TEST(SphereFlow, WavesDecayAtTheirRates) {
-    // maths 6 (a) while the radius grows.
+    // theory.md (6.3) while the radius grows.
     for (const auto& [l, m, end] : {std::tuple{2, 1, 0.2}, {3, 2, 0.02}}) {
         const double a0 = 1e-4;
         Motion motion(mesh_of(Sphere{.radius = 1, .modes = {{a0, l, m}}}, icosphere(2), 4), {}, all_terms);
@@ -182,7 +183,7 @@ double error_of_waves(const Bending& energy, const Model& model, const std::vect
 }
 
 TEST(TubeFlow, WavesAlongAndAroundFollowLinearTheory) {
-    // maths 5 (a) with the radius drifting: the exact multiplier is exp INT s dt.
+    // theory.md (5.7), the radius drifting: the exact multiplier is exp INT s dt.
     const double a = 1e-4;
     const std::vector<Phased> waves{{{1, 0, a}}, {{1, 1, a}}, {{1, 2, a}}, {{2, 0, a}}, {{0, 2, a}}};
     double error[2];
@@ -192,7 +193,7 @@ TEST(TubeFlow, WavesAlongAndAroundFollowLinearTheory) {
 }
 
 TEST(TubeWaves, FollowTheAmplitudeEquations) {
-    // maths 5, TRAP: several waves, whose pressure varies in time so that SUM w c a^2 stays. The equations leave out
+    // theory.md (5.14): several waves, whose pressure varies in time so that SUM Z a^2 stays. The equations leave out
     // squares of amplitudes, which these phases keep away from the waves themselves: (1,0) with itself makes (2,0) of
     // phase 0, and so on. What the constraints leave free is of second order in the waves, so that these must stand
     // out from the errors of the mesh: waves of 1e-3 do not on this one.
@@ -282,9 +283,9 @@ TEST(Models, AlphaGoesOnFromAnotherScheme) {
 }
 
 TEST(Models, AccelerationOfTheFluidAtRestIsTheVelocityOfTheOverdampedModel) {
-    // maths 3: with u = 0 the fluid's equation for d_t u is the overdamped one for u. One has Taylor-Hood elements and
-    // the other a scalar: integrals against a smooth field agree the better the finer the mesh (the force itself, as a
-    // fourth derivative, has no stable values at points).
+    // theory.md (3.8): with u = 0 the fluid's equation for d_t u is the overdamped one for u. One has Taylor-Hood
+    // elements and the other a scalar: integrals against a smooth field agree the better the finer the mesh (the force
+    // itself, as a fourth derivative, has no stable values at points).
     const double tau = 1e-9;
     double gap[2];
     for (int i : {0, 1}) {
@@ -359,7 +360,8 @@ TEST(Models, AFirstStepGoesOnWithTheVelocityOfTheStart) {
 }
 
 TEST(Models, NewMeshesKeepMomenta) {
-    // Friction alone changes them (maths 3). By interpolation alone they are off by more than a hundred times that.
+    // Friction alone changes them, theory.md (3.15). By interpolation alone they are off by more than a hundred times
+    // that.
     const Model model{.kind = ModelKind::fluid, .Re = 1, .gamma = 0.3, .keeps_volume = {}};
     Motion motion(mesh_of(wavy, icosphere(3), 3), model, {.k = {0.125, 0, 0.05}, .H0 = 0});
     motion.state = motion.stepper.start(motion.mesh(), rigid(motion.state.X, {0.1, 0.2, -0.3}, {0.3, -0.2, 0.5}));
@@ -379,8 +381,8 @@ TEST(Models, NewMeshesKeepMomenta) {
 }
 
 TEST(Models, MomentumDecaysByFriction) {
-    // maths 3: momentum and angular momentum fall as exp(-gamma t), whatever the membrane does. They are kept so, step
-    // by step; the speed in between, which nothing prescribes, agrees with steps half as long.
+    // theory.md (3.15): momentum and angular momentum fall as exp(-gamma t), whatever the membrane does. They are kept
+    // so, step by step; the speed in between, which nothing prescribes, agrees with steps half as long.
     const double gamma = 0.8, end = 0.1;
     double speed[2];
     for (int i : {0, 1}) {
@@ -406,8 +408,8 @@ TEST(Models, MomentumDecaysByFriction) {
 }
 
 TEST(Models, RotatingTubeStaysStraight) {
-    // maths 5: lambda0 = b0 + p0/R + omega^2 R. On a straight tube the pressure stands for lambda; without friction the
-    // rotation goes on.
+    // theory.md (5.4): lambda0 = b0 + p0/R + omega^2 R. On a straight tube the pressure stands for lambda; without
+    // friction the rotation goes on.
     const double R = 0.8, omega = 0.7;
     const Bending energy{.k = {0.5, 0, 0.1}, .H0 = -0.4};
     Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4),

@@ -69,7 +69,7 @@ TEST(PaperScheme, FirstStepIsThatOfTheDefaultForEveryTerm) {
 }
 
 TEST(PaperScheme, OverdampedVelocityIsTheFluidsInitialAcceleration) {
-    // Stokes with much friction is the third way to the same: all have the same right-hand side (maths 3).
+    // Stokes with much friction is the third way to the same: all have the same right-hand side: theory.md (3.8).
     const CurvedMesh mesh = smooth_cell(3);
     const Bending bending{.k = {1, 0, 0.1}, .H0 = 0};
     const double tau = 1e-11, gamma = 1e11;  // so short that nothing is implicit
@@ -107,7 +107,7 @@ TEST(PaperScheme, IsOfFirstOrderInTimeAndLosesEnergyAtEveryStep) {
 }
 
 TEST(PaperScheme, SmoothingLosesEnergy) {
-    // Exactly 19.2636 (maths 7). A prototype of the scheme found 7.9 with eps = .1 h^2.
+    // Exactly 19.2636, theory.md (7.10). A prototype of the scheme found 7.9 with eps = .1 h^2.
     const CurvedMesh mesh = mapped_mesh(icosphere(4), 3, map_of(perturbed_sphere()));
     const Bending bending{.k = {0, 0, 0.12}, .H0 = 0};
     const auto energy = [&](double smoothing) {

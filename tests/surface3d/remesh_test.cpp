@@ -286,7 +286,8 @@ TEST(Remesh, ChangesNoEnergyAreaOrVolume) {
 }
 
 TEST(Remesh, RepeatsWithoutDrift) {
-    // Each mesh is as far from the exact area and volume (maths 7) as the first one of its kind: errors do not add up.
+    // Each mesh is as far from the exact area and volume, theory.md (7.10), as the first one of its kind: errors do not
+    // add up.
     CurvedMesh mesh = mapped_mesh(icosphere(8), 3, map_of(perturbed_sphere()));
     double first = 0;
     for (int i = 0; i < 4; ++i) {

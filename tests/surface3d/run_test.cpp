@@ -50,7 +50,7 @@ void expect_honest(const Outcome& o, double exact) {
 }
 
 TEST(SurfaceRun, EnergiesAreAsAccurateAsAsked) {
-    // Exact values: maths 7.
+    // Exact values: theory.md (7.10).
     expect_honest(run_case(perturbed), 135.8066231985);
     expect_honest(run_case(perturbed, {"energy.k20=0", "energy.k42=1"}), 160.529992807);
     expect_honest(run_case("kind = \"torus\"\nradius = 1.5\ntube_radius = 0.5\n"), integral_H2(Torus{1.5, 0.5}));
@@ -62,7 +62,7 @@ TEST(SurfaceRun, EnergiesAreAsAccurateAsAsked) {
 
 TEST(SurfaceRun, AreaAndVolume) {
     const Outcome o = run_case("kind = \"dumbbell\"\n", {"accuracy.energy=1e-5"});
-    EXPECT_NEAR(o.at("area"), 5.176926500756, 2e-5);  // maths 7
+    EXPECT_NEAR(o.at("area"), 5.176926500756, 2e-5);  // theory.md (7.9)
     EXPECT_NEAR(o.at("volume"), 0.777918180889, 1e-5);
     EXPECT_NEAR(o.at("integral_K"), 4 * pi, 1e-4);
     EXPECT_EQ(o.at("elements"), o.summary.elements);

@@ -52,7 +52,7 @@ J tube_density(const Bending& energy, double tension, const J& r, const J& r_t, 
 }
 
 TEST(Dispersion, stiffnessIsTheSecondVariationOfTheEnergy) {
-    // Theorem (maths 5, last but one line, for any m): along straight normals E'' = (G - b0/R) INT w^2, w = cos(q z)
+    // Theorem, theory.md (5.13): along straight normals E'' = (G - b0/R) INT w^2, w = cos(q z)
     // cos(m theta), and E' = -b0 INT 1 dS for w = 1. Trapezoids integrate periodic functions exactly.
     std::mt19937 random(1);
     std::uniform_real_distribution<double> number(-1, 1);
@@ -130,9 +130,9 @@ TEST(Dispersion, theSameForSpheres) {
     }
 }
 
-// The linearised equations (maths 3) for (w, u_z, u_theta, p, a) on a tube unrolled to y = R theta, all going with
-// exp(i q z + i m theta + s t): K - s M. B = -1/R in the direction of theta, so that sigma_thth = d_y u_theta + w/R,
-// and the viscous force has the normal part 2 mu B:sigma = -2 mu sigma_thth/R.
+// The linearised equations theory.md (3.1), (3.2) for (w, u_z, u_theta, p, a) on a tube unrolled to y = R theta, all
+// going with exp(i q z + i m theta + s t): K - s M. B = -1/R in the direction of theta, so that sigma_thth = d_y
+// u_theta + w/R, and the viscous force has the normal part 2 mu B:sigma = -2 mu sigma_thth/R.
 Eigen::Matrix<Complex, 5, 5> equations(const UniformTube& tube, const Model& law, double q, int m, Complex s) {
     const double R = tube.radius, mu = law.kind == ModelKind::overdamped ? 0 : 1 / law.Re,
                  gamma = law.kind == ModelKind::overdamped ? 1 : law.gamma;
@@ -198,13 +198,14 @@ TEST(Dispersion, modelsAgreeInTheirLimits) {
                      other = growth(tube, model(kind, 2, 0.3), 0.7, -1);
         for (std::size_t i = 0; i < one.roots.size(); ++i) EXPECT_EQ(one.roots[i], other.roots[i]);
     }
-    // maths 5 (c): m = 0, gamma = 0: s = -Re R^2 G/4.
+    // theory.md (5.11): m = 0, gamma = 0: s = -Re R^2 G/4.
     EXPECT_NEAR(growth(tube, model(ModelKind::stokes, 2, 0), 0.7, 0).rate(),
                 -2 * 0.8 * 0.8 / 4 * stiffness(tube, 0)(0.7), 1e-12);
     // A ring wave is not sheared: without friction nothing resists it.
     EXPECT_EQ(growth(tube, model(ModelKind::stokes, 2, 0), 0, 2).rate(), -std::numeric_limits<double>::infinity());
     EXPECT_EQ(growth(tube, model(ModelKind::fluid, 2, 0), 0, 1).rate(), 0);
-    // maths 6 (d): the sphere's fluid is its Stokes flow where that is slow, and one with friction 1 the overdamped.
+    // theory.md (6.7): the sphere's fluid is its Stokes flow where that is slow, and one with friction 1 the
+    // overdamped.
     const UniformSphere sphere{bending(0.3, -0.4, 0.02, 0.15), 1.2, 0.7};
     for (int l = 2; l <= 5; ++l) {
         const double stokes = growth(sphere, model(ModelKind::stokes, 1e-4, 0), l).rate();
@@ -216,36 +217,38 @@ TEST(Dispersion, modelsAgreeInTheirLimits) {
     EXPECT_NEAR(toroidal_rate(sphere, model(ModelKind::fluid, 2, 0.3), 1), -0.3, 1e-15);  // a rotation: friction alone
 }
 
-// ---- thresholds, for k40 = 0, in P, c, kappa (maths 5)
+// ---- thresholds, for k40 = 0, in the reduced tension, c = H0 R, beta = k42/(k20 R^2): theory.md (5.20) and after
 
-UniformTube tube_of(double P, double c, double kappa, double k20 = 0.4, double R = 1.3) {
-    return {bending(k20, c / R, 0, kappa * k20 * R * R), R, (P - (c * c - 1) / 2) * 2 * k20 / (R * R)};
+UniformTube tube_of(double Sigma, double c, double beta, double k20 = 0.4, double R = 1.3) {
+    return {bending(k20, c / R, 0, beta * k20 * R * R), R, (Sigma - (c * c - 1) / 2) * 2 * k20 / (R * R)};
 }
-double tension_of(double P, double c, double k20 = 0.4, double R = 1.3) {
-    return (P - (c * c - 1) / 2) * 2 * k20 / (R * R);
+double tension_of(double Sigma, double c, double k20 = 0.4, double R = 1.3) {
+    return (Sigma - (c * c - 1) / 2) * 2 * k20 / (R * R);
 }
 
 TEST(Thresholds, pearling) {
     for (const double c : {-2.6, -1.5, -1.0, -0.6, 0.0, 0.8})
-        for (const double kappa : {-0.4, 0.0, 0.3, 2.0})
-            for (double P = -2.05; P < 1.9; P += 0.1) {
-                const UniformTube tube = tube_of(P, c, kappa);
-                EXPECT_NEAR(reduced_tension(tube), P, 1e-12);
-                const bool long_waves = P > 1,
-                           finite = P < 1 && P + 2 * c < 0 && kappa < (P + 2 * c) * (P + 2 * c) / (4 * (1 - P)) - 1;
-                EXPECT_EQ(!growing_bands(tube, 0).empty(), long_waves || finite) << P << " " << c << " " << kappa;
+        for (const double beta : {-0.4, 0.0, 0.3, 2.0})
+            for (double Sigma = -2.05; Sigma < 1.9; Sigma += 0.1) {
+                const UniformTube tube = tube_of(Sigma, c, beta);
+                EXPECT_NEAR(reduced_tension(tube), Sigma, 1e-12);
+                const bool long_waves = Sigma > 1,
+                           finite = Sigma < 1 && Sigma + 2 * c < 0 &&
+                                    beta < (Sigma + 2 * c) * (Sigma + 2 * c) / (4 * (1 - Sigma)) - 1;
+                EXPECT_EQ(!growing_bands(tube, 0).empty(), long_waves || finite) << Sigma << " " << c << " " << beta;
                 const auto stable = stable_tensions(tube, 0);
                 EXPECT_EQ(stable && stable->lowest < tube.tension && tube.tension < stable->highest,
                           !long_waves && !finite)
-                    << P << " " << c << " " << kappa;
+                    << Sigma << " " << c << " " << beta;
                 const auto least = least_f_KK(tube);
                 ASSERT_EQ(least.has_value(), !long_waves);
                 if (least) {
-                    const double bound = P + 2 * c < 0 ? (P + 2 * c) * (P + 2 * c) / (4 * (1 - P)) - 1 : -1;
+                    const double bound =
+                        Sigma + 2 * c < 0 ? (Sigma + 2 * c) * (Sigma + 2 * c) / (4 * (1 - Sigma)) - 1 : -1;
                     EXPECT_NEAR(*least, 2 * bound * 0.4 * 1.3 * 1.3, 1e-11);
                 }
             }
-    // H0 = 0: sigma0 R^2/(2 k20) = 3/2, long waves (P = sigma0 R^2/(2 k20) - 1/2 = 1).
+    // H0 = 0: sigma0 R^2/(2 k20) = 3/2, long waves (Sigma = sigma0 R^2/(2 k20) - 1/2 = 1).
     const auto stable = stable_tensions(tube_of(0, 0, 0), 0);
     ASSERT_TRUE(stable);
     EXPECT_NEAR(stable->highest * 1.3 * 1.3 / (2 * 0.4), 1.5, 1e-12);
@@ -254,25 +257,25 @@ TEST(Thresholds, pearling) {
 
 TEST(Thresholds, tubeAtItsPreferredRadius) {
     // H0 = -1/R: without k42 the wave q R = 1 is neutral; k42 > 0 lifts it, k42 < 0 lets it grow. The gradient flow is
-    // sigma0 = 0, P = 0.
+    // sigma0 = 0, Sigma = 0.
     const UniformTube neutral = tube_of(0, -1, 0);
     EXPECT_NEAR(neutral.tension, 0, 1e-15);
     EXPECT_NEAR(stiffness(neutral, 0)(1 / neutral.radius), 0, 1e-15);
     EXPECT_GT(stiffness(tube_of(0, -1, 0.01), 0)(1 / neutral.radius), 0);
     EXPECT_TRUE(growing_bands(tube_of(0, -1, 0.01), 0).empty());
-    // maths 5: s = -(2 k20/R^4)[(1 + kappa) x^2 - 2 x + 1], largest at x = 1/(1 + kappa).
+    // theory.md (5.27): s = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], largest at x = 1/(1 + beta).
     const UniformTube grows = tube_of(0, -1, -0.2);
     ASSERT_EQ(growing_bands(grows, 0).size(), 1u);
     const auto fastest = fastest_wave(grows, model(ModelKind::gradient_flow), 0);
     ASSERT_TRUE(fastest);
     EXPECT_NEAR(fastest->q * 1.3, std::sqrt(1 / 0.8), 1e-7);
     EXPECT_NEAR(fastest->rate, 0.8 / std::pow(1.3, 4) * (1 / 0.8 - 1), 1e-14);
-    // The stable window 0 <= P <= 2 (sqrt(kappa^2 + kappa) - kappa), of all m: a point without k42, empty below.
-    for (const double kappa : {0.05, 0.5, 3.0}) {
-        const auto stable = common_stable_tensions(tube_of(0, -1, kappa), 4);
+    // The stable window 0 <= Sigma <= 2 (sqrt(beta^2 + beta) - beta), of all m: a point without k42, empty below.
+    for (const double beta : {0.05, 0.5, 3.0}) {
+        const auto stable = common_stable_tensions(tube_of(0, -1, beta), 4);
         ASSERT_TRUE(stable);
         EXPECT_NEAR(stable->lowest, 0, 1e-13);
-        EXPECT_NEAR(stable->highest, tension_of(2 * (std::sqrt(kappa * kappa + kappa) - kappa), -1), 1e-13);
+        EXPECT_NEAR(stable->highest, tension_of(2 * (std::sqrt(beta * beta + beta) - beta), -1), 1e-13);
         EXPECT_GT(stable->q_highest, 0);
     }
     EXPECT_FALSE(common_stable_tensions(tube_of(0, -1, -0.05), 4));
@@ -283,20 +286,20 @@ TEST(Thresholds, tubeAtItsPreferredRadius) {
 
 TEST(Thresholds, bucklingAndRings) {
     for (const double c : {-2.0, -1.0, 0.0, 0.7})
-        for (const double kappa : {-0.3, 0.0, 1.0}) {
-            // Buckling: P < -2 (1 + c). Ring: P < -3, where no helix grows before it (c > -5/2).
-            const UniformTube tube = tube_of(0.2, c, kappa);
+        for (const double beta : {-0.3, 0.0, 1.0}) {
+            // Buckling: Sigma < -2 (1 + c). Ring: Sigma < -3, where no helix grows before it (c > -5/2).
+            const UniformTube tube = tube_of(0.2, c, beta);
             EXPECT_NEAR(stable_tensions(tube, 1)->lowest, tension_of(-2 * (1 + c), c), 1e-13);
             EXPECT_NEAR(stable_tensions(tube, 2)->lowest, tension_of(-3, c), 1e-13);
             for (int m = 1; m <= 3; ++m)
                 for (const double by : {-1e-6, 1e-6}) {
                     UniformTube near = tube;
                     near.tension = stable_tensions(tube, m)->lowest + by;
-                    EXPECT_EQ(growing_bands(near, m).empty(), by > 0) << m << " " << c << " " << kappa;
+                    EXPECT_EQ(growing_bands(near, m).empty(), by > 0) << m << " " << c << " " << beta;
                 }
         }
-    // For c < -5/2 a wave of q > 0 comes before the ring. By maths 5, with k42 = 0 and y = q^2 R^2 + 3, it grows below
-    // P = -y - 2 (1 + c) + 6 (1 + c)/y, which is largest at y^2 = -6 (1 + c), here 12.
+    // For c < -5/2 a wave of q > 0 comes before the ring. By theory.md (5.24), with k42 = 0 and y = q^2 R^2 + 3, it
+    // grows below Sigma = -y - 2 (1 + c) + 6 (1 + c)/y, which is largest at y^2 = -6 (1 + c), here 12.
     const auto wavy = stable_tensions(tube_of(0, -3, 0), 2);
     EXPECT_NEAR(wavy->lowest, tension_of(4 - 4 * std::sqrt(3.0), -3), 1e-12);
     EXPECT_NEAR(wavy->q_lowest * 1.3, std::sqrt(std::sqrt(12.0) - 3), 1e-7);
@@ -359,8 +362,8 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
 // ---- in time
 
 TEST(Waves, aDriftingTube) {
-    // maths 7: R^4 = R0^4 + 4 k20 t for H0 = 0. The amplitude: s = -(k20/R^4)[2 (x - 1)^2 - (x - 1) + 4 x], x = q^2
-    // R^2, by Simpson's rule over the exact R(t).
+    // theory.md (7.12): R^4 = R0^4 + 4 k20 t for H0 = 0. The amplitude: s = -(k20/R^4)[2 (x - 1)^2 - (x - 1) + 4 x], x
+    // = q^2 R^2, by Simpson's rule over the exact R(t).
     const UniformTube tube{bending(0.2), 1};
     const double length = 7, end = 2, q = 2 * pi / length;
     const auto radius = [](double t) { return std::pow(1 + 0.8 * t, 0.25); };
@@ -405,7 +408,7 @@ TEST(Waves, meetTheReferenceRunsOnceSmall) {
 }
 
 TEST(Waves, areConservedTogether) {
-    // maths 5, TRAP: SUM w c a^2 stays, so a single wave is frozen; the tension is p0 = G/c for it.
+    // theory.md (5.14), (5.15): SUM Z a^2 stays, so a single wave is frozen; its tension is -G/Z.
     const UniformTube tube{bending(1, 0, 0, 0.1), 1};
     const double length = 6;
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {

@@ -69,7 +69,7 @@ TEST(ProfileCurve, CellIsSmoothAtThePoles) {
 }
 
 TEST(ProfileCurve, TubeThatOverhangs) {
-    // z' = 2 + 1.2 pi cos(2 pi t) < 0 about t = 1/2. At its points, curvatures are those of the curve (maths 4).
+    // z' = 2 + 1.2 pi cos(2 pi t) < 0 about t = 1/2. At its points, curvatures are those of the curve: theory.md (4.5).
     const double length = 2;
     const auto r = [](double t) { return 1 + 0.4 * std::cos(2 * pi * t); };
     const auto z = [&](double t) { return length * t + 0.6 * std::sin(2 * pi * t); };

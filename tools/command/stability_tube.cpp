@@ -257,7 +257,7 @@ void add_rows(Text& out, const ModelReport& report, double end) {
 
 void add_model(Text& out, const ModelReport& report, int last, double end) {
     add(out, "\n{}\n", words(report.model));
-    add(out, "  tension {:.8g} ({}); P = {:.8g}\n", report.tube.tension, report.tension_source,
+    add(out, "  tension {:.8g} ({}), reduced {:.8g}\n", report.tube.tension, report.tension_source,
         theory::reduced_tension(report.tube));
     const auto grown = instabilities(report.tube, last);
     const bool ill = theory::ill_posed_along(report.tube) || theory::ill_posed_around(report.tube);
@@ -286,7 +286,7 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
 
 void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Threshold>& limits, int last) {
     add(out, "\nwhere waves begin to grow, all else kept\n  {:<16} {:>3} {:>12}  {:>20} {:>14}\n", "", "m", "q",
-        "tension", "P");
+        "tension", "reduced");
     for (const Threshold& limit : limits) {
         UniformTube there = tube;
         there.tension = limit.tension;
@@ -366,10 +366,9 @@ std::string json_of(const ModelReport& report) {
                                      : "null";
     const auto least = least_f_KK_of(report.tube);
     return fmt::format(
-        "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, \"P\": "
-        "{}, "
-        "\"radius_rate\": "
-        "{},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": {},\n\"fastest_fitting\": {}}}",
+        "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, "
+        "\"reduced_tension\": {}, \"radius_rate\": {},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": "
+        "{},\n\"fastest_fitting\": {}}}",
         json(name(report.model.kind)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
         json(report.model.Re), json(report.model.gamma), json(report.tube.tension), json(report.tension_source),
         json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least / 2) : "null",

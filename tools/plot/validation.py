@@ -48,7 +48,7 @@ def read_table(path):
 
 
 def profile(angle):
-    """r, z, outward normal (r, z), H and K at an angle from the pole of the validation surface (maths 4, 7)."""
+    """r, z, outward normal (r, z), H and K at an angle from the pole of the dumbbell: theory.md (4.5), (7.9)."""
     import numpy as np
 
     c, s = np.cos(angle), np.sin(angle)

@@ -64,8 +64,9 @@ std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     return rest;
 }
 
-// What drives the waves of one m, of those that fit: -G of maths 5 of the one that is driven most. The models differ in
-// what they make of it, but not in its sign. For m = 0 those that repeat the cells of the start, as tier 1 does.
+// What drives the waves of one m, of those that fit: -G of theory.md (5.8) of the one that is driven most. The models
+// differ in what they make of it, but not in its sign. For m = 0 those that repeat the cells of the start, as tier 1
+// does.
 std::optional<double> driven_most(const Case& c, int m) {
     const auto tube = tube_at_rest(c);
     if (!tube) return std::nullopt;

@@ -1,5 +1,5 @@
-// When a tube in gradient flow has become so uniform that its fate is known: the closed dispersion relation (maths 5)
-// says that all its waves only decay from here on, whatever the radius does on its way to rest.
+// When a tube in gradient flow has become so uniform that its fate is known: the closed dispersion relation,
+// theory.md (5.6), says that all its waves only decay from here on, whatever the radius does on its way to rest.
 #pragma once
 
 #include <optional>
