@@ -1,10 +1,12 @@
 // Shape "capsule": a cylinder of length `length` along z, closed by two half spheres of the same radius.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/base_surface.hpp"
 
 namespace tubule {
 
@@ -22,6 +24,19 @@ Vector3<S> position(const Capsule& capsule, const Vector3<S>& p) {
     if (std::abs(z) > half) centre[2] = S(std::copysign(half, z));
     const Vector3<S> d = p - centre;
     return centre + d * S(capsule.radius * inverse_sqrt(S(d.dot(d))));
+}
+
+inline Profile base(const Capsule& c) {
+    const double cap = pi / 2 * c.radius, total = 2 * cap + c.length, half = c.length / 2;
+    const auto at = [=](double t) {
+        const double s = t * total;
+        if (s <= cap)
+            return Eigen::Vector2d(c.radius * std::sin(s / c.radius), -half - c.radius * std::cos(s / c.radius));
+        if (s <= cap + c.length) return Eigen::Vector2d(c.radius, std::clamp(s - cap - half, -half, half));
+        const double angle = (total - s) / c.radius;
+        return Eigen::Vector2d(c.radius * std::sin(angle), half + c.radius * std::cos(angle));
+    };
+    return {.at = at, .period = 0, .fixed = {cap / total, (cap + c.length) / total}};
 }
 
 inline double area(const Capsule& c) {

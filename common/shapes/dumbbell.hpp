@@ -3,6 +3,7 @@
 #pragma once
 
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/base_surface.hpp"
 
 namespace tubule {
 
@@ -17,6 +18,9 @@ Vector3<S> position(const Dumbbell&, const Vector3<S>& p) {
     const Vector3<S> n = p * inverse_sqrt(S(p.dot(p)));
     const S scale = 0.75 * (n[2] * n[2]) + 0.25;
     return {scale * n[0], scale * n[1], n[2]};
+}
+inline UnitSphere base(const Dumbbell&) {
+    return {};
 }
 
 template <class Keys>

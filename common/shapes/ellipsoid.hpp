@@ -5,6 +5,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/base_surface.hpp"
 
 namespace tubule {
 
@@ -18,6 +19,9 @@ template <class S>
 Vector3<S> position(const Ellipsoid& e, const Vector3<S>& p) {
     const S scale = inverse_sqrt(S(p.dot(p)));
     return {e.a * (p[0] * scale), e.b * (p[1] * scale), e.c * (p[2] * scale)};
+}
+inline UnitSphere base(const Ellipsoid&) {
+    return {};
 }
 
 inline double volume(const Ellipsoid& e) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/base_surface.hpp"
 
 namespace tubule {
 
@@ -48,6 +49,9 @@ Vector3<S> position(const Sphere& sphere, const Vector3<S>& p) {
     for (const SphereMode& mode : sphere.modes)
         r = r + (sphere.radius * mode.amplitude) * real_harmonic(mode.l, mode.m, n);
     return n * r;
+}
+inline UnitSphere base(const Sphere&) {
+    return {};
 }
 
 // Why this is no surface, worded to follow "shape"; empty when it is one.

@@ -24,6 +24,9 @@ Vector3<S> position(const Torus& torus, const Vector3<S>& p) {
     const S rho = along * scale + torus.radius;
     return {rho * cosine, rho * sine, p[2] * scale};
 }
+inline Torus base(const Torus& torus) {
+    return torus;
+}
 
 inline double area(const Torus& t) {
     return 4 * pi * pi * t.radius * t.tube_radius;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/base_surface.hpp"
 
 namespace tubule {
 
@@ -64,6 +65,9 @@ Vector3<S> position(const Tube& tube, const Vector3<S>& p) {
         r = r + mode.amplitude * re;
     }
     return {r * cosine, r * sine, p[2]};
+}
+inline Cylinder base(const Tube& tube) {
+    return {tube.radius, tube.length};
 }
 
 // The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.

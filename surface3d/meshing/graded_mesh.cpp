@@ -209,28 +209,6 @@ TriangleMesh rings_of_number(const Resolution& r, const Profile& profile, int tr
 
 }  // namespace
 
-Profile sphere_profile() {
-    return {
-        .at = [](double t) { return Eigen::Vector2d(std::sin(pi * t), -std::cos(pi * t)); }, .period = 0, .fixed = {}};
-}
-
-Profile tube_profile(double radius, double length) {
-    return {.at = [=](double t) { return Eigen::Vector2d(radius, length * t); }, .period = length, .fixed = {}};
-}
-
-Profile capsule_profile(const Capsule& c) {
-    const double cap = pi / 2 * c.radius, total = 2 * cap + c.length, half = c.length / 2;
-    const auto at = [=](double t) {
-        const double s = t * total;
-        if (s <= cap)
-            return Eigen::Vector2d(c.radius * std::sin(s / c.radius), -half - c.radius * std::cos(s / c.radius));
-        if (s <= cap + c.length) return Eigen::Vector2d(c.radius, std::clamp(s - cap - half, -half, half));
-        const double angle = (total - s) / c.radius;
-        return Eigen::Vector2d(c.radius * std::sin(angle), half + c.radius * std::cos(angle));
-    };
-    return {.at = at, .period = 0, .fixed = {cap / total, (cap + c.length) / total}};
-}
-
 Resolution measure_resolution(const ExactPoint& point, const Profile& profile, int order) {
     Resolution r{std::vector<double>(samples + 1), std::vector<double>(samples + 1), {}, {}};
     const auto at = [&](double t, double theta) {

@@ -7,23 +7,10 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
-#include "common/shapes/capsule.hpp"
+#include "common/shapes/base_surface.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 
 namespace tubule::surface3d {
-
-// A curve (r, z)(t), 0 <= t <= 1, that sweeps a surface around the z axis, outward to the right of its direction; with
-// period 0 from pole to pole, else (r, z)(1) is (r, z)(0) moved up by the period. `fixed` are parameters that rings of
-// points must have, where the surface is less smooth.
-struct Profile {
-    std::function<Eigen::Vector2d(double)> at;
-    double period = 0;
-    std::vector<double> fixed;
-};
-
-Profile sphere_profile();
-Profile tube_profile(double radius, double length);
-Profile capsule_profile(const Capsule& capsule);
 
 // What decides on sizes, at evenly spaced parameters 0 ... 1: lengths on the surface for a step of the parameter and
 // around the axis, and in column i of `defect` the errors of the shape operator, root mean square, that elements of

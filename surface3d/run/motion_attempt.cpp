@@ -84,9 +84,9 @@ void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
     summary.elements = mesh.triangles();
 }
 
-void MotionAttempt::begin() {
-    const StartMesh start = start_mesh(case_, memory_.settings.elements);
-    summary.warnings = start.notes;
+void MotionAttempt::begin(const Start& from) {
+    const StartMesh start = from.mesh(memory_.settings.elements, element_order(case_));
+    summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
     if (const auto fold = find_fold(mesh_quality(start.mesh))) {
         early_ = *fold;

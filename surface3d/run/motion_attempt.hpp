@@ -15,6 +15,7 @@
 #include "surface3d/run/motion_run.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/motion_trace.hpp"
+#include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 
@@ -31,7 +32,7 @@ public:
                   Clock::time_point started);
 
     // One of the first two, then go().
-    void begin();
+    void begin(const Start& start);
     void resume(const Restart& restart);
     void go();
 

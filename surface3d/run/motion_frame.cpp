@@ -52,17 +52,6 @@ VectorField field_of(const Record& record, const std::string& name) {
 
 }  // namespace
 
-SurfaceCells cells_of(const CurvedMesh& mesh) {
-    return {mesh.order, mesh.nodes.size(), mesh.cells, mesh.period, mesh.shifts};
-}
-
-CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points) {
-    CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
-    for (std::size_t i = 0; i < cells.nodes; ++i)
-        mesh.nodes.emplace_back(points.data[3 * i], points.data[3 * i + 1], points.data[3 * i + 2]);
-    return mesh;
-}
-
 Record motion_record(const MotionStepper& stepper, const MotionState& s, const MotionMeasures& m,
                      const Bending& bending, const MotionMemory& memory, std::size_t mesh_number) {
     Record out;

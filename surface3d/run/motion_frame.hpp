@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/result/result.hpp"
+#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/run/motion_settings.hpp"
 
@@ -34,16 +35,5 @@ struct MotionRestart {
 
 // Throws std::runtime_error if the record does not hold such a state.
 MotionRestart motion_restart(const Record& record);
-
-SurfaceCells cells_of(const CurvedMesh& mesh);
-CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points);
-
-// One column a node.
-template <class Columns>
-Array array(const std::string& name, const Columns& nodal) {
-    Array out{name, {static_cast<std::size_t>(nodal.cols())}, {nodal.data(), nodal.data() + nodal.size()}};
-    if (nodal.rows() > 1) out.shape.push_back(nodal.rows());
-    return out;
-}
 
 }  // namespace tubule::surface3d

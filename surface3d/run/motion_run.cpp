@@ -8,7 +8,6 @@
 #include "surface3d/run/motion_attempt.hpp"
 #include "surface3d/run/motion_series.hpp"
 #include "surface3d/run/motion_start.hpp"
-#include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -54,26 +53,24 @@ void accept(RunSummary& s, const Case& c, bool chosen, const Coarse& coarse) {
 // The runs of a case: in pairs, each finer than the one before.
 class Pairs {
 public:
-    Pairs(const Case& c, RunObserver& watch, const Restart* restart)
-        : case_(c), watch_(watch), restart_(restart), settings_(first_settings(c)) {
+    Pairs(const Case& c, const Start& start, RunObserver& watch, const Restart* restart)
+        : case_(c), start_(start), watch_(watch), restart_(restart), settings_(first_settings(c)) {
         if (restart) {
             begun_ = motion_restart(restart->record).memory.settings;
             if (begun_->role == Role::reported) settings_ = *begun_, coarse_.trace = {restart->record, coarser_trace};
         }
-        const StartMesh start = start_mesh(c, settings_.elements);
-        resizable_ = start.resizable, notes_ = start.notes;
     }
 
     RunSummary run() {
         if (coarse_.trace.empty()) {
             // The result shows the start, whatever ends the coarser run.
-            if (!restart_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin();
+            if (!restart_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin(start_);
             RunSummary other = run_coarse();
             if (can_go_on(other.stop.reason)) return unfinished(std::move(other));
             watch_.discard();  // the start, and what the other was saved with
             restart_ = nullptr;
         }
-        const bool given = settings_given(case_) || !resizable_;
+        const bool given = settings_given(case_) || !start_.resizable();
         for (;;) {
             MotionAttempt fine = attempt(case_, settings_, coarse_.trace.empty() ? nullptr : &coarse_.trace);
             RunSummary& s = fine.summary;
@@ -101,11 +98,11 @@ private:
         MotionAttempt out(c, watch_, settings, coarser, started_);
         const bool again = restart_ && begun_->role == settings.role;
         if (again) {
-            out.summary.warnings = notes_;
+            out.summary.warnings = start_.notes();
             out.resume(*restart_);
             restart_ = nullptr;
         } else {
-            out.begin();
+            out.begin(start_);
         }
         out.go();
         return out;
@@ -125,7 +122,7 @@ private:
     // So it has where fewer triangles lose the surface on the way.
     RunSummary run_coarse() {
         const bool begun = begun_ && begun_->role == Role::other_order;
-        const bool fewer = resizable_ && coarser(settings_, Role::fewer_triangles).elements >= least_triangles;
+        const bool fewer = start_.resizable() && coarser(settings_, Role::fewer_triangles).elements >= least_triangles;
         if (begun || !fewer) return run_coarse(Role::other_order);
         RunSummary first = run_coarse(Role::fewer_triangles);
         if (first.stop.reason != Stop::resolution_lost && first.stop.reason != Stop::pinch_off) return first;
@@ -146,13 +143,12 @@ private:
     }
 
     const Case& case_;
+    const Start& start_;
     RunObserver& watch_;
     const Restart* restart_;
     const Clock::time_point started_ = Clock::now();
     std::optional<MotionSettings> begun_;  // of the run that was interrupted
     MotionSettings settings_;              // of the run to be reported
-    bool resizable_ = false;
-    std::vector<std::string> notes_;
     Coarse coarse_;
 };
 
@@ -166,8 +162,8 @@ void check_restart(const Record& record) {
     motion_restart(record);
 }
 
-RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* restart) {
-    return Pairs(c, observer, restart).run();
+RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+    return Pairs(c, start, observer, restart).run();
 }
 
 }  // namespace tubule::surface3d

@@ -6,6 +6,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
+#include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 
@@ -22,6 +23,6 @@ void check_restart(const Record& record);
 
 // Each run is one of a pair: the energies of the coarser one, of fewer triangles and larger steps, tell the error of
 // the finer one, which is written. Pairs become finer until the energy is as accurate as asked at all times.
-RunSummary run_motion(const Case& c, RunObserver& observer, const Restart* restart);
+RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart);
 
 }  // namespace tubule::surface3d

@@ -7,9 +7,8 @@
 
 #include "common/solve/sparse.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/run/guards.hpp"
-#include "surface3d/run/motion_frame.hpp"
-#include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -72,9 +71,8 @@ struct Answer {
 // A mesh that is given: compared with the same triangles one order lower, or at the lowest with another recovery.
 Answer on_given_mesh(const Case& c, StartMesh start) {
     const int order = start.mesh.order;
-    const Measured other = order > 2
-                               ? measure(c, {with_order(start.mesh, order - 1), false, {}, {}}, c.surface.recovery)
-                               : measure(c, start, Recovery::normal);
+    const Measured other = order > 2 ? measure(c, {with_order(start.mesh, order - 1), {}, {}}, c.surface.recovery)
+                                     : measure(c, start, Recovery::normal);
     Answer answer{measure(c, std::move(start), c.surface.recovery), 0, 1};
     answer.error = given_mesh_margin * std::abs(answer.measured.o.energy - other.o.energy);
     return answer;
@@ -95,11 +93,11 @@ StopReport interruption() {
 
 // So many triangles, compared with a quarter and a sixteenth of them. No others have a say, so errors that change sign
 // are to be feared more.
-Answer on_elements(const Case& c, int elements, RunObserver& observer) {
+Answer on_elements(const Case& c, const Start& start, int elements, RunObserver& observer) {
     std::vector<double> energies;
     for (int part = 16;; part /= 4) {
         if (part > 1 && elements / part < fewest_triangles) continue;
-        Answer answer{measure(c, start_mesh(c, elements / part), c.surface.recovery), 0,
+        Answer answer{measure(c, start.mesh(elements / part, element_order(c)), c.surface.recovery), 0,
                       static_cast<int>(energies.size()) + 1};
         energies.push_back(answer.measured.o.energy);
         answer.error = error_or_all(estimated_error(energies, 1.0 / 4), answer.measured.o);
@@ -113,11 +111,11 @@ Answer on_elements(const Case& c, int elements, RunObserver& observer) {
 
 // Twice as many triangles again and again, until the energy is as accurate as asked. Every other mesh has half the
 // width; those in between have their own say, so that two energies which agree by chance do not end it.
-Answer as_accurate_as_asked(const Case& c, RunObserver& observer) {
+Answer as_accurate_as_asked(const Case& c, const Start& start, RunObserver& observer) {
     std::vector<double> energies[2];
     double before = std::numeric_limits<double>::infinity();
     for (int count = 0, triangles = fewest_triangles;; ++count, triangles *= 2) {
-        Answer answer{measure(c, start_mesh(c, triangles), c.surface.recovery), 0, count + 1};
+        Answer answer{measure(c, start.mesh(triangles, element_order(c)), c.surface.recovery), 0, count + 1};
         std::vector<double>& same = energies[count % 2];
         same.push_back(answer.measured.o.energy);
         const double error = estimated_error(same);
@@ -132,10 +130,10 @@ Answer as_accurate_as_asked(const Case& c, RunObserver& observer) {
     }
 }
 
-Answer answer_to(const Case& c, RunObserver& observer) {
-    StartMesh first = start_mesh(c, c.surface.elements.value_or(fewest_triangles));
-    if (!first.resizable) return on_given_mesh(c, std::move(first));
-    return c.surface.elements ? on_elements(c, *c.surface.elements, observer) : as_accurate_as_asked(c, observer);
+Answer answer_to(const Case& c, const Start& start, RunObserver& observer) {
+    if (!start.resizable()) return on_given_mesh(c, start.mesh(0, element_order(c)));
+    return c.surface.elements ? on_elements(c, start, *c.surface.elements, observer)
+                              : as_accurate_as_asked(c, start, observer);
 }
 
 std::vector<double> row(const Answer& answer, double seconds) {
@@ -168,13 +166,13 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
 }
 
 // What the run came to, in the end.
-StopReport stop_of(const Case& c, const Answer& answer, RunSummary& summary) {
+StopReport stop_of(const Case& c, const Start& start, const Answer& answer, RunSummary& summary) {
     if (answer.measured.stop) return *answer.measured.stop;
     const StopReport done{Stop::finished, 0, "geometry, curvature and energies of the shape", ""};
     if (summary.as_accurate_as_asked) return done;
     const std::string missed = fmt::format("the energy is off by {:.2g} of E_ref (estimated), {:.2g} was asked for",
                                            summary.estimated_error, c.accuracy.energy);
-    if (c.surface.elements || !answer.measured.start.resizable) {
+    if (c.surface.elements || !start.resizable()) {
         summary.warnings.push_back(missed + ": the triangles are given");
         return done;
     }
@@ -194,14 +192,14 @@ std::vector<std::string> series_names(const Case& c) {
     return names;
 }
 
-void check_start(const Case& c) {
-    start_mesh(c, fewest_triangles);
+RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
+    return run(c, Start(c), observer, restart);
 }
 
-RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
-    if (c.moves()) return run_motion(c, observer, restart);
+RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+    if (c.moves()) return run_motion(c, start, observer, restart);
     const auto started = std::chrono::steady_clock::now();
-    const Answer answer = answer_to(c, observer);
+    const Answer answer = answer_to(c, start, observer);
     const Measured& m = answer.measured;
     RunSummary s;
     s.energy = m.o.energy;
@@ -209,13 +207,13 @@ RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
     s.estimated_error = s.reference_energy > 0 ? answer.error / s.reference_energy : 0;
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
     s.elements = m.start.mesh.triangles();
-    s.warnings = m.start.notes;
+    s.warnings = start.notes();
     s.effort = fmt::format("{} triangles of order {}, {} nodes", s.elements, m.start.mesh.order, m.start.mesh.size());
     s.details = {{"elements", std::int64_t{s.elements}},
                  {"nodes", std::int64_t{m.start.mesh.size()}},
                  {"order", std::int64_t{m.start.mesh.order}},
                  {"meshes", std::int64_t{answer.meshes}}};
-    s.stop = stop_of(c, answer, s);
+    s.stop = stop_of(c, start, answer, s);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     if (m.has_curvature()) observer.row(row(answer, seconds));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));

@@ -13,12 +13,12 @@ namespace tubule::surface3d {
 // Names of the series a run of this case writes, "time" first.
 std::vector<std::string> series_names(const Case& c);
 
-// Throws CaseError where the shape of the case cannot be meshed, for then nothing should be written.
-void check_start(const Case& c);
-
 // A motion: motion_run.hpp. Else one row and one frame. The triangles are those of the case; where it leaves their
-// number open, they become more until the energy is as accurate as asked. What the geometry does (elements that fold,
-// curvatures of no surface) is reported in the summary; throws as check_start.
+// number open, they become more until the energy is as accurate as asked. `start` is that of the case. What the
+// geometry does (elements that fold, curvatures of no surface) is reported in the summary.
+RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart = nullptr);
+
+// The same from Start(c); throws as that.
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::surface3d

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <stdexcept>
 
 #include "common/case/read.hpp"
@@ -15,8 +17,8 @@
 #include "surface3d/curvature/exact_curvature.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
-#include "surface3d/run/motion_frame.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -29,26 +31,26 @@ int even(double n, int least) {
     return std::max(2 * static_cast<int>(std::lround(n / 2)), least);
 }
 
-// About so many equal triangles on the shape's base surface.
-TriangleMesh uniform_sphere(int triangles) {
+// About so many equal triangles on a base surface.
+TriangleMesh divided(const UnitSphere&, int triangles) {
     return icosphere(std::max(static_cast<int>(std::lround(std::sqrt(triangles / 20.0))), 1));
 }
-TriangleMesh uniform_torus(const Torus& torus, int triangles) {
+TriangleMesh divided(const Torus& torus, int triangles) {
     const double aspect = torus.radius / torus.tube_radius;
     return torus_grid(torus, even(std::sqrt(triangles / 2.0 * aspect), 4),
                       even(std::sqrt(triangles / 2.0 / aspect), 4));
 }
 // Rings half a spacing out of step make equilateral triangles where the height of a row is sqrt(3)/2 of the spacing.
-TriangleMesh uniform_tube(double radius, double length, int triangles) {
-    const double around = 2 * pi * radius, side = std::sqrt(around * length / triangles * 4 / std::sqrt(3.0));
-    return tube_rings(radius, length, even(length / (std::sqrt(0.75) * side), 2),
+TriangleMesh divided(const Cylinder& tube, int triangles) {
+    const double around = 2 * pi * tube.radius, side = std::sqrt(around * tube.length / triangles * 4 / std::sqrt(3.0));
+    return tube_rings(tube.radius, tube.length, even(tube.length / (std::sqrt(0.75) * side), 2),
                       std::max(static_cast<int>(std::lround(around / side)), 3));
 }
 
 // A surface of revolution with waves, as a map from a base; it may move.
 struct WavedMap {
-    const WavedProfile& surface;
-    const Torus& base;
+    WavedProfile surface;
+    Torus base;
     template <class S>
     Vector3<S> operator()(const Vector3<S>& p) const {
         return position(surface, base, p);
@@ -63,37 +65,42 @@ struct WavedMap {
     }
 };
 
-// The shape map(base), with its curvatures where the case wants the exact ones, and its velocity if it has one.
-template <class Map>
-StartMesh mapped(const Case& c, const TriangleMesh& base, const Map& map) {
-    const int order = element_order(c);
-    StartMesh start{mapped_mesh(base, order, map), true, {}, {}};
-    if constexpr (requires { map.velocities(base, order); }) start.velocity = map.velocities(base, order);
-    if (c.surface.recovery == Recovery::exact) start.exact = exact_curvature(start.mesh, exact_nodes(base, order, map));
-    return start;
+// What is needed for every order of elements is made once for each.
+template <class T>
+using ByOrder = std::shared_ptr<std::map<int, T>>;
+template <class T, class MakeOne>
+const T& once(const ByOrder<T>& made, int order, const MakeOne& make) {
+    const auto found = made->find(order);
+    return found != made->end() ? found->second : made->emplace(order, make()).first->second;
 }
 
-// The shape `map` over the profile's surface, in the kind of mesh that the case asks for.
-template <class Map, class Uniform>
-StartMesh meshed(const Case& c, int triangles, const Map& map, const Profile& profile, const Uniform& uniform) {
-    const auto base = [&] {
-        switch (c.surface.mesh) {
-            case MeshKind::graded:
-                return graded_rings(resolution_of(map, profile, element_order(c)), profile, triangles);
-            case MeshKind::irregular:
-                return jittered(uniform(), jitter, seed);
-            default:
-                return uniform();
+// Meshes of the shape map(base), of the kind that the case asks for, with curvatures where it wants the exact ones, and
+// the velocity of the map if it has one.
+template <class Base, class Map>
+Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
+    const ByOrder<Resolution> resolutions = std::make_shared<std::map<int, Resolution>>();
+    const auto triangulation = [=, kind = c.surface.mesh](int triangles, int order) {
+        if constexpr (!std::is_same_v<Base, Torus>) {
+            const auto resolution = [&]() -> const Resolution& {
+                return once(resolutions, order, [&] { return resolution_of(map, profile_of(base), order); });
+            };
+            if (kind == MeshKind::graded) return graded_rings(resolution(), profile_of(base), triangles);
+            if constexpr (std::is_same_v<Base, Profile>) {
+                TriangleMesh rings = uniform_rings(resolution(), base, triangles);
+                return kind == MeshKind::irregular ? jittered(rings, jitter, seed) : rings;
+            }
         }
+        if constexpr (!std::is_same_v<Base, Profile>)
+            return kind == MeshKind::irregular ? jittered(divided(base, triangles), jitter, seed)
+                                               : divided(base, triangles);
     };
-    return mapped(c, base(), map);
-}
-
-// The same where equal triangles need rings that follow the surface.
-template <class Map>
-StartMesh meshed_in_rings(const Case& c, int triangles, const Map& map, const Profile& profile) {
-    return meshed(c, triangles, map, profile,
-                  [&] { return uniform_rings(resolution_of(map, profile, element_order(c)), profile, triangles); });
+    return [=, exact = c.surface.recovery == Recovery::exact](int triangles, int order) {
+        const TriangleMesh flat = triangulation(triangles, order);
+        StartMesh start{mapped_mesh(flat, order, map), {}, {}};
+        if constexpr (requires { map.velocities(flat, order); }) start.velocity = map.velocities(flat, order);
+        if (exact) start.exact = exact_curvature(start.mesh, exact_nodes(flat, order, map));
+        return start;
+    };
 }
 
 std::filesystem::path beside(const Case& c, const std::string& path) {
@@ -102,6 +109,16 @@ std::filesystem::path beside(const Case& c, const std::string& path) {
 
 [[noreturn]] void refuse(const Case& c, const std::string& what) {
     throw CaseError(fmt::format("{}: {}", c.path, what));
+}
+
+// What `make` makes of a mesh of the case at `path`, which may turn out to be none to be used.
+template <class MakeOne>
+auto usable(const std::string& path, const MakeOne& make) {
+    try {
+        return make();
+    } catch (const MeshError& error) {
+        throw CaseError(fmt::format("{}: shape.path: {}", path, error.what()));
+    }
 }
 
 Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
@@ -128,9 +145,15 @@ double number(const Record& record, const std::string& name) {
     return 0;
 }
 
-struct MakeStart {
+// The meshes of a start; what else there is to say of them.
+struct Prepared {
+    Start::Make make;
+    bool resizable = true;
+    std::vector<std::string> notes = {};
+};
+
+struct Prepare {
     const Case& c;
-    int triangles;
 
     void refuse_what_needs_a_shape() const {
         if (c.surface.mesh != MeshKind::uniform || c.surface.elements)
@@ -140,66 +163,54 @@ struct MakeStart {
                 c,
                 "discretisation.recovery must not be \"exact\": of a surface made of triangles only points are known");
     }
-    void refuse_grading(const char* shape) const {
-        if (c.surface.mesh == MeshKind::graded)
-            refuse(c, fmt::format("discretisation.mesh must be \"uniform\" or \"irregular\" for {}, not \"graded\"",
-                                  shape));
-    }
-    template <class Map>
-    StartMesh on_torus(const Torus& base, const Map& map) const {
-        refuse_grading("a torus");
-        const TriangleMesh grid = uniform_torus(base, triangles);
-        return mapped(c, c.surface.mesh == MeshKind::irregular ? jittered(grid, jitter, seed) : grid, map);
+    template <class Base, class Map>
+    Prepared on(const Base& base, const Map& map) const {
+        if (std::is_same_v<Base, Torus> && c.surface.mesh == MeshKind::graded)
+            refuse(c, "discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
+        return {meshes_of(c, base, map)};
     }
 
-    template <class SphereLike>
-    StartMesh operator()(const SphereLike& shape) const {
-        return meshed(
-            c, triangles, [&](const auto& p) { return position(shape, p); }, sphere_profile(),
-            [&] { return uniform_sphere(triangles); });
+    template <class Shape>
+    Prepared operator()(const Shape& shape) const {
+        return on(base(shape), [shape](const auto& p) { return position(shape, p); });
     }
-    StartMesh operator()(const Tube& tube) const {
-        return meshed(
-            c, triangles, [&](const auto& p) { return position(tube, p); }, tube_profile(tube.radius, tube.length),
-            [&] { return uniform_tube(tube.radius, tube.length, triangles); });
-    }
-    StartMesh operator()(const Capsule& capsule) const {
-        return meshed_in_rings(
-            c, triangles, [&](const auto& p) { return position(capsule, p); }, capsule_profile(capsule));
-    }
-    StartMesh operator()(const Torus& torus) const {
-        return on_torus(torus, [&](const auto& p) { return position(torus, p); });
-    }
-    StartMesh operator()(const WavedProfile& surface) const {
+    Prepared operator()(const WavedProfile& surface) const {
         const ProfileCurve& curve = surface.curve;
         // Where the torus is only a base, its grid must be one of cells about as long as wide.
-        const Torus base{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
-        const WavedMap map{surface, base};
-        if (curve.kind == ProfileCurve::Kind::ring) return on_torus(base, map);
-        const bool tube = curve.kind == ProfileCurve::Kind::tube;
-        return meshed_in_rings(c, triangles, map,
-                               tube ? tube_profile(curve.mean_radius, curve.length) : sphere_profile());
+        const Torus torus{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
+        const WavedMap map{surface, torus};
+        if (curve.kind == ProfileCurve::Kind::ring) return on(torus, map);
+        if (curve.kind == ProfileCurve::Kind::cell) return on(profile_of(UnitSphere{}), map);
+        return on(profile_of(Cylinder{curve.mean_radius, curve.length}), map);
     }
-    StartMesh operator()(const MeshFile& file) const {
+    Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
-        try {
-            ImportedMesh imported = read_mesh(beside(c, file.path), file.weld);
-            close_mesh(imported);
-            Fit fit = fit_surface(imported, {.order = element_order(c), .smoothing = file.smoothing});
-            std::vector<std::string> notes = imported.notes;
-            notes.insert(notes.end(), fit.report.notes.begin(), fit.report.notes.end());
-            return {std::move(fit.surface), false, notes, {}};
-        } catch (const MeshError& error) {
-            refuse(c, fmt::format("shape.path: {}", error.what()));
-        }
+        const auto imported = std::make_shared<ImportedMesh>(usable(c.path, [&] {
+            ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld);
+            close_mesh(mesh);
+            return mesh;
+        }));
+        const ByOrder<Fit> fits = std::make_shared<std::map<int, Fit>>();
+        const auto fit = [=, path = c.path, smoothing = file.smoothing](int order) -> const Fit& {
+            return once(fits, order, [&] {
+                return usable(path, [&] { return fit_surface(*imported, {order, smoothing}); });
+            });
+        };
+        std::vector<std::string> notes = imported->notes;
+        const std::vector<std::string>& more = fit(element_order(c)).report.notes;
+        notes.insert(notes.end(), more.begin(), more.end());
+        return {[=](int, int order) { return StartMesh{fit(order).surface, {}, {}}; }, false, notes};
     }
-    StartMesh operator()(const ResultFrame& from) const {
+    Prepared operator()(const ResultFrame& from) const {
         Result result;
         const Record frame = frame_of(c, from, result);
         if (frame.mesh) {
             refuse_what_needs_a_shape();
             const CurvedMesh mesh = curved_mesh(result.meshes.at(*frame.mesh), *find_array(frame, "points"));
-            return {mesh.order == element_order(c) ? mesh : with_order(mesh, element_order(c)), false, {}, {}};
+            return {[mesh](int, int order) {
+                        return StartMesh{mesh.order == order ? mesh : with_order(mesh, order), {}, {}};
+                    },
+                    false};
         }
         if (find_array(frame, "knots") && find_array(frame, "coefficients")) return of_graph(frame);
         const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");
@@ -210,7 +221,7 @@ struct MakeStart {
             refuse(c, fmt::format("shape.path: {}: {}", from.path, error.what()));
         }
     }
-    StartMesh of_graph(const Record& frame) const {
+    Prepared of_graph(const Record& frame) const {
         const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"),
                               find_array(frame, "knots")->data, find_array(frame, "coefficients")->data};
         if (tube.degree < 1 || tube.degree > 7 || tube.length <= 0 || tube.coefficients.empty() ||
@@ -218,17 +229,17 @@ struct MakeStart {
             refuse(c, "shape.path: the spline of the frame is damaged");
         double radius = 0;
         for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
-        return meshed(
-            c, triangles, [&](const auto& p) { return position(tube, p); }, tube_profile(radius, tube.length),
-            [&] { return uniform_tube(radius, tube.length, triangles); });
+        return on(Cylinder{radius, tube.length}, [tube](const auto& p) { return position(tube, p); });
     }
 };
 
 }  // namespace
 
-StartMesh start_mesh(const Case& c, int triangles) {
-    const MakeStart make{c, triangles};
-    return c.handover ? make(c.handover->surface) : std::visit(make, c.shape);
+Start::Start(const Case& c) {
+    Prepared prepared = c.handover ? Prepare{c}(c.handover->surface) : std::visit(Prepare{c}, c.shape);
+    make_ = std::move(prepared.make);
+    resizable_ = prepared.resizable;
+    notes_ = std::move(prepared.notes);
 }
 
 }  // namespace tubule::surface3d

@@ -1,6 +1,7 @@
-// The curved mesh that a case begins with.
+// The curved meshes that a case begins with.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,15 +13,29 @@ namespace tubule::surface3d {
 
 struct StartMesh {
     CurvedMesh mesh;
-    bool resizable = true;                // whether the number of triangles can be chosen; a file brings its own
-    std::vector<std::string> notes;       // what was changed on the way, in whole sentences
     std::optional<CurvatureField> exact;  // where the case asks for Recovery::exact
     VectorField velocity = {};            // of the nodes, where the start has one
 };
 
-// The shape of the case, or what is handed over to it, with about this many triangles, where that can be chosen. Throws
-// CaseError that names the key to blame: a file that cannot be read or used, a result without such a frame, a mesh or
-// exact curvatures that this shape has not.
-StartMesh start_mesh(const Case& c, int triangles);
+// The shape of the case, or what is handed over to it. Files are read, checked and fitted once, and so is what meshes
+// of all sizes have in common.
+class Start {
+public:
+    // Throws CaseError that names the key to blame: a file that cannot be read or used, a result without such a frame,
+    // a mesh or exact curvatures that this shape has not.
+    explicit Start(const Case& c);
+
+    // With elements of this order and about this many triangles, where their number can be chosen.
+    StartMesh mesh(int triangles, int order) const { return make_(triangles, order); }
+    bool resizable() const { return resizable_; }                     // whether it can; a file brings its own triangles
+    const std::vector<std::string>& notes() const { return notes_; }  // what was changed on the way, whole sentences
+
+    using Make = std::function<StartMesh(int triangles, int order)>;
+
+private:
+    Make make_;
+    bool resizable_ = true;
+    std::vector<std::string> notes_;
+};
 
 }  // namespace tubule::surface3d

@@ -7,7 +7,7 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
-#include "surface3d/run/motion_frame.hpp"
+#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/run/start.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
@@ -174,7 +174,7 @@ Result growing_tube(double first, double factor) {
     for (int i = 0; i <= 10; ++i) {
         Case then = c;
         std::get<Tube>(then.shape).modes = {{first * std::pow(factor, i / 10.0), 1, 1, 0.3}};
-        const surface3d::CurvedMesh mesh = surface3d::start_mesh(then, 60).mesh;
+        const surface3d::CurvedMesh mesh = surface3d::Start(then).mesh(60, element_order(then)).mesh;
         Record frame;
         frame.time = 0.2 * i;
         frame.mesh = result.meshes.size();

@@ -56,9 +56,8 @@ TEST(BaseMeshes, AreClosedAndOutward) {
         {"jittered torus", jittered(torus_grid(torus, 24, 12), 0.25, 2), on(torus), 0, volume(torus)},
         {"tube", tube_rings(0.5, 2, 8, 12), on(tube), 0, tube_volume},
         {"jittered tube", jittered(tube_rings(0.5, 2, 8, 12), 0.25, 3), on(tube), 0, tube_volume},
-        {"capsule",
-         uniform_rings(resolution_of(map_of(capsule), capsule_profile(capsule), 3), capsule_profile(capsule), 300),
-         on(capsule), 2, volume(capsule)}};
+        {"capsule", uniform_rings(resolution_of(map_of(capsule), base(capsule), 3), base(capsule), 300), on(capsule), 2,
+         volume(capsule)}};
     for (const Sample& sample : samples)
         for (int k = 2; k <= 4; ++k) {
             SCOPED_TRACE(std::string(sample.name) + ", k = " + std::to_string(k));
@@ -148,7 +147,7 @@ TEST(Shapes, HaveTheIntegralsTheyClaim) {
     EXPECT_NEAR(integrate_exactly(ball, map_of(perturbed_sphere()), K2) / perturbed_K2, 1, 1e-5);
 
     const Capsule capsule{0.4, 1.3};
-    const Profile profile = capsule_profile(capsule);
+    const Profile profile = base(capsule);
     const TriangleMesh rings = uniform_rings(resolution_of(map_of(capsule), profile, 3), profile, 1000);
     EXPECT_NEAR(integrate_exactly(rings, map_of(capsule), one) / area(capsule), 1, 1e-9);
     EXPECT_NEAR(integrate_exactly(rings, map_of(capsule), flux) / volume(capsule), 1, 1e-9);
@@ -226,7 +225,7 @@ TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesOnACapsule) {
     // K jumps where the caps begin: the error is of the order of the elements there. Measured: H and K 1.25 to 1.6,
     // E20 and E42 1.5 to 2.6.
     const Capsule capsule;
-    expect_gains(capsule, capsule_profile(capsule), {600, 1200, 2400}, integral_H2(capsule), integral_K2(capsule),
+    expect_gains(capsule, base(capsule), {600, 1200, 2400}, integral_H2(capsule), integral_K2(capsule),
                  {0, 1.2, 1.2, 1.4, 1.4});
 }
 
@@ -240,7 +239,7 @@ TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesAtANeck) {
         const auto p = graph_point(r.v, r.d[0], r.dd[0]);
         H2 += p.H * p.H * p.area / 1000, K2 += p.K * p.K * p.area / 1000;
     }
-    expect_gains(neck, tube_profile(1, 4), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
+    expect_gains(neck, profile_of(base(neck)), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
 }
 
 }  // namespace
