@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "axisym/run.hpp"
-#include "tools/auto/choice.hpp"
 #include "tools/auto/joined_file.hpp"
 #include "tools/auto/profile_watch.hpp"
 #include "tools/auto/waves.hpp"
@@ -167,8 +166,8 @@ private:
 
 class AutoRun {
 public:
-    AutoRun(const Case& c, RunObserver& file)
-        : case_(c), file_(file), clock_(c), choice_(choice_for(c)), names_(auto_series_names(c)) {}
+    AutoRun(const Case& c, const Choice& choice, RunObserver& file)
+        : case_(c), file_(file), clock_(c), choice_(choice), names_(auto_series_names(c, choice)) {}
 
     RunSummary in_three_dimensions(const surface3d::Restart* restart);
     RunSummary axisymmetric(const Record* restart);
@@ -185,7 +184,7 @@ private:
     const Case& case_;
     RunObserver& file_;
     Clock clock_;
-    Choice choice_;
+    const Choice& choice_;
     std::vector<std::string> names_;
     std::vector<std::string> warnings_;  // of the part before
     std::string effort_;
@@ -196,7 +195,7 @@ RunSummary AutoRun::in_three_dimensions(const surface3d::Restart* restart) {
     const Case c = surface_case(case_);
     const Before nothing;
     SurfacePart part(file_, {names_, surface3d::series_names(c), 2, 0}, nothing);
-    RunSummary s = surface3d::run(c, part, restart);
+    RunSummary s = surface3d::run(c, *choice_.start, part, restart);
     set_choice(s, "surface3d", choice_.reason);
     return s;
 }
@@ -286,17 +285,14 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const s
 
 }  // namespace
 
-std::vector<std::string> auto_series_names(const Case& c) {
-    return joined_series_names(c, choice_for(c).axisymmetric);
+std::vector<std::string> auto_series_names(const Case& c, const Choice& choice) {
+    return joined_series_names(c, choice.axisymmetric);
 }
 
-void check_auto_start(const Case& c) {
-    if (!choice_for(c).axisymmetric) surface3d::check_start(surface_case(c));
-}
-
-RunSummary run_auto(const Case& c, RunObserver& file, const surface3d::Restart* restart, const Result* unfinished) {
-    AutoRun run(c, file);
-    if (!choice_for(c).axisymmetric) return run.in_three_dimensions(restart);
+RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const surface3d::Restart* restart,
+                    const Result* unfinished) {
+    AutoRun run(c, choice, file);
+    if (!choice.axisymmetric) return run.in_three_dimensions(restart);
     if (!restart) return run.axisymmetric(nullptr);
     if (!restart->record.mesh && !is_switch(restart->record)) return run.axisymmetric(&restart->record);
     if (!unfinished) throw std::invalid_argument("a run of tier \"auto\" goes on in three dimensions with its file");

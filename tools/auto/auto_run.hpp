@@ -7,17 +7,18 @@
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
 #include "surface3d/run/run.hpp"
+#include "tools/auto/choice.hpp"
 
 namespace tubule {
 
-// As those of the tiers (surface3d/run/run.hpp); both throw CaseError where a result to start from cannot be read.
-std::vector<std::string> auto_series_names(const Case& c);
-void check_auto_start(const Case& c);
+// Names of the series of the file, "time" first.
+std::vector<std::string> auto_series_names(const Case& c, const Choice& choice);
 
-// An axisymmetric start is run in tier axisym, with the growth rates of waves around the axis at many times. Where the
-// noise of the case grows to auto.largest by them, the run is made again until then, and goes on in tier surface3d with
-// these waves on the profile. `unfinished` is the file that `restart` belongs to. What was chosen and why stands in the
-// summary's details ("choice", "reason", ...), and is told by note().
-RunSummary run_auto(const Case& c, RunObserver& file, const surface3d::Restart* restart, const Result* unfinished);
+// `choice` is that for the case. An axisymmetric start is run in tier axisym, with the growth rates of waves around the
+// axis at many times. Where the noise of the case grows to auto.largest by them, the run is made again until then, and
+// goes on in tier surface3d with these waves on the profile. `unfinished` is the file that `restart` belongs to. What
+// was chosen and why stands in the summary's details ("choice", "reason", ...), and is told by note().
+RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const surface3d::Restart* restart,
+                    const Result* unfinished);
 
 }  // namespace tubule

@@ -20,7 +20,7 @@
 #include "common/solve/progress.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/scan/tiers.hpp"
+#include "tools/run/engine.hpp"
 
 namespace tubule {
 
@@ -150,12 +150,13 @@ struct Opened {
     std::optional<Result> unfinished;  // the file that it belongs to, as it was found
 };
 
-Opened create(const Case& c, const std::filesystem::path& file) {
-    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), series_names(c)), std::nullopt, std::nullopt};
+Opened create(const Case& c, const Engine& engine, const std::filesystem::path& file) {
+    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), engine.series_names()), std::nullopt,
+            std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
-std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
+std::optional<Opened> resume(const Case& c, const Engine& engine, const std::filesystem::path& file) {
     Result old = read_result(file);
     if (old.case_text.text != c.text || old.case_text.sets != c.sets)
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
@@ -164,18 +165,19 @@ std::optional<Opened> resume(const Case& c, const std::filesystem::path& file) {
     if (c.equilibrium && !stop)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
-    if (old.frames.empty() && !old.checkpoint) return create(c, file);
-    ResultWriter writer = ResultWriter::resume(file, [&](const Record& record) { check_restart(c, record); });
+    if (old.frames.empty() && !old.checkpoint) return create(c, engine, file);
+    ResultWriter writer = ResultWriter::resume(file, [&](const Record& record) { engine.check_restart(record); });
     const Record& record = writer.restart_record();
     surface3d::Restart restart{record, record.mesh ? old.meshes.at(*record.mesh) : SurfaceCells{}};
     return Opened{std::move(writer), std::move(restart), std::move(old)};
 }
 
 // A result that cannot be written or resumed is found before anything is computed: bad input.
-std::optional<Opened> open_result(const Case& c, const std::filesystem::path& file, bool resuming) {
+std::optional<Opened> open_result(const Case& c, const Engine& engine, const std::filesystem::path& file,
+                                  bool resuming) {
     try {
-        if (resuming && std::filesystem::exists(file)) return resume(c, file);
-        return create(c, file);
+        if (resuming && std::filesystem::exists(file)) return resume(c, engine, file);
+        return create(c, engine, file);
     } catch (const std::runtime_error& error) {
         throw CaseError(error.what());
     }
@@ -192,8 +194,8 @@ int run_case(Case c, const RunOptions& options) {
             if (e.time) c.time.output.push_back(*e.time);
 
     const auto started = std::chrono::steady_clock::now();
-    check_start(c);
-    std::optional<Opened> result = open_result(c, file, options.resume);
+    const auto engine = engine_for(c);
+    std::optional<Opened> result = open_result(c, *engine, file, options.resume);
     if (!result) {
         if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
@@ -202,7 +204,7 @@ int run_case(Case c, const RunOptions& options) {
     RunSummary summary;
     {
         Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->record.time : 0);
-        summary = run_tier(c, recorder, restart ? &*restart : nullptr, unfinished ? &*unfinished : nullptr);
+        summary = engine->run(recorder, restart ? &*restart : nullptr, unfinished ? &*unfinished : nullptr);
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     writer.finish(about_end(c, summary, seconds));

@@ -13,7 +13,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_frame.hpp"
-#include "tools/scan/tiers.hpp"
+#include "tools/run/engine.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
 namespace tubule {
@@ -39,8 +39,9 @@ int column(const std::vector<std::string>& series, const char* name) {
 // Keeps the last row and the last frame, and ends the run when its fate is known.
 class Watch : public RunObserver {
 public:
-    Watch(const Case& c, bool to_the_end, const std::function<bool()>& interrupted) : interrupted_(interrupted) {
-        const auto series = series_names(c);
+    Watch(const Case& c, const std::vector<std::string>& series, bool to_the_end,
+          const std::function<bool()>& interrupted)
+        : interrupted_(interrupted) {
         for (const char* name : {"energy", "volume", "r_min", "r_max", "area"})
             columns_.push_back(column(series, name));
         if (!to_the_end) fate_ = UniformFate::of(c);
@@ -138,8 +139,9 @@ PointResult computed(Case c, bool to_the_end, const std::function<bool()>& inter
     c.time.output.clear();
     double steps = 0;
     for (std::optional<surface3d::Restart> from;;) {
-        Watch watch(c, to_the_end, interrupted);
-        const RunSummary summary = run_tier(c, watch, from ? &*from : nullptr);
+        const auto engine = engine_for(c);
+        Watch watch(c, engine->series_names(), to_the_end, interrupted);
+        const RunSummary summary = engine->run(watch, from ? &*from : nullptr);
         PointResult p = summed_up(c, summary, watch);
         p[Measure::steps] = steps += p[Measure::steps];
         if (summary.stop.reason != Stop::stationary || !watch.last_frame) return p;

@@ -1,0 +1,89 @@
+#include "tools/run/engine.hpp"
+
+#include <stdexcept>
+
+#include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/run.hpp"
+#include "tools/auto/auto_run.hpp"
+
+namespace tubule {
+namespace {
+
+class Axisymmetric : public Engine {
+public:
+    explicit Axisymmetric(const Case& c) : case_(c) {}
+    std::vector<std::string> series_names() const override { return axisym::series_names(case_); }
+    void check_restart(const Record& record) const override { axisym::check_restart(record); }
+    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result*) const override {
+        return axisym::run(case_, observer, restart ? &restart->record : nullptr);
+    }
+
+private:
+    const Case& case_;
+};
+
+class Equilibria : public Engine {
+public:
+    explicit Equilibria(const Case& c) : case_(c) { axisym::check_equilibrium(c); }
+    std::vector<std::string> series_names() const override { return axisym::equilibrium_series_names(case_); }
+    void check_restart(const Record& record) const override { axisym::check_restart(record); }
+    RunSummary run(RunObserver& observer, const surface3d::Restart*, const Result*) const override {
+        return axisym::run_equilibrium(case_, observer);
+    }
+
+private:
+    const Case& case_;
+};
+
+class ThreeDimensions : public Engine {
+public:
+    explicit ThreeDimensions(const Case& c) : case_(c), start_(c) {}
+    std::vector<std::string> series_names() const override { return surface3d::series_names(case_); }
+    void check_restart(const Record& record) const override {
+        if (case_.moves()) surface3d::check_restart(record);
+    }
+    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result*) const override {
+        if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
+        return surface3d::run(case_, start_, observer, restart);
+    }
+
+private:
+    const Case& case_;
+    surface3d::Start start_;
+};
+
+class Automatic : public Engine {
+public:
+    explicit Automatic(const Case& c) : case_(c), choice_(choice_for(c)) {}
+    std::vector<std::string> series_names() const override { return auto_series_names(case_, choice_); }
+    void check_restart(const Record& record) const override {
+        if (record.mesh)
+            surface3d::check_restart(record);
+        else
+            axisym::check_restart(record);
+    }
+    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result* unfinished) const override {
+        return run_auto(case_, choice_, observer, restart, unfinished);
+    }
+
+private:
+    const Case& case_;
+    Choice choice_;
+};
+
+}  // namespace
+
+std::unique_ptr<const Engine> engine_for(const Case& c) {
+    if (c.equilibrium) return std::make_unique<Equilibria>(c);
+    switch (c.tier) {
+        case Tier::axisym:
+            return std::make_unique<Axisymmetric>(c);
+        case Tier::surface3d:
+            return std::make_unique<ThreeDimensions>(c);
+        case Tier::automatic:
+            return std::make_unique<Automatic>(c);
+    }
+    throw std::logic_error("a tier without an engine");
+}
+
+}  // namespace tubule

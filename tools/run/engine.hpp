@@ -1,0 +1,35 @@
+// What runs a case: the one place that decides which tier it is.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/case/case.hpp"
+#include "common/result/run.hpp"
+#include "surface3d/run/run.hpp"
+
+namespace tubule {
+
+// A case, checked and with its start prepared: what it starts from is read once.
+class Engine {
+public:
+    virtual ~Engine() = default;
+
+    // Names of the series that a run writes, "time" first.
+    virtual std::vector<std::string> series_names() const = 0;
+
+    // Throws std::runtime_error where a run cannot go on from this record, as one of another version.
+    virtual void check_restart(const Record& record) const = 0;
+
+    // Runs the case, or goes on from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
+    // tier's own run.
+    virtual RunSummary run(RunObserver& observer, const surface3d::Restart* restart = nullptr,
+                           const Result* unfinished = nullptr) const = 0;
+};
+
+// The case must outlive its engine. Throws CaseError where the shape of the case cannot be meshed, or the result that
+// it starts from cannot be read.
+std::unique_ptr<const Engine> engine_for(const Case& c);
+
+}  // namespace tubule
