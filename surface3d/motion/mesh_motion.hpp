@@ -9,12 +9,12 @@
 namespace tubule::surface3d {
 
 // Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to a good one:
-// (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/(relaxation + te), with a multiplier m. With a = 1 and Euler
-// steps, in the limit of no relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose positions do
-// not converge with the step. What pulls is taken where the matrices are, so that it knows nothing of how nodes moved
-// before: the pull of other positions would draw nodes, if relaxation is short, to where X is extrapolated to, and
-// motions along the surface would go on for ever. To follow the curvature, a is what a triangle has of INT |B|^2,
-// bounded, over the mean of all: triangles with more than their share contract.
+// (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/(relaxation + te), with a multiplier m: theory.md (10.14). With a
+// = 1 and Euler steps, in the limit of no relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose
+// positions do not converge with the step. What pulls is taken where the matrices are, so that it knows nothing of how
+// nodes moved before: the pull of other positions would draw nodes, if relaxation is short, to where X is extrapolated
+// to, and motions along the surface would go on for ever. To follow the curvature, a is what a triangle has of INT
+// |B|^2, bounded, over the mean of all: triangles with more than their share contract.
 class MeshMotion {
 public:
     explicit MeshMotion(bool follows_curvature) : follows_curvature_(follows_curvature) {}

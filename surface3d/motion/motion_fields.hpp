@@ -7,7 +7,7 @@ namespace tubule::surface3d {
 
 class Projection;
 
-// Nodal values. H nu is the weak Laplacian of the position, (H nu, phi) = -(grad X, grad phi): unlike all recoveries
+// Nodal values, theory.md (10.1), (10.2). H nu is the weak Laplacian of the position: unlike all recoveries
 // that look at the normal or at patches alone, it feels every wave that the mesh can hold, so that the bending force
 // restores them. K is that of the gradient of the continuous normal.
 struct MotionFields {

@@ -183,7 +183,8 @@ void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& 
     }
 }
 
-// inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (D(u), D(v))
+// theory.md (10.5): inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (D(u),
+// D(v))
 void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();

@@ -18,7 +18,7 @@ struct MotionUnknowns : FieldUnknowns {
 };
 
 // What a step is linearised about: the surface X* that is expected at its end, and what is known of its past. Over the
-// step, X = Xbar + te w and u_t = inertia (u - ubar): of backward differences of any order.
+// step, X = Xbar + te w and u_t = (u - ubar)/te: theory.md (10.4), backward differences of any order.
 struct StepBase {
     const CurvedMesh* mesh;     // X*
     MotionFields fields;        // of X*
@@ -41,7 +41,7 @@ struct StepSystem {
 };
 
 // H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in
-// both. The equations stand in docs/surface_motion.md.
+// both: theory.md (10.5), (10.6), (10.7), (10.8).
 void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 
