@@ -1,0 +1,12 @@
+# Library headers that most files include, read once a target instead of once a file: that halves the compiling. Files
+# still include what they use; a build with CMAKE_DISABLE_PRECOMPILE_HEADERS (preset `dev`) finds what they forgot.
+set(precompiled_headers
+  <algorithm> <array> <chrono> <cmath> <filesystem> <functional> <limits> <map> <memory> <numbers> <numeric> <optional>
+  <random> <set> <span> <stdexcept> <string> <string_view> <tuple> <utility> <variant> <vector>
+  <fmt/format.h> <fmt/ranges.h>
+  <Eigen/Dense> <Eigen/SparseCore>)
+
+# tubule_precompile(target [header...]): these, and further ones that this target uses throughout.
+function(tubule_precompile target)
+  target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
+endfunction()
