@@ -14,8 +14,8 @@
 
 namespace tubule::theory {
 
-// A straight tube, and a sphere. The tension sigma0 is that of the membrane, minus its base pressure p0. A gradient
-// flow with a tension is that of E + sigma0 A.
+// A straight tube, and a sphere. The tension is sigma0 of theory.md (5.8). A gradient flow with a tension is that of
+// E + sigma0 A.
 struct UniformTube {
     Bending energy;
     double radius = 1, tension = 0;

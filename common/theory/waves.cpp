@@ -21,11 +21,10 @@ namespace tubule::theory {
 
 namespace {
 
-// One wave's coefficients in the amplitude equations: c = Q - 1/R^2, g = G without tension. Of a fluid with inertia
-//   a'' = -(gamma + drag) a' + swirl y - M (g - p0 c) a,     y' = a' - (gamma + decay) y,
-// y being what the tangential swirl leaves behind; swirl = 0 for m = 0.
+// One wave's coefficients in theory.md (5.16), (5.18): Z, G without tension, the mobility M; of a fluid with inertia
+//   a'' = -(gamma + drag) a' + swirl y - M (G0 - p0 Z) a,     y' = a' - (gamma + decay) y.
 struct Coefficients {
-    double c, g, M, drag, swirl, decay;
+    double Z, G0, M, drag, swirl, decay;
 };
 
 struct Motion {
@@ -69,11 +68,11 @@ Motion prepared(const UniformTube& tube, const Model& model, double length, cons
             throw std::invalid_argument(fmt::format("the wave n = {}, m = {} is there twice", wave.n, wave.m));
         motion.of.push_back(coefficients(motion, wave));
         const Coefficients& k = motion.of.back();
-        if (!std::isfinite(k.M) && k.g != 0)
+        if (!std::isfinite(k.M) && k.G0 != 0)
             throw std::invalid_argument(
                 fmt::format("the wave n = 0, m = {} is infinitely fast in Stokes flow without friction", wave.m));
         if (!std::isfinite(k.M)) motion.of.back().M = 0;
-        moves += k.c * k.c * motion.of.back().M * wave.amplitude * wave.amplitude;
+        moves += k.Z * k.Z * motion.of.back().M * wave.amplitude * wave.amplitude;
     }
     if (motion.tension_is_outcome && !(moves > 0))
         throw std::invalid_argument("the tension that keeps area and volume needs a wave with an amplitude");
@@ -85,12 +84,12 @@ double tension(const Motion& motion, const double* y) {
     if (!motion.tension_is_outcome) return motion.tube.tension;
     double above = 0, below = 0;
     for (std::size_t k = 0; k < motion.of.size(); ++k) {
-        const auto& [c, g, M, drag, swirl, decay] = motion.of[k];
+        const auto& [Z, G0, M, drag, swirl, decay] = motion.of[k];
         const double* at = y + k * motion.per_wave();
         const double a = at[0];
-        above += c * M * g * a * a;
-        if (motion.fluid) above += c * (a * ((motion.model.gamma + drag) * at[1] - swirl * at[2]) - at[1] * at[1]);
-        below += c * c * M * a * a;
+        above += Z * M * G0 * a * a;
+        if (motion.fluid) above += Z * (a * ((motion.model.gamma + drag) * at[1] - swirl * at[2]) - at[1] * at[1]);
+        below += Z * Z * M * a * a;
     }
     return -above / below;
 }
@@ -109,9 +108,9 @@ int slope(double, const double* y, double* dy, void* parameters) {
     }
     const double p0 = -tension(motion, y);
     for (std::size_t k = 0; k < motion.of.size(); ++k) {
-        const auto& [c, g, M, drag, swirl, decay] = motion.of[k];
+        const auto& [Z, G0, M, drag, swirl, decay] = motion.of[k];
         const std::size_t at = k * motion.per_wave();
-        const double force = -M * (g - p0 * c) * y[at];
+        const double force = -M * (G0 - p0 * Z) * y[at];
         if (!motion.fluid) {
             dy[at] = force;
             continue;
