@@ -1,4 +1,4 @@
-// From shapes, points and graphs to spline curves in proportion to arc length.
+// From meridians of shapes, points and graphs to spline curves in proportion to arc length.
 #pragma once
 
 #include <array>
@@ -7,33 +7,12 @@
 #include <vector>
 
 #include "axisym/splines/curve_space.hpp"
-#include "common/shapes/capsule.hpp"
-#include "common/shapes/dumbbell.hpp"
 #include "common/shapes/ellipsoid.hpp"
+#include "common/shapes/meridian.hpp"
 #include "common/shapes/revolution.hpp"
-#include "common/shapes/sphere.hpp"
-#include "common/shapes/torus.hpp"
-#include "common/shapes/tube.hpp"
 
 namespace tubule::axisym {
 
-// A profile curve by any regular parameter t in [0, 1], in the direction that CurveSpace asks for.
-struct Meridian {
-    Topology topology = Topology::cell;
-    double length = 0;                                  // period of a tube
-    std::function<std::array<double, 4>(double t)> at;  // r, dr/dt, z, dz/dt
-    std::vector<double> seams;                          // where in (0, 1) it is less than smooth, ascending
-};
-
-// Closed cells from pole to pole; throw std::invalid_argument for what is not axisymmetric.
-Meridian meridian(const Sphere& sphere);
-Meridian meridian(const Ellipsoid& ellipsoid);
-Meridian meridian(const Dumbbell& dumbbell);
-Meridian meridian(const Capsule& capsule);
-// One period.
-Meridian meridian(const Torus& torus);
-Meridian meridian(const Tube& tube);
-Meridian meridian(const Revolution& surface);
 // Starts for the families of vesicles: a spheroid of this reduced volume (0 < v < 1) and the area 4 pi, prolate or
 // oblate; and a bowl, the shell between spheres of the radii 1 and 1 - thickness, open above the polar angle `opening`
 // from its bottom, with a round rim.

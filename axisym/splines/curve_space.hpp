@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "axisym/splines/profile_space.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule::axisym {
 
@@ -57,14 +58,6 @@ private:
     int size_ = 0;
     std::vector<int> dofs_;
     std::vector<double> signs_;
-};
-
-// What the curve is a part of, and what its ends are.
-enum class Topology {
-    cell,       // closed, from the south pole (s = 0) to the north pole: r odd, z even at both
-    half_cell,  // from the south pole to the equator z = 0, a plane of symmetry
-    tube,       // one period of a tube: r(s + 1) = r(s), z(s + 1) = z(s) + length; a torus if the length is 0
-    half_tube   // half a period, between the planes of symmetry z = 0 and z = length/2
 };
 
 struct CurvePoint {

@@ -259,8 +259,7 @@ void keys(Keys& k, Expect& expect, double end) {
     }
 
     Choices<Stop> stops;
-    for (int i = 0; i <= static_cast<int>(Stop::interrupted); ++i)
-        stops.emplace_back(name(static_cast<Stop>(i)), static_cast<Stop>(i));
+    for (const StopKind& kind : stop_kinds) stops.emplace_back(kind.name, kind.reason);
     k.choice("stop", expect.stop, stops);
 
     // Of series "time", the end has the time of stopping, also called so; at a moment, `time` is that moment.
@@ -293,19 +292,30 @@ inline bool is_tube(const Shape& shape) {
     return std::holds_alternative<Tube>(shape);
 }
 
-// Why a start is not one for tier "axisym": the key to blame, and the words that follow it. Empty if it is one.
-std::pair<std::string, std::string> not_axisymmetric(const Shape& shape);
+// Why a start is not one for tier "axisym".
+inline Asymmetry not_axisymmetric(const Shape& shape) {
+    return std::visit(
+        [](const auto& which) -> Asymmetry {
+            if constexpr (requires { asymmetry(which); }) return asymmetry(which);
+            return {};
+        },
+        shape);
+}
 
+// Where it is known how narrow the start is.
 template <class Keys>
 void check_neck(Keys& k, const Case& c) {
-    const Tube* tube = std::get_if<Tube>(&c.shape);
-    if (!tube) return;
-    k.check("accuracy.r_min", [&]() -> std::string {
-        const Neck neck = narrowest(*tube);
-        if (c.accuracy.r_min < neck.radius) return {};
-        return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}", neck.radius,
-                           neck.z, c.accuracy.r_min);
-    });
+    std::visit(
+        [&](const auto& shape) {
+            if constexpr (requires { narrowest(shape); })
+                k.check("accuracy.r_min", [&]() -> std::string {
+                    const Neck neck = narrowest(shape);
+                    if (c.accuracy.r_min < neck.radius) return {};
+                    return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}",
+                                       neck.radius, neck.z, c.accuracy.r_min);
+                });
+        },
+        c.shape);
 }
 
 // What no table can tell alone.

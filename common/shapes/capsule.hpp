@@ -7,6 +7,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -37,6 +38,19 @@ inline Profile base(const Capsule& c) {
         return Eigen::Vector2d(c.radius * std::sin(angle), half + c.radius * std::cos(angle));
     };
     return {.at = at, .period = 0, .fixed = {cap / total, (cap + c.length) / total}};
+}
+inline Meridian meridian(const Capsule& c) {
+    const double total = pi * c.radius + c.length, cap = pi / 2 * c.radius / total;
+    Meridian m;
+    m.seams = {cap, 1 - cap};
+    m.at = [c, total, cap](double t) {
+        if (t > cap && t < 1 - cap) return std::array{c.radius, 0.0, (t - 0.5) * total, total};
+        const double angle = (t <= cap ? t : t - 1) * total / c.radius;  // from the pole of this side
+        const double side = t <= cap ? 1 : -1;
+        return std::array{c.radius * std::sin(side * angle), side * total * std::cos(angle),
+                          -side * (c.length / 2 + c.radius * std::cos(angle)), side * total * std::sin(angle)};
+    };
+    return m;
 }
 
 inline double area(const Capsule& c) {

@@ -4,6 +4,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -21,6 +22,9 @@ Vector3<S> position(const Dumbbell&, const Vector3<S>& p) {
 }
 inline UnitSphere base(const Dumbbell&) {
     return {};
+}
+inline Meridian meridian(const Dumbbell& dumbbell) {
+    return sphere_image(dumbbell);
 }
 
 template <class Keys>

@@ -6,6 +6,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -22,6 +23,14 @@ Vector3<S> position(const Ellipsoid& e, const Vector3<S>& p) {
 }
 inline UnitSphere base(const Ellipsoid&) {
     return {};
+}
+inline Asymmetry asymmetry(const Ellipsoid& e) {
+    if (e.a == e.b) return {};
+    return {"shape.b", fmt::format("must be a = {}, not {}: tier \"axisym\" is axisymmetric about z", e.a, e.b)};
+}
+inline Meridian meridian(const Ellipsoid& e) {
+    require_axisymmetric(e);
+    return sphere_image(e);
 }
 
 inline double volume(const Ellipsoid& e) {

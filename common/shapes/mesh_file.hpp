@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "common/shapes/meridian.hpp"
+
 namespace tubule {
 
 struct MeshFile {
@@ -11,6 +13,10 @@ struct MeshFile {
     double weld = 0;    // vertices nearer than this become one, in the units of the file
     int smoothing = 0;  // how often vertices are moved to the least-squares surface: for noisy scans
 };
+
+inline Asymmetry asymmetry(const MeshFile&) {
+    return {"shape.kind", "must not be \"file\": meshes need tier = \"surface3d\""};
+}
 
 template <class Keys>
 void keys(Keys& k, MeshFile& file) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -41,6 +42,9 @@ template <class S>
 Vector3<S> position(const Revolution& surface, const Vector3<S>& p) {
     const S scale = radius_at(surface, p[2]) * inverse_sqrt(S(p[0] * p[0] + p[1] * p[1]));
     return {p[0] * scale, p[1] * scale, p[2]};
+}
+inline Meridian meridian(const Revolution& surface) {
+    return graph_meridian(surface);
 }
 
 }  // namespace tubule

@@ -6,6 +6,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -52,6 +53,13 @@ Vector3<S> position(const Sphere& sphere, const Vector3<S>& p) {
 }
 inline UnitSphere base(const Sphere&) {
     return {};
+}
+inline Asymmetry asymmetry(const Sphere& sphere) {
+    return wave_around(sphere.modes);
+}
+inline Meridian meridian(const Sphere& sphere) {
+    require_axisymmetric(sphere);
+    return sphere_image(sphere);
 }
 
 // Why this is no surface, worded to follow "shape"; empty when it is one.

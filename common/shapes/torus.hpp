@@ -6,6 +6,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -26,6 +27,15 @@ Vector3<S> position(const Torus& torus, const Vector3<S>& p) {
 }
 inline Torus base(const Torus& torus) {
     return torus;
+}
+inline Meridian meridian(const Torus& torus) {
+    Meridian m;
+    m.topology = Topology::tube;
+    m.at = [torus](double t) {
+        const double a = torus.tube_radius, c = std::cos(2 * pi * t), s = std::sin(2 * pi * t);
+        return std::array{torus.radius + a * c, -2 * pi * a * s, a * s, 2 * pi * a * c};
+    };
+    return m;
 }
 
 inline double area(const Torus& t) {

@@ -8,6 +8,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
 
@@ -68,6 +69,13 @@ Vector3<S> position(const Tube& tube, const Vector3<S>& p) {
 }
 inline Cylinder base(const Tube& tube) {
     return {tube.radius, tube.length};
+}
+inline Asymmetry asymmetry(const Tube& tube) {
+    return wave_around(tube.modes);
+}
+inline Meridian meridian(const Tube& tube) {
+    require_axisymmetric(tube);
+    return graph_meridian(tube);
 }
 
 // The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.

@@ -1,33 +1,62 @@
-// Why a run ended. One list serves exit codes, [expect], scans and pictures.
+// Why a run ended. One list serves exit statuses, [expect], scans, pictures and docs/results.md.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
 
 namespace tubule {
 
+// For each reason: its name here and in files, the exit status of the program (0 as asked, 3 the physics ended it, 4
+// the numerics failed, 5 time limit, 130 interrupted; bad input, 2, never gets as far as a Stop), and when it is given.
+// clang-format off
+#define TUBULE_STOPS(reason) \
+    reason(finished, "finished", 0, "the run reached `time.end`") \
+    reason(stationary, "stationary", 0, "nothing moves any more, as asked by `time.stationary`") \
+    reason(pinch_off, "pinch-off", 3, "a neck reached the floor `accuracy.r_min`") \
+    reason(overhang, "overhang", 3, "a graph r(z) has a vertical tangent") \
+    reason(ill_posed, "ill-posed", 3, "the flow is no longer parabolic: no resolution helps") \
+    reason(self_intersection, "self-intersection", 3, "the surface touches itself") \
+    reason(resolution_lost, "resolution-lost", 4, "the discretisation can no longer represent the shape") \
+    reason(mesh_lost, "mesh-lost", 4, "elements degenerated beyond repair") \
+    reason(solver_failed, "solver-failed", 4, "the time integrator or the linear solver gave up") \
+    reason(time_limit, "time-limit", 5, "`time.limit` seconds of wall clock are used") \
+    reason(interrupted, "interrupted", 130, "SIGINT or SIGTERM")
+// clang-format on
+
 enum class Stop {
-    finished,           // reached time.end
-    stationary,         // nothing moves any more, as asked by time.stationary
-    pinch_off,          // a neck reached the floor accuracy.r_min
-    overhang,           // a graph r(z) has got a vertical tangent
-    ill_posed,          // the flow is no longer parabolic: no resolution helps
-    self_intersection,  // the surface touches itself
-    resolution_lost,    // the discretisation can no longer represent the shape
-    mesh_lost,          // elements degenerated beyond repair
-    solver_failed,      // time integrator or linear solver gave up
-    time_limit,         // time.limit seconds of wall clock used
-    interrupted         // SIGINT or SIGTERM
+#define TUBULE_STOP(id, name, exit, meaning) id,
+    TUBULE_STOPS(TUBULE_STOP)
+#undef TUBULE_STOP
 };
 
-// "pinch-off" for Stop::pinch_off, and so on.
-std::string_view name(Stop reason);
-std::optional<Stop> stop_from_name(std::string_view name);
+struct StopKind {
+    Stop reason;
+    std::string_view name;  // "pinch-off" for Stop::pinch_off, and so on
+    int exit_code;
+    std::string_view meaning;
+};
+inline constexpr std::array stop_kinds{
+#define TUBULE_STOP(id, name, exit, meaning) StopKind{Stop::id, name, exit, meaning},
+    TUBULE_STOPS(TUBULE_STOP)
+#undef TUBULE_STOP
+};
 
-// Process exit status: 0 finished or stationary, 3 the physics ended it, 4 the numerics failed,
-// 5 time limit, 130 interrupted. (2, bad input, never gets as far as a Stop.)
-int exit_code(Stop reason);
+constexpr const StopKind& kind_of(Stop reason) {
+    return stop_kinds[static_cast<std::size_t>(reason)];
+}
+constexpr std::string_view name(Stop reason) {
+    return kind_of(reason).name;
+}
+constexpr int exit_code(Stop reason) {
+    return kind_of(reason).exit_code;
+}
+constexpr std::optional<Stop> stop_from_name(std::string_view name) {
+    for (const StopKind& kind : stop_kinds)
+        if (kind.name == name) return kind.reason;
+    return std::nullopt;
+}
 
 // What happened, where and when, and what to try.
 struct StopReport {

@@ -328,12 +328,18 @@ TEST(CurveStart, meridiansFromPointsAndCurves) {
 }
 
 TEST(CurveStart, refusals) {
-    EXPECT_EQ(message([] { meridian(Sphere{1, {{0.2, 3, 2}}}); }), "a sphere with a mode m = 2 is not axisymmetric");
-    EXPECT_EQ(message([] { meridian(Tube{1, 2, {{0.2, 3, 1, 0}}}); }), "a tube with a mode m = 1 is not axisymmetric");
+    EXPECT_EQ(message([] {
+                  meridian(Sphere{1, {{0.2, 3, 2}}});
+              }),
+              "shape.mode.0.m must be 0, not 2: tier \"axisym\" is axisymmetric and has no waves around the axis");
+    EXPECT_EQ(message([] {
+                  meridian(Tube{1, 2, {{0.2, 3, 1, 0}}});
+              }),
+              "shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no waves around the axis");
     EXPECT_EQ(message([] {
                   meridian(Ellipsoid{1, 2, 1});
               }),
-              "an ellipsoid with a = 1 and b = 2 is not axisymmetric: they must be equal");
+              "shape.b must be a = 1, not 2: tier \"axisym\" is axisymmetric about z");
     std::vector<std::array<double, 2>> points{{0, -1}, {0.5, -0.8}};
     EXPECT_EQ(message([&] { meridian(points, Topology::cell); }), "a curve needs at least 7 points, not 2");
     points = {{0, -1}, {0.5, -0.8}, {0.8, -0.5}, {1, 0}, {0.8, 0.5}, {0.5, 0.8}, {0.1, 1}};

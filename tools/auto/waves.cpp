@@ -16,7 +16,7 @@ namespace {
 constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
-axisym::Spectrum spectrum_of(const Case& c, Model model, const axisym::Meridian& profile) {
+axisym::Spectrum spectrum_of(const Case& c, Model model, const Meridian& profile) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
     settings.max_elements = most_elements;
@@ -50,7 +50,7 @@ double rate_with_inertia(double stokes, double overdamped) {
 }
 
 WaveRates wave_rates(const Case& c, const Record& frame) {
-    const axisym::Meridian profile = axisym::frame_meridian(frame);
+    const Meridian profile = axisym::frame_meridian(frame);
     const axisym::Spectrum found = spectrum_of(c, c.model, profile);
     WaveRates out;
     for (const axisym::ModeRates& mode : found.modes) out.rates.push_back(fastest(mode));

@@ -14,16 +14,14 @@ class App;
 
 namespace tubule {
 
-void add_run(CLI::App& app, int& exit_status);
-void add_equilibrium(CLI::App& app, int& exit_status);
-void add_stability(CLI::App& app, int& exit_status);
-void add_check(CLI::App& app, int& exit_status);
-void add_show(CLI::App& app, int& exit_status);
-void add_plot(CLI::App& app, int& exit_status);
-void add_compare(CLI::App& app, int& exit_status);
-void add_chart(CLI::App& app, int& exit_status);
-void add_scan(CLI::App& app, int& exit_status);
-void add_confirm(CLI::App& app, int& exit_status);
+// In the order in which --help lists them.
+#define TUBULE_COMMANDS(command)                                                                                     \
+    command(run) command(equilibrium) command(stability) command(scan) command(confirm) command(check) command(show) \
+        command(plot) command(compare) command(chart)
+
+#define TUBULE_COMMAND(name) void add_##name(CLI::App& app, int& exit_status);
+TUBULE_COMMANDS(TUBULE_COMMAND)
+#undef TUBULE_COMMAND
 
 // What a result says of its making when it begins: the build, the machine, when.
 About about_start();

@@ -14,16 +14,9 @@ int main(int argc, char** argv) {
     bool version = false;
     app.add_flag("--version", version, "what this program is made of");
     int status = 0;
-    tubule::add_run(app, status);
-    tubule::add_equilibrium(app, status);
-    tubule::add_stability(app, status);
-    tubule::add_scan(app, status);
-    tubule::add_confirm(app, status);
-    tubule::add_check(app, status);
-    tubule::add_show(app, status);
-    tubule::add_plot(app, status);
-    tubule::add_compare(app, status);
-    tubule::add_chart(app, status);
+#define TUBULE_COMMAND(name) tubule::add_##name(app, status);
+    TUBULE_COMMANDS(TUBULE_COMMAND)
+#undef TUBULE_COMMAND
     try {
         app.parse(argc, argv);
         if (version)

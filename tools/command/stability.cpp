@@ -131,8 +131,8 @@ std::optional<double> mean_of(const Record& frame, const std::string& array) {
 
 // A frame that is a straight tube, to a thousandth of its radius.
 std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
-    const axisym::Meridian profile = axisym::frame_meridian(frame);
-    if (profile.topology != axisym::Topology::tube || !(profile.length > 0)) return std::nullopt;
+    const Meridian profile = axisym::frame_meridian(frame);
+    if (profile.topology != Topology::tube || !(profile.length > 0)) return std::nullopt;
     TubeSubject out;
     out.tube = {c.energy, axisym::mean_radius(profile), 0};
     out.length = profile.length;

@@ -47,16 +47,9 @@ Outcome outcome_of(Stop reason, const EndShape& end) {
             return Outcome::ill_posed;
         case Stop::self_intersection:
             return Outcome::self_intersection;
-        case Stop::resolution_lost:
-        case Stop::mesh_lost:
-        case Stop::solver_failed:
-            return Outcome::failed;
-        case Stop::finished:
-        case Stop::time_limit:
-        case Stop::interrupted:
-            break;
+        default:  // no outcome of its own: the numerics failed, or the run could have gone on
+            return exit_code(reason) == exit_code(Stop::solver_failed) ? Outcome::failed : Outcome::undecided;
     }
-    return Outcome::undecided;
 }
 
 }  // namespace tubule

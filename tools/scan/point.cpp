@@ -22,6 +22,8 @@ namespace {
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 // A rate counts as none below this part of the fastest one: a tube may be shifted along itself at no cost.
 constexpr double translation = 1e-12;
+// Of stop_words(): those after the reasons why runs end.
+constexpr int decided_word = static_cast<int>(stop_kinds.size()), refused_word = decided_word + 1;
 constexpr double near_rest = 0.1;           // distance to the shape at rest / amplitude
 constexpr double next_stationarity = 1e-2;  // what a run that was not at rest is asked for next
 
@@ -119,7 +121,7 @@ PointResult summed_up(const Case& c, const RunSummary& s, const Watch& watch) {
     const EndShape end = watch.end(std::holds_alternative<Tube>(c.shape));
     const bool decided = watch.decided && s.stop.reason == Stop::interrupted;
     p.outcome = decided ? Outcome::uniform_tube : outcome_of(s.stop.reason, end);
-    p.stop = decided ? stop_word(Stop::interrupted) + 1 : stop_word(s.stop.reason);
+    p.stop = decided ? decided_word : stop_word(s.stop.reason);
     p.message = decided ? "all waves decay from here on" : s.stop.message;
     p[Measure::energy] = s.energy;
     p[Measure::time] = s.stop.time;
@@ -162,7 +164,7 @@ PointResult computed(Case c, bool to_the_end, const std::function<bool()>& inter
 const std::vector<std::string>& stop_words() {
     static const std::vector<std::string> words = [] {
         std::vector<std::string> all;
-        for (int i = 0; i <= static_cast<int>(Stop::interrupted); ++i) all.emplace_back(name(static_cast<Stop>(i)));
+        for (const StopKind& kind : stop_kinds) all.emplace_back(kind.name);
         all.insert(all.end(), {"decided", "refused"});
         return all;
     }();
@@ -191,7 +193,7 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
 PointResult refused_point(const std::string& message) {
     PointResult p;
     p.outcome = Outcome::failed;
-    p.stop = stop_word(Stop::interrupted) + 2;
+    p.stop = refused_word;
     p.measures.fill(unknown);
     p.message = message;
     return p;

@@ -9,7 +9,7 @@
 int main() {
     using namespace tubule;
     const double pi = std::acos(-1.0), R = 1.5;
-    const auto [area, volume] = axisym::area_and_volume(axisym::meridian(Sphere{R, {}}));
+    const auto [area, volume] = axisym::area_and_volume(meridian(Sphere{R, {}}));
     const Case c = parse_case(
         "tier = 'surface3d'\n[energy]\nk20 = 0.5\n[shape]\nkind = 'sphere'\nradius = 1.5\n[accuracy]\nenergy = 1e-3\n",
         {}, "sphere.toml");
