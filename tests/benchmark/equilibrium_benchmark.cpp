@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "axisym/equilibrium/equilibrium.hpp"
+#include "common/shapes/capsule.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 
 namespace tubule::axisym {
