@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "axisym/equilibrium/equilibrium.hpp"
-#include "common/shapes/capsule.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "common/shapes/capsule.hpp"
 
 namespace tubule::axisym {
 namespace {
