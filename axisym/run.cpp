@@ -41,15 +41,16 @@ std::vector<std::string> series_names(const Case& c) {
 }
 
 void check_restart(const Record& record) {
-    if (is_curve(record))
+    if (kind_of(record) == RecordKind::curve)
         curve_restart(record);
     else
         restart_state(record);
 }
 
-RunSummary run(const Case& c, RunObserver& observer, const Record* restart) {
-    if (!begins_as_graph(c) || (restart && is_curve(*restart))) return run_curve(c, observer, restart);
-    RunSummary summary = run_graph(c, observer, restart);
+RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
+    const Record* from = restart ? &restart->record : nullptr;
+    if (!begins_as_graph(c) || (from && kind_of(*from) == RecordKind::curve)) return run_curve(c, observer, from);
+    RunSummary summary = run_graph(c, observer, from);
     if (summary.stop.reason != Stop::overhang || c.discretisation.parametrisation) return summary;
     observer.discard();
     return run_curve(c, observer);

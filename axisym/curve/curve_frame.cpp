@@ -7,32 +7,23 @@
 #include <filesystem>
 #include <memory>
 
-#include "axisym/graph/graph_frame.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/result/frame_profile.hpp"
 
 namespace tubule::axisym {
 namespace {
 
 constexpr int samples_per_element = 6;
 
-Array array(const std::string& name, std::vector<double> data) {
-    return {name, {data.size()}, std::move(data)};
-}
-Array array(const std::string& name, const Eigen::VectorXd& v) {
-    return array(name, std::vector<double>(v.begin(), v.end()));
-}
-
-const Array* find(const Record& record, const std::string& name) {
-    for (const Array& a : record.arrays)
-        if (a.name == name) return &a;
-    return nullptr;
-}
-
-double number(const Record& record, const std::string& name) {
-    for (const auto& [key, value] : record.numbers)
-        if (key == name) return value;
-    return 0;
+// What a run needs to resume, by name.
+template <class Fields, class State>
+void restart_fields(Fields&& f, State& s) {
+    f.array("restart_breaks", s.breaks);
+    f.array("restart_y", s.y), f.array("restart_rate", s.rate, s.y.size());
+    f.number("restart_elements", s.elements), f.number("restart_tolerance", s.tolerance);
+    f.number("restart_total_start", s.total_start), f.number("restart_dissipated", s.dissipated);
+    f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
 }
 
 // One point of the profile, and what happens there.
@@ -118,7 +109,7 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     if (space.topology() == Topology::half_tube) complete(samples, space.rise());
 
     Record out;
-    out.time = time;
+    out.time = time, out.kind = RecordKind::curve;
     out.numbers = {{"energy", energy}, {"length", space.length()}};
     const auto add = [&](const char* name, double Sample::*member) {
         std::vector<double> values;
@@ -128,54 +119,25 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K), add("u_n", &Sample::u_n);
     if (motion.law().flows) add("u_t", &Sample::u_t), add("p", &Sample::p);
     if (motion.law().swirls) add("u_theta", &Sample::u_theta);
-    for (const Array& more :
-         {array("restart_breaks", breaks), array("restart_y", state.y), array("restart_rate", state.rate)})
-        out.arrays.push_back(more);
-    out.numbers.insert(out.numbers.end(), {{"restart_elements", static_cast<double>(state.elements)},
-                                           {"restart_tolerance", state.tolerance},
-                                           {"restart_total_start", state.total_start},
-                                           {"restart_dissipated", state.dissipated},
-                                           {"restart_error", state.error},
-                                           {"restart_reference_energy", state.reference_energy}});
+    restart_fields(RecordWriter(out), state);
     return out;
 }
 
-bool is_curve(const Record& record) {
-    return find(record, "restart_y") != nullptr;
-}
-
 CurveRestart curve_restart(const Record& record) {
-    const auto values = [&](const std::string& name) {
-        const Array* a = find(record, name);
-        if (!a) throw std::runtime_error(fmt::format("no restart record of a curve: it has no array {}", name));
-        return a->data;
-    };
-    const auto vector = [&](const std::string& name) {
-        const std::vector<double> data = values(name);
-        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(data.data(), static_cast<Eigen::Index>(data.size())));
-    };
-    return {values("restart_breaks"),
-            vector("restart_y"),
-            vector("restart_rate"),
-            static_cast<int>(number(record, "restart_elements")),
-            number(record, "restart_tolerance"),
-            number(record, "restart_total_start"),
-            number(record, "restart_dissipated"),
-            number(record, "restart_error"),
-            number(record, "restart_reference_energy")};
+    CurveRestart s;
+    restart_fields(RecordReader(record, RecordKind::curve), s);
+    return s;
 }
 
 Meridian frame_meridian(const Record& frame) {
-    if (const Array* knots = find(frame, "knots"); knots && find(frame, "coefficients"))
-        return meridian(Revolution{static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data,
-                                   find(frame, "coefficients")->data});
-    const Array *r = find(frame, "r"), *z = find(frame, "z");
-    if (!r || !z) throw std::invalid_argument("holds no profile of tier \"axisym\"");
+    const auto profile = profile_of(frame);
+    if (const auto* spline = std::get_if<Revolution>(&profile)) return meridian(*spline);
+    const auto& [r, z, length] = std::get<ProfilePoints>(profile);
     std::vector<std::array<double, 2>> points;
-    for (std::size_t i = 0; i < r->data.size(); ++i) points.push_back({r->data[i], z->data[i]});
-    const double r_max = *std::max_element(r->data.begin(), r->data.end());
-    const bool has_poles = std::abs(r->data.front()) < 1e-9 * r_max && std::abs(r->data.back()) < 1e-9 * r_max;
-    return meridian(points, has_poles ? Topology::cell : Topology::tube, number(frame, "length"));
+    for (std::size_t i = 0; i < r.size(); ++i) points.push_back({r[i], z[i]});
+    const double r_max = *std::max_element(r.begin(), r.end());
+    const bool has_poles = std::abs(r.front()) < 1e-9 * r_max && std::abs(r.back()) < 1e-9 * r_max;
+    return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
 }
 
 Meridian start_meridian(const Case& c) {

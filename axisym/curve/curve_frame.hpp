@@ -21,9 +21,7 @@ struct CurveRestart {
 // u_theta (if it swirls); the restart state under names that begin with restart_.
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy);
 
-bool is_curve(const Record& record);
-
-// Throws std::runtime_error if the record is no curve of this tier.
+// Throws as RecordReader.
 CurveRestart curve_restart(const Record& record);
 
 // The profile of a frame, of a graph or a curve, over its whole period or from pole to pole. Throws

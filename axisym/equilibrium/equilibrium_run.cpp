@@ -194,7 +194,7 @@ private:
             }
         }
         Record out;
-        out.time = count_;
+        out.time = count_, out.kind = RecordKind::equilibrium;
         out.numbers = {{"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"P", e.P}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
         const auto add = [&](const char* name, double Sample::*member) {

@@ -1,12 +1,10 @@
 #include "axisym/graph/graph_frame.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/result/record.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -25,17 +23,17 @@ std::vector<double> sample_points(const std::vector<double>& knots, double lengt
     return points;
 }
 
-Array array(const std::string& name, std::vector<double> data) {
-    return {name, {data.size()}, std::move(data)};
-}
-Array array(const std::string& name, const Eigen::VectorXd& v) {
-    return array(name, std::vector<double>(v.begin(), v.end()));
-}
-
-const Array& find(const Record& record, const std::string& name) {
-    for (const Array& a : record.arrays)
-        if (a.name == name) return a;
-    throw std::runtime_error(fmt::format("no restart record of tier axisym: it has no array {}", name));
+// What a run needs to resume, by name.
+template <class Fields, class State>
+void restart_fields(Fields&& f, State& s) {
+    f.number("restart_z0", s.cell.z0), f.number("restart_z1", s.cell.z1);
+    f.number("restart_mirror", s.cell.mirror), f.number("restart_copies", s.cell.copies);
+    f.number("restart_reference_energy", s.reference_energy);
+    f.number("restart_energy_start", s.energy_start), f.number("restart_dissipated", s.dissipated);
+    f.number("restart_error_max", s.error_max), f.number("restart_time_tolerance", s.time_tolerance);
+    f.number("restart_defect", s.defect), f.number("restart_least_symbol", s.least_symbol);
+    f.array("restart_breaks", s.breaks), f.array("restart_coefficients", s.coefficients);
+    f.array("restart_error_total", s.error_total), f.array("restart_error_spatial", s.error_spatial);
 }
 
 }  // namespace
@@ -59,7 +57,7 @@ Record frame_record(double time, const ProfileSpace& space, const RestartState& 
         u_n.push_back(space.evaluate(rate.data(), e, inside)[0] * p.inverse_speed);
     }
     Record out;
-    out.time = time;
+    out.time = time, out.kind = RecordKind::graph;
     out.numbers = {{"degree", space.degree()}, {"length", cell.period()}, {"energy", energy}};
     out.arrays = {array("knots", spline.knots),
                   array("coefficients", spline.coefficients),
@@ -67,34 +65,14 @@ Record frame_record(double time, const ProfileSpace& space, const RestartState& 
                   array("r", r),
                   array("H", H),
                   array("K", K),
-                  array("u_n", u_n),
-                  array("restart_breaks", s.breaks),
-                  array("restart_coefficients", s.coefficients),
-                  array("restart_error_total", s.error_total),
-                  array("restart_error_spatial", s.error_spatial),
-                  array("restart_numbers",
-                        std::vector<double>{cell.z0, cell.z1, cell.mirror ? 1.0 : 0.0, static_cast<double>(cell.copies),
-                                            s.reference_energy, s.energy_start, s.dissipated, s.error_max,
-                                            s.time_tolerance, s.defect, s.least_symbol})};
+                  array("u_n", u_n)};
+    restart_fields(RecordWriter(out), s);
     return out;
 }
 
 RestartState restart_state(const Record& record) {
-    const auto vector = [&](const char* name) {
-        const Array& a = find(record, name);
-        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(a.data.data(), a.data.size()));
-    };
-    const std::vector<double>& n = find(record, "restart_numbers").data;
-    if (n.size() != 11)
-        throw std::runtime_error("no restart record of tier axisym: restart_numbers has another length");
     RestartState s;
-    s.cell = {n[0], n[1], n[2] != 0, static_cast<int>(n[3])};
-    s.reference_energy = n[4], s.energy_start = n[5], s.dissipated = n[6];
-    s.error_max = n[7], s.time_tolerance = n[8], s.defect = n[9], s.least_symbol = n[10];
-    s.breaks = find(record, "restart_breaks").data;
-    s.coefficients = vector("restart_coefficients");
-    s.error_total = vector("restart_error_total");
-    s.error_spatial = vector("restart_error_spatial");
+    restart_fields(RecordReader(record, RecordKind::graph), s);
     return s;
 }
 

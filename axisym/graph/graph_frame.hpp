@@ -23,7 +23,7 @@ struct RestartState {
 Record frame_record(double time, const ProfileSpace& space, const RestartState& state, const Eigen::VectorXd& rate,
                     double energy);
 
-// Throws std::runtime_error if the record is no frame of this tier.
+// Throws as RecordReader.
 RestartState restart_state(const Record& record);
 
 }  // namespace tubule::axisym

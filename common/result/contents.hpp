@@ -32,4 +32,7 @@ struct Contents {
     }
 };
 
+// The kind of this name. Throws std::runtime_error if there is none.
+RecordKind record_kind(std::string_view name);
+
 }  // namespace tubule

@@ -1,6 +1,7 @@
 #include "common/result/hdf5_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <hdf5.h>
 
 #include <algorithm>
@@ -26,6 +27,7 @@ std::mutex library;  // HDF5 may be built without thread safety
 void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes) {
     const auto group = make_group(parent, name);
     put_attribute(group, "time", record.time);
+    if (record.kind) put_attribute(group, "kind", std::string(tubule::name(*record.kind)));
     for (const auto& [key, value] : record.numbers) put_attribute(group, key, value);
     if (record.mesh) {
         put_grid(group, record, meshes[*record.mesh]);
@@ -57,7 +59,7 @@ std::size_t size_estimate(const Contents& contents) {
 
 // ---- reading
 
-// All attributes of a record are numbers; on a mesh, but for these.
+// All attributes of a record are numbers but its kind and, on a mesh, these.
 bool is_of_the_grid(const std::string& attribute) {
     return std::find(std::begin(grid_attributes), std::end(grid_attributes), attribute) != std::end(grid_attributes);
 }
@@ -69,6 +71,8 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
         const auto attribute = open_attribute(group, key);
         if (key == "mesh")
             record.mesh = get_attribute<std::size_t>(attribute, H5T_NATIVE_UINT64, key);
+        else if (key == "kind")
+            record.kind = record_kind(fmt::format("{}", fmt::join(get_texts(attribute, key), " ")));
         else if (is_of_the_grid(key))
             continue;
         else if (key == "time")

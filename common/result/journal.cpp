@@ -69,6 +69,9 @@ void put(std::vector<std::byte>& out, const std::string& text) {
     put(out, std::as_bytes(std::span(text)));
 }
 
+// In place of the number of a mesh.
+constexpr std::uint64_t no_mesh = ~std::uint64_t{0};
+
 // Reading of a payload. Its CRC was right, so running over its end means a fault in this file.
 class Payload {
 public:
@@ -118,7 +121,9 @@ void put(std::vector<std::byte>& out, const Record& record) {
         put(out, std::uint64_t{array.data.size()});
         put(out, std::span<const double>(array.data));
     }
-    if (record.mesh) put(out, std::uint64_t{*record.mesh});
+    if (!record.mesh && !record.kind) return;
+    put(out, record.mesh ? std::uint64_t{*record.mesh} : no_mesh);
+    if (record.kind) put(out, std::string(name(*record.kind)));
 }
 
 Record get_record(Payload& in) {
@@ -135,7 +140,9 @@ Record get_record(Payload& in) {
         array.data = in.list<double>(in.get<std::uint64_t>());
         record.arrays.push_back(std::move(array));
     }
-    if (!in.empty()) record.mesh = in.get<std::uint64_t>();
+    if (!in.empty())
+        if (const auto mesh = in.get<std::uint64_t>(); mesh != no_mesh) record.mesh = mesh;
+    if (!in.empty()) record.kind = record_kind(in.text());
     return record;
 }
 

@@ -14,6 +14,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_file.hpp"
 #include "common/result/journal.hpp"
+#include "common/result/record.hpp"
 #include "common/result/view.hpp"
 #include "common/result/vtk_grid.hpp"
 
@@ -83,9 +84,8 @@ void check_grid(const Record& record, const std::vector<SurfaceCells>& meshes, c
     const auto refuse = [&](const std::string& why) { throw std::invalid_argument(where + ": " + why); };
     if (*record.mesh >= meshes.size()) refuse(fmt::format("mesh {}, there are {}", *record.mesh, meshes.size()));
     const SurfaceCells& mesh = meshes[*record.mesh];
-    const auto points = std::find_if(record.arrays.begin(), record.arrays.end(),
-                                     [](const Array& array) { return array.name == "points"; });
-    if (points == record.arrays.end() || points->shape != std::vector<std::size_t>{mesh.nodes, 3})
+    const Array* points = find_array(record, "points");
+    if (!points || points->shape != std::vector<std::size_t>{mesh.nodes, 3})
         refuse(fmt::format("on a mesh it must have an array points [{}, 3]", mesh.nodes));
     for (const Array& array : record.arrays)
         if (!is_point_data(array, mesh)) check_free(array.name, grid_members, where);
@@ -93,7 +93,7 @@ void check_grid(const Record& record, const std::vector<SurfaceCells>& meshes, c
 
 void check_record(const Record& record, const std::vector<SurfaceCells>& meshes, const std::string& where) {
     check_finite(record.time, where, "time");
-    std::set<std::string> numbers{"time"};
+    std::set<std::string> numbers{"time", "kind"};
     for (const auto& [name, value] : record.numbers) {
         check_name(name, where, numbers);
         check_free(name, grid_attributes, where);

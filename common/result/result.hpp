@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -36,6 +37,10 @@ struct SurfaceCells {
     bool operator==(const SurfaceCells&) const = default;
 };
 
+// What kind of state a record holds.
+enum class RecordKind { graph, curve, equilibrium, surface };
+std::string_view name(RecordKind kind);  // "graph", ...
+
 // A frame (/frames/000123) or a restart record (/checkpoint): a time, named numbers (attributes), named arrays.
 struct Record {
     double time = 0;
@@ -44,6 +49,7 @@ struct Record {
     // Of a curved surface: the number of its SurfaceCells. Then there must be an array "points" [nodes, 3], and arrays
     // [nodes], [nodes, 3] and [nodes, 6] are data of the nodes for VTK (but for "restart_...").
     std::optional<std::size_t> mesh = std::nullopt;
+    std::optional<RecordKind> kind = std::nullopt;  // kind_of() (record.hpp) knows that of older results
 };
 
 // Whether an array of a frame on this mesh is data of its nodes.

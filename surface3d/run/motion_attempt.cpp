@@ -123,9 +123,7 @@ void MotionAttempt::set_moving() {
 void MotionAttempt::resume(const Restart& restart) {
     auto [state, memory] = motion_restart(restart.record);
     memory_ = memory;
-    CurvedMesh mesh{restart.cells.order, {}, restart.cells.cells, restart.cells.period, restart.cells.shifts};
-    for (int i = 0; i < state.X.cols(); ++i) mesh.nodes.push_back(state.X.col(i));
-    make_stepper(mesh);
+    make_stepper(curved_mesh(restart.cells.value(), array("points", state.X)));
     state_ = std::move(state);
     look();
     next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), state_.time) - outputs_.begin();

@@ -33,7 +33,7 @@ struct MotionRestart {
     MotionMemory memory;
 };
 
-// Throws std::runtime_error if the record does not hold such a state.
+// Throws as RecordReader.
 MotionRestart motion_restart(const Record& record);
 
 }  // namespace tubule::surface3d

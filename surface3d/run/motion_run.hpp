@@ -5,16 +5,11 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/result/record.hpp"
 #include "common/result/run.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
-
-// What an interrupted run goes on from.
-struct Restart {
-    Record record;
-    SurfaceCells cells;
-};
 
 std::vector<std::string> motion_series_names(const Case& c);
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "common/result/record.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/mesh_record.hpp"
@@ -152,15 +153,15 @@ std::vector<double> row(const Answer& answer, double seconds) {
 Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
     const CurvatureField& field = m.curvature;
     Record out;
-    out.mesh = mesh_number;
+    out.mesh = mesh_number, out.kind = RecordKind::surface;
     const VectorField points = node_positions(m.start.mesh);
     out.arrays = {array("points", points)};
     if (!m.has_curvature()) return out;
     Eigen::RowVectorXd energy_density(points.cols());
     for (int i = 0; i < points.cols(); ++i) energy_density[i] = density(c.energy, field.H[i], field.K[i]).f;
     out.numbers = {{"energy", m.o.energy}};
-    for (const Array& more : {array("normal", field.normal), array("H", field.H.transpose()),
-                              array("K", field.K.transpose()), array("energy_density", energy_density)})
+    for (const Array& more : {array("normal", field.normal), array("H", field.H), array("K", field.K),
+                              array("energy_density", energy_density)})
         out.arrays.push_back(more);
     return out;
 }

@@ -11,9 +11,8 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
-#include "common/result/result.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/shapes/profile_curve.hpp"
-#include "common/shapes/revolution.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
@@ -133,18 +132,6 @@ Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
     return result.frames[number];
 }
 
-const Array* find_array(const Record& record, const std::string& name) {
-    for (const Array& array : record.arrays)
-        if (array.name == name) return &array;
-    return nullptr;
-}
-
-double number(const Record& record, const std::string& name) {
-    for (const auto& [key, value] : record.numbers)
-        if (key == name) return value;
-    return 0;
-}
-
 // The meshes of a start; what else there is to say of them.
 struct Prepared {
     Start::Make make;
@@ -212,21 +199,16 @@ struct Prepare {
                     },
                     false};
         }
-        if (find_array(frame, "knots") && find_array(frame, "coefficients")) return of_graph(frame);
-        const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");
-        if (!r || !z) refuse(c, fmt::format("shape.path: {} holds no surface and no profile of one", from.path));
         try {
-            return (*this)(WavedProfile{profile_curve(r->data, z->data, number(frame, "length")), {}, {}});
+            const auto profile = profile_of(frame);
+            if (const auto* spline = std::get_if<Revolution>(&profile)) return of_spline(*spline);
+            const auto& [r, z, length] = std::get<ProfilePoints>(profile);
+            return (*this)(WavedProfile{profile_curve(r, z, length), {}, {}});
         } catch (const std::invalid_argument& error) {
             refuse(c, fmt::format("shape.path: {}: {}", from.path, error.what()));
         }
     }
-    Prepared of_graph(const Record& frame) const {
-        const Revolution tube{static_cast<int>(number(frame, "degree")), number(frame, "length"),
-                              find_array(frame, "knots")->data, find_array(frame, "coefficients")->data};
-        if (tube.degree < 1 || tube.degree > 7 || tube.length <= 0 || tube.coefficients.empty() ||
-            tube.knots.size() != tube.coefficients.size() + tube.degree + 1)
-            refuse(c, "shape.path: the spline of the frame is damaged");
+    Prepared of_spline(const Revolution& tube) const {
         double radius = 0;
         for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
         return on(Cylinder{radius, tube.length}, [tube](const auto& p) { return position(tube, p); });

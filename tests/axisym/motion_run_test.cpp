@@ -251,7 +251,8 @@ TEST(CurveRun, goesOnAfterAnInterruption) {
         const RunSummary half = run(c, first);
         ASSERT_EQ(half.stop.reason, Stop::interrupted);
         ASSERT_LT(half.stop.time, 0.2);
-        const RunSummary rest = run(c, second, &first.frames.back());
+        const Restart from{first.frames.back()};
+        const RunSummary rest = run(c, second, &from);
         EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
         EXPECT_EQ(rest.elements, expected.elements);
         EXPECT_GE(second.rows.front()[0], half.stop.time);
@@ -268,7 +269,8 @@ TEST(CurveRun, goesOnWithElementsGradedAtSeams) {
     const RunSummary expected = run(c, whole);
     first.interrupt_at = 0.01;
     ASSERT_EQ(run(c, first).stop.reason, Stop::interrupted);
-    const RunSummary rest = run(c, second, &first.frames.back());
+    const Restart from{first.frames.back()};
+    const RunSummary rest = run(c, second, &from);
     EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
     EXPECT_EQ(rest.elements, expected.elements);
     EXPECT_NEAR(rest.energy, expected.energy, 1e-3 * expected.reference_energy);

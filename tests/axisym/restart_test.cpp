@@ -97,12 +97,11 @@ TEST(Restart, refusesRecordsOfAnotherKind) {
         }
         return "accepted";
     };
-    EXPECT_EQ(message(Record{}), "no restart record of tier axisym: it has no array restart_numbers");
     Record record = run_case(c).log.frames[1];
     EXPECT_EQ(message(record), "accepted");
-    for (Array& a : record.arrays)
-        if (a.name == "restart_numbers") a.data.pop_back();
-    EXPECT_EQ(message(record), "no restart record of tier axisym: restart_numbers has another length");
+    record.kind = RecordKind::equilibrium;
+    EXPECT_EQ(message(record),
+              "cannot resume from this frame: it is of kind equilibrium, not graph; run the case without --resume");
 }
 
 TEST(Frame, holdsTheProfileOverThePeriod) {
@@ -133,6 +132,7 @@ TEST(Frame, holdsTheProfileOverThePeriod) {
     }
     EXPECT_NEAR(dissipation, o["dissipation"].front(), 0.02 * dissipation);
     for (const auto& [name, value] : frame.numbers) {
+        if (name.starts_with("restart_")) continue;
         const double expected = name == "degree" ? 5 : name == "length" ? 2 : o["energy"].front();
         EXPECT_EQ(value, expected) << name;
     }

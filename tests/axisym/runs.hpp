@@ -75,7 +75,9 @@ inline Outcome run_case(const Case& c, const Record* restart = nullptr,
                         std::function<bool(double)> stop_when = nullptr) {
     Outcome out;
     out.log.stop_when = std::move(stop_when);
-    out.summary = run(c, out.log, restart);
+    std::optional<Restart> from;
+    if (restart) from = Restart{*restart};
+    out.summary = run(c, out.log, from ? &*from : nullptr);
     const auto names = series_names(c);
     for (std::size_t i = 0; i < names.size(); ++i)
         for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));

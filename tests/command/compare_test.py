@@ -225,7 +225,7 @@ class Shapes(Compare):
         self.assertIn("one is a tube of period 2.000000, the other one a closed surface", err)
         damaged = self.edited(one, "damaged.hdf", lambda file: [frame.pop("knots") for frame in file["frames"].values()])
         self.edited(damaged, "damaged.hdf2", lambda file: [frame.pop("r") for frame in file["frames"].values()])
-        self.assertIn("frame 0 of B, t = 0: it holds no surface", self.refused(one, "damaged.hdf2"))
+        self.assertIn("frame 0 of B, t = 0: it is damaged: knots is missing", self.refused(one, "damaged.hdf2"))
 
 
 if __name__ == "__main__":

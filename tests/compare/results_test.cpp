@@ -167,7 +167,7 @@ TEST(Frames, ThatHoldNoSurfaceAreNamed) {
         compare_shapes(a, b, {0, 0}, false);
         FAIL();
     } catch (const std::invalid_argument& error) {
-        EXPECT_STREQ(error.what(), "frame 0 of B, t = 0.5: it holds no surface and no profile of one");
+        EXPECT_STREQ(error.what(), "frame 0 of B, t = 0.5: it holds neither a surface nor a profile");
     }
 }
 

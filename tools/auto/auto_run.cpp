@@ -63,17 +63,18 @@ std::set<double> times_for_rates(const Case& c) {
     return out;
 }
 
-double number(const Record& record, const std::string& name) {
-    for (const auto& [key, value] : record.numbers)
-        if (key == name) return value;
-    return 0;
+// What the profile with which a run in three dimensions begins has beside its waves.
+struct Switch {
+    int m = 0;                               // of the wave that has become too large
+    double reference_energy = 0, error = 0;  // of the part before
+};
+template <class Fields, class State>
+void switch_fields(Fields&& f, State& s) {
+    f.number("switch_m", s.m), f.number("switch_E_ref", s.reference_energy), f.number("switch_error", s.error);
 }
 
-// The frame that a run in three dimensions begins with has these numbers.
-constexpr const char *switch_m = "switch_m", *switch_reference = "switch_E_ref", *switch_error = "switch_error";
-
 bool is_switch(const Record& record) {
-    return !record.mesh && number(record, switch_m) > 0;
+    return !record.mesh && find_number(record, "switch_m");
 }
 
 std::string percent(double amplitude) {
@@ -169,16 +170,16 @@ public:
     AutoRun(const Case& c, const Choice& choice, RunObserver& file)
         : case_(c), file_(file), clock_(c), choice_(choice), names_(auto_series_names(c, choice)) {}
 
-    RunSummary in_three_dimensions(const surface3d::Restart* restart);
-    RunSummary axisymmetric(const Record* restart);
+    RunSummary in_three_dimensions(const Restart* restart);
+    RunSummary axisymmetric(const Restart* restart);
     // From the frame of the switch, or from a state after it.
-    RunSummary after_switch(const Record& at, const Before& before, const surface3d::Restart* restart);
+    RunSummary after_switch(const Record& at, const Before& before, const Restart* restart);
 
 private:
     RowMap axisym_rows() const {
         return {names_, axisym::series_names(axisym_case(case_, case_.time.end, {})), 1, clock_.seconds()};
     }
-    RunSummary watched(ProfileWatch& watch, const std::set<double>& for_rates, const Record* restart);
+    RunSummary watched(ProfileWatch& watch, const std::set<double>& for_rates, const Restart* restart);
     RunSummary with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch);
 
     const Case& case_;
@@ -190,7 +191,7 @@ private:
     std::string effort_;
 };
 
-RunSummary AutoRun::in_three_dimensions(const surface3d::Restart* restart) {
+RunSummary AutoRun::in_three_dimensions(const Restart* restart) {
     if (!restart) file_.note(fmt::format("tier surface3d: {}", choice_.reason));
     const Case c = surface_case(case_);
     const Before nothing;
@@ -201,7 +202,7 @@ RunSummary AutoRun::in_three_dimensions(const surface3d::Restart* restart) {
 }
 
 // A run that is stationary, but for waves that will be too large before its end, goes on: nothing else would show them.
-RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rates, const Record* restart) {
+RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rates, const Restart* restart) {
     std::vector<double> output = case_.time.output;
     output.insert(output.end(), for_rates.begin(), for_rates.end());
     std::sort(output.begin(), output.end());
@@ -216,16 +217,16 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
         if (end < case_.automatic.largest) continue;
         c.time.stationary.reset();
         clock_.limit(c);
-        const Record from = *watch.last_frame();
+        const Restart from{*watch.last_frame()};
         return axisym::run(c, watch, &from);
     }
     return s;
 }
 
-RunSummary AutoRun::axisymmetric(const Record* restart) {
+RunSummary AutoRun::axisymmetric(const Restart* restart) {
     const std::set<double> for_rates = times_for_rates(case_);
     ProfileWatch watch(case_, file_, axisym_rows(), for_rates);
-    if (restart) watch.resume(*restart);
+    if (restart) watch.resume(restart->record);
     RunSummary s = watched(watch, for_rates, restart);
     if (watch.reached()) return with_switch(*watch.reached(), watch);
     clock_.reword(s.stop);
@@ -249,16 +250,17 @@ RunSummary AutoRun::with_switch(const NoiseGrowth::Peak& at, const ProfileWatch&
         return s;
     }
     Record last = *part.last;
-    last.numbers.insert(last.numbers.end(), {{switch_m, static_cast<double>(at.m)},
-                                             {switch_reference, s.reference_energy},
-                                             {switch_error, s.estimated_error}});
+    const Switch known{at.m, s.reference_energy, s.estimated_error};
+    switch_fields(RecordWriter(last), known);
     part.write(last);
     warnings_ = s.warnings, effort_ = s.effort;
     return after_switch(last, part.before, nullptr);
 }
 
-RunSummary AutoRun::after_switch(const Record& at, const Before& before, const surface3d::Restart* restart) {
-    const int m = static_cast<int>(number(at, switch_m));
+RunSummary AutoRun::after_switch(const Record& at, const Before& before, const Restart* restart) {
+    Switch known;
+    switch_fields(RecordReader(at), known);
+    const int m = known.m;
     std::vector<double> amplitudes = amplitudes_of(at);
     const double largest = amplitudes.at(m - 1);
     const std::string reason = fmt::format("a wave with m = {} grows from {:.3g} to {} at t = {:.6g}", m,
@@ -268,13 +270,13 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const s
         if (a < grown * case_.automatic.noise && a < largest) a = 0;
 
     Case c = surface_case(case_);
-    c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, number(at, switch_reference)};
+    c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy};
     clock_.limit(c);
     SurfacePart part(file_, {names_, surface3d::series_names(c), 2, clock_.seconds()}, before);
     RunSummary s = surface3d::run(c, part, restart);
     clock_.reword(s.stop);
-    s.estimated_error = std::max(s.estimated_error, number(at, switch_error));
-    s.as_accurate_as_asked = s.as_accurate_as_asked && number(at, switch_error) <= case_.accuracy.energy;
+    s.estimated_error = std::max(s.estimated_error, known.error);
+    s.as_accurate_as_asked = s.as_accurate_as_asked && known.error <= case_.accuracy.energy;
     s.warnings.insert(s.warnings.begin(), warnings_.begin(), warnings_.end());
     if (!effort_.empty()) s.effort = fmt::format("{}, then {}", effort_, s.effort);
     set_choice(s, "axisym, then surface3d", reason);
@@ -289,12 +291,12 @@ std::vector<std::string> auto_series_names(const Case& c, const Choice& choice) 
     return joined_series_names(c, choice.axisymmetric);
 }
 
-RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const surface3d::Restart* restart,
+RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished) {
     AutoRun run(c, choice, file);
     if (!choice.axisymmetric) return run.in_three_dimensions(restart);
     if (!restart) return run.axisymmetric(nullptr);
-    if (!restart->record.mesh && !is_switch(restart->record)) return run.axisymmetric(&restart->record);
+    if (!restart->record.mesh && !is_switch(restart->record)) return run.axisymmetric(restart);
     if (!unfinished) throw std::invalid_argument("a run of tier \"auto\" goes on in three dimensions with its file");
     const Before before = axisymmetric_part(*unfinished);
     if (before.frames.empty() || !is_switch(before.frames.back()))

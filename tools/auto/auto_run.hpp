@@ -18,7 +18,7 @@ std::vector<std::string> auto_series_names(const Case& c, const Choice& choice);
 // axis at many times. Where the noise of the case grows to auto.largest by them, the run is made again until then, and
 // goes on in tier surface3d with these waves on the profile. `unfinished` is the file that `restart` belongs to. What
 // was chosen and why stands in the summary's details ("choice", "reason", ...), and is told by note().
-RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const surface3d::Restart* restart,
+RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished);
 
 }  // namespace tubule

@@ -7,6 +7,7 @@
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
+#include "common/result/frame_profile.hpp"
 
 namespace tubule {
 
@@ -26,18 +27,6 @@ axisym::Spectrum spectrum_of(const Case& c, Model model, const Meridian& profile
 
 double fastest(const axisym::ModeRates& mode) {
     return mode.rates.empty() ? 0 : mode.rates[0];
-}
-
-const std::vector<double>* values(const Record& frame, const std::string& name) {
-    for (const Array& array : frame.arrays)
-        if (array.name == name) return &array.data;
-    return nullptr;
-}
-
-double number(const Record& frame, const std::string& name) {
-    for (const auto& [key, value] : frame.numbers)
-        if (key == name) return value;
-    return 0;
 }
 
 }  // namespace
@@ -66,10 +55,9 @@ WaveRates wave_rates(const Case& c, const Record& frame) {
 }
 
 WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
-    const auto *r = values(frame, "r"), *z = values(frame, "z");
-    if (!r || !z) throw std::invalid_argument("the frame holds no profile");
-    WavedProfile out{profile_curve(*r, *z, number(frame, "length")), {}, {}};
-    const double radius = *std::max_element(r->begin(), r->end());
+    const auto [r, z, length] = profile_points(frame);
+    WavedProfile out{profile_curve(r, z, length), {}, {}};
+    const double radius = *std::max_element(r.begin(), r.end());
     const axisym::Spectrum found = spectrum_of(c, c.model, axisym::frame_meridian(frame));
     for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
         const axisym::ModeRates& mode = found.modes[i];
@@ -78,9 +66,11 @@ WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector
         for (double& value : w) value *= relative_amplitudes[i] * radius;
         out.waves.push_back(normal_wave(out.curve, mode.m, w));
     }
-    const auto *normal = values(frame, "u_n"), *along = values(frame, "u_t"), *around = values(frame, "u_theta");
+    const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
+                *around = find_array(frame, "u_theta");
     if (c.model.kind == ModelKind::fluid && normal && along)
-        out.velocity = profile_velocity(out.curve, {*normal, *along, around ? *around : std::vector<double>{}});
+        out.velocity =
+            profile_velocity(out.curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
     return out;
 }
 

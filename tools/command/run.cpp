@@ -146,7 +146,7 @@ bool derivatives_pass(const Case& c) {
 
 struct Opened {
     ResultWriter writer;
-    std::optional<surface3d::Restart> restart;
+    std::optional<Restart> restart;
     std::optional<Result> unfinished;  // the file that it belongs to, as it was found
 };
 
@@ -168,7 +168,8 @@ std::optional<Opened> resume(const Case& c, const Engine& engine, const std::fil
     if (old.frames.empty() && !old.checkpoint) return create(c, engine, file);
     ResultWriter writer = ResultWriter::resume(file, [&](const Record& record) { engine.check_restart(record); });
     const Record& record = writer.restart_record();
-    surface3d::Restart restart{record, record.mesh ? old.meshes.at(*record.mesh) : SurfaceCells{}};
+    Restart restart{record};
+    if (record.mesh) restart.cells = old.meshes.at(*record.mesh);
     return Opened{std::move(writer), std::move(restart), std::move(old)};
 }
 

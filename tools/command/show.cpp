@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "common/case/read.hpp"
-#include "common/result/result.hpp"
+#include "common/result/record.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/show_scan.hpp"
@@ -155,8 +155,8 @@ std::vector<Column> series_columns(const Result& result) {
 
 // The arrays sampled at the points z. The spline's own may happen to be as long, but their rows are no points.
 std::vector<Column> profile_columns(const Record& frame) {
-    const auto z = std::find_if(frame.arrays.begin(), frame.arrays.end(), [](const Array& a) { return a.name == "z"; });
-    if (z == frame.arrays.end()) throw std::runtime_error("the frame has no array z of sampling points");
+    const Array* z = find_array(frame, "z");
+    if (!z) throw std::runtime_error("the frame has no array z of sampling points");
     std::vector<Column> columns;
     for (const Array& array : frame.arrays)
         if (array.shape == z->shape && array.name != "knots" && array.name != "coefficients" && !is_private(array.name))

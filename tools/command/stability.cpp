@@ -17,6 +17,7 @@
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
+#include "common/result/record.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
@@ -120,13 +121,11 @@ std::optional<TubeSubject> tube_of(const Case& c) {
 }
 
 std::optional<double> mean_of(const Record& frame, const std::string& array) {
-    for (const Array& a : frame.arrays)
-        if (a.name == array && !a.data.empty()) {
-            double sum = 0;
-            for (const double value : a.data) sum += value;
-            return sum / static_cast<double>(a.data.size());
-        }
-    return std::nullopt;
+    const Array* found = find_array(frame, array);
+    if (!found || found->data.empty()) return std::nullopt;
+    double sum = 0;
+    for (const double value : found->data) sum += value;
+    return sum / static_cast<double>(found->data.size());
 }
 
 // A frame that is a straight tube, to a thousandth of its radius.
@@ -138,8 +137,7 @@ std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
     out.length = profile.length;
     for (int i = 0; i < 400; ++i)
         if (std::abs(profile.at(i / 400.0)[0] - out.tube.radius) > 1e-3 * out.tube.radius) return std::nullopt;
-    for (const auto& [key, value] : frame.numbers)
-        if (key == "sigma") out.tension = value, out.tension_source = "sigma of the frame";
+    if (const auto sigma = find_number(frame, "sigma")) out.tension = *sigma, out.tension_source = "sigma of the frame";
     if (const auto pressure = mean_of(frame, "p"))
         out.tension = -*pressure, out.tension_source = "minus the mean pressure of the frame";
     return out;

@@ -2,26 +2,11 @@
 
 #include <stdexcept>
 
+#include "common/result/frame_profile.hpp"
 #include "tools/compare/revolution_surface.hpp"
 #include "tools/compare/triangle_surface.hpp"
 
 namespace tubule::compare {
-
-namespace {
-
-const Array* find_array(const Record& record, const std::string& name) {
-    for (const Array& array : record.arrays)
-        if (array.name == name) return &array;
-    return nullptr;
-}
-
-double number(const Record& record, const std::string& name) {
-    for (const auto& [key, value] : record.numbers)
-        if (key == name) return value;
-    return 0;
-}
-
-}  // namespace
 
 std::unique_ptr<Surface> frame_surface(const Record& frame, const Result& result) {
     if (frame.mesh) {
@@ -30,13 +15,10 @@ std::unique_ptr<Surface> frame_surface(const Record& frame, const Result& result
             throw std::invalid_argument("the points or the triangles of its surface are missing");
         return std::make_unique<TriangleSurface>(result.meshes[*frame.mesh], points->data);
     }
-    const Array *knots = find_array(frame, "knots"), *coefficients = find_array(frame, "coefficients");
-    if (knots && coefficients)
-        return std::make_unique<RevolutionSurface>(Revolution{
-            static_cast<int>(number(frame, "degree")), number(frame, "length"), knots->data, coefficients->data});
-    const Array *r = find_array(frame, "r"), *z = find_array(frame, "z");
-    if (!r || !z) throw std::invalid_argument("it holds no surface and no profile of one");
-    return std::make_unique<RevolutionSurface>(profile_curve(r->data, z->data, number(frame, "length")));
+    const auto profile = profile_of(frame);
+    if (const auto* spline = std::get_if<Revolution>(&profile)) return std::make_unique<RevolutionSurface>(*spline);
+    const auto& [r, z, length] = std::get<ProfilePoints>(profile);
+    return std::make_unique<RevolutionSurface>(profile_curve(r, z, length));
 }
 
 }  // namespace tubule::compare

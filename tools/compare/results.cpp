@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/result/record.hpp"
 #include "tools/compare/frame_surface.hpp"
 
 namespace tubule::compare {
@@ -19,12 +20,6 @@ std::optional<T> about(const Result& result, const std::string& name) {
     for (const auto& [key, value] : result.about)
         if (key == name)
             if (const T* held = std::get_if<T>(&value)) return *held;
-    return {};
-}
-
-std::optional<double> energy_of(const Record& frame) {
-    for (const auto& [name, value] : frame.numbers)
-        if (name == "energy") return value;
     return {};
 }
 
@@ -77,7 +72,7 @@ std::vector<FramePair> frames_in_common(const Result& a, const Result& b) {
 }
 
 bool know_energies(const Result& a, const Result& b, FramePair frames) {
-    return energy_of(a.frames[frames.first]) && energy_of(b.frames[frames.second]);
+    return find_number(a.frames[frames.first], "energy") && find_number(b.frames[frames.second], "energy");
 }
 
 ShapeDifference compare_shapes(const Result& a, const Result& b, FramePair frames, bool align) {
@@ -86,7 +81,7 @@ ShapeDifference compare_shapes(const Result& a, const Result& b, FramePair frame
     ShapeDifference out;
     out.frames = frames, out.time = a.frames[i].time;
     if (know_energies(a, b, frames)) {
-        const double of_a = *energy_of(a.frames[i]), of_b = *energy_of(b.frames[j]);
+        const double of_a = *find_number(a.frames[i], "energy"), of_b = *find_number(b.frames[j], "energy");
         const double stated = reference_energy(a), scale = stated > 0 ? stated : std::abs(of_a);
         out.energy = std::abs(of_a - of_b) / (scale > 0 ? scale : 1);
     }

@@ -14,8 +14,8 @@ public:
     explicit Axisymmetric(const Case& c) : case_(c) {}
     std::vector<std::string> series_names() const override { return axisym::series_names(case_); }
     void check_restart(const Record& record) const override { axisym::check_restart(record); }
-    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result*) const override {
-        return axisym::run(case_, observer, restart ? &restart->record : nullptr);
+    RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
+        return axisym::run(case_, observer, restart);
     }
 
 private:
@@ -27,7 +27,7 @@ public:
     explicit Equilibria(const Case& c) : case_(c) { axisym::check_equilibrium(c); }
     std::vector<std::string> series_names() const override { return axisym::equilibrium_series_names(case_); }
     void check_restart(const Record& record) const override { axisym::check_restart(record); }
-    RunSummary run(RunObserver& observer, const surface3d::Restart*, const Result*) const override {
+    RunSummary run(RunObserver& observer, const Restart*, const Result*) const override {
         return axisym::run_equilibrium(case_, observer);
     }
 
@@ -42,7 +42,7 @@ public:
     void check_restart(const Record& record) const override {
         if (case_.moves()) surface3d::check_restart(record);
     }
-    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result*) const override {
+    RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
         return surface3d::run(case_, start_, observer, restart);
     }
@@ -62,7 +62,7 @@ public:
         else
             axisym::check_restart(record);
     }
-    RunSummary run(RunObserver& observer, const surface3d::Restart* restart, const Result* unfinished) const override {
+    RunSummary run(RunObserver& observer, const Restart* restart, const Result* unfinished) const override {
         return run_auto(case_, choice_, observer, restart, unfinished);
     }
 

@@ -24,7 +24,7 @@ public:
 
     // Runs the case, or goes on from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
     // tier's own run.
-    virtual RunSummary run(RunObserver& observer, const surface3d::Restart* restart = nullptr,
+    virtual RunSummary run(RunObserver& observer, const Restart* restart = nullptr,
                            const Result* unfinished = nullptr) const = 0;
 };
 

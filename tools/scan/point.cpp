@@ -89,9 +89,7 @@ enum class Rest { here, on_its_way, on_a_saddle };
 // stationary shape next to it so near that it is of the same kind. A wave that decays slowly fails the latter, for
 // Newton's step takes it away as a whole (or, where its rate vanishes, a third of it). What is no graph is believed.
 Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
-    const bool graph = std::any_of(frame.arrays.begin(), frame.arrays.end(),
-                                   [](const Array& a) { return a.name == "restart_numbers"; });
-    if (!graph) return Rest::here;
+    if (kind_of(frame) != RecordKind::graph) return Rest::here;
     const axisym::RestartState state = axisym::restart_state(frame);
     const int order = c.discretisation.order;
     const axisym::ProfileSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
@@ -140,7 +138,7 @@ PointResult summed_up(const Case& c, const RunSummary& s, const Watch& watch) {
 PointResult computed(Case c, bool to_the_end, const std::function<bool()>& interrupted) {
     c.time.output.clear();
     double steps = 0;
-    for (std::optional<surface3d::Restart> from;;) {
+    for (std::optional<Restart> from;;) {
         const auto engine = engine_for(c);
         Watch watch(c, engine->series_names(), to_the_end, interrupted);
         const RunSummary summary = engine->run(watch, from ? &*from : nullptr);
@@ -155,7 +153,7 @@ PointResult computed(Case c, bool to_the_end, const std::function<bool()>& inter
             c.time.stationary.reset();
         else
             *c.time.stationary *= next_stationarity;
-        from = surface3d::Restart{std::move(*watch.last_frame), {}};
+        from = Restart{std::move(*watch.last_frame)};
     }
 }
 

@@ -1,0 +1,99 @@
+// Records by name: what they hold, and the state of a run written to one and read back from one list of fields.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+// What a run resumes from: a frame or the checkpoint of its result, with the cells of its mesh if it has one.
+struct Restart {
+    Record record;
+    std::optional<SurfaceCells> cells = std::nullopt;
+};
+
+// The declared kind of a record. Older results declare none: there, the arrays tell.
+RecordKind kind_of(const Record& record);
+
+const Array* find_array(const Record& record, std::string_view name);  // nullptr if there is none
+std::optional<double> find_number(const Record& record, std::string_view name);
+
+// A list [n]; a vector [n]; columns, one a node, [columns, rows].
+Array array(const std::string& name, std::vector<double> values);
+template <class Matrix>
+Array array(const std::string& name, const Eigen::MatrixBase<Matrix>& values) {
+    const typename Matrix::PlainObject plain = values;
+    Array out{name, {static_cast<std::size_t>(plain.size())}, {plain.data(), plain.data() + plain.size()}};
+    if (!Matrix::IsVectorAtCompileTime)
+        out.shape = {static_cast<std::size_t>(plain.cols()), static_cast<std::size_t>(plain.rows())};
+    return out;
+}
+
+// A state that a run resumes from lists its fields once, as a template over `Fields`, which is RecordWriter or
+// RecordReader (and State, which is const for the writer):
+//     template <class Fields, class State>
+//     void fields(Fields&& f, State& s) {
+//         f.number("restart_step", s.step);
+//         f.array("restart_u", s.u, s.X.cols());
+//     }
+class RecordWriter {
+public:
+    explicit RecordWriter(Record& record) : record_(record) {}
+
+    template <class Number>
+    void number(const char* name, const Number& value) {
+        record_.numbers.emplace_back(name, static_cast<double>(value));
+    }
+    template <class Values>
+    void array(const char* name, const Values& values, std::optional<Eigen::Index> = {}) {
+        record_.arrays.push_back(tubule::array(name, values));
+    }
+    template <class Values>
+    void optional_array(const char* name, const Values& values, std::optional<Eigen::Index> = {}) {
+        if (values.size() > 0) array(name, values);
+    }
+
+private:
+    Record& record_;
+};
+
+// Throws std::runtime_error that begins with "cannot resume from this frame" for a field that is missing, is not of the
+// type asked for, or has another shape: vectors [n], fields [n, 3], where n must be `count` if that is given.
+class RecordReader {
+public:
+    explicit RecordReader(const Record& record) : record_(record) {}
+    // Refuses a record of another kind.
+    RecordReader(const Record& record, RecordKind kind);
+
+    template <class Number>
+    void number(const char* name, Number& value) const {
+        if constexpr (std::is_floating_point_v<Number>)
+            value = number_of(name);
+        else
+            value = static_cast<Number>(integer_of(name));
+    }
+    void array(const char* name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
+    void array(const char* name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;
+    void array(const char* name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count = {}) const;
+    // Stays empty where there is none.
+    template <class Values>
+    void optional_array(const char* name, Values& values, std::optional<Eigen::Index> count = {}) const {
+        if (find_array(record_, name)) array(name, values, count);
+    }
+
+private:
+    double number_of(const char* name) const;
+    int integer_of(const char* name) const;
+    // Of `width` numbers a row; 1 for a vector.
+    const std::vector<double>& data_of(const char* name, std::optional<Eigen::Index> count, std::size_t width) const;
+
+    const Record& record_;
+};
+
+}  // namespace tubule
