@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <set>
+#include <span>
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_measures.hpp"
@@ -36,8 +37,6 @@ constexpr double newton_error = 2e-9;  // of the iteration, relative to the curv
 constexpr int most_crawling = 2000;    // steps by which the time has not grown by a thousandth
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
-
-enum Guard { neck_floor, well_posed, evenness };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -167,8 +166,13 @@ private:
     Look look(const double* y, const double* rate) const;
     const Look& observe(double t, const double* y, const double* rate);
     void make_flow(const CurveState& state, double first_step);
-    Guards guards(const Look& l) const;
-    StopReport guard_report(int guard) const;
+    // Each is positive while all is well; what to report of the present state once it is not.
+    struct Guard {
+        double (*value)(const CurveAttempt& run, const Look& l);
+        StopReport (*report)(const CurveAttempt& run);
+    };
+    static std::span<const Guard> guards();
+    Guards guard_values(const Look& l) const;
     std::optional<StopReport> step();
     std::optional<StopReport> check(double t);
     double what_may_change(double t) const;
@@ -331,7 +335,8 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     system.dissipation = [this](double t, const double* y, const double* v) {
         return observe(t, y, v).balance.dissipation;
     };
-    system.guards = [this](double t, const double* y, const double* v) { return guards(observe(t, y, v)); };
+    system.guards = [this](double t, const double* y, const double* v) { return guard_values(observe(t, y, v)); };
+    system.n_guards = guards().size();
     TimeControl control;
     control.relative = settings_.tolerance;
     control.absolute = 0.1 * settings_.tolerance;
@@ -345,30 +350,39 @@ void CurveAttempt::make_flow(const CurveState& state, double first_step) {
     observe(state.time, flow_->x(), flow_->v());
 }
 
-Guards CurveAttempt::guards(const Look& l) const {
-    const double neck = std::isfinite(l.neck.radius) ? l.neck.radius - case_.accuracy.r_min : 1;
-    return {neck, l.o.symbol, l.o.g_min / l.o.g_max - stretched};
+std::span<const CurveAttempt::Guard> CurveAttempt::guards() {
+    using Run = const CurveAttempt&;
+    static const Guard list[]{
+        {[](Run run, const Look& l) {
+             return std::isfinite(l.neck.radius) ? l.neck.radius - run.case_.accuracy.r_min : 1;
+         },
+         [](Run run) {
+             const auto& neck = run.now_.neck;
+             return StopReport{Stop::pinch_off, run.flow_->time(),
+                               fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", neck.radius, neck.z),
+                               "lower accuracy.r_min to follow the neck further"};
+         }},
+        {[](Run, const Look& l) { return l.o.symbol; },
+         [](Run run) {
+             return StopReport{Stop::ill_posed, run.flow_->time(),
+                               fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
+                                           run.now_.o.s_symbol),
+                               "no resolution helps: the energy does not resist short waves there"};
+         }},
+        {[](Run, const Look& l) { return l.o.g_min / l.o.g_max - stretched; },
+         [](Run run) {
+             return StopReport{Stop::mesh_lost, run.flow_->time(),
+                               fmt::format("the parametrisation speed varies by a factor {:.3g} along the profile",
+                                           run.now_.o.g_max / run.now_.o.g_min),
+                               "set discretisation.parametrisation = \"even\""};
+         }}};
+    return list;
 }
 
-StopReport CurveAttempt::guard_report(int guard) const {
-    const double t = flow_->time();
-    switch (guard) {
-        case neck_floor:
-            return {Stop::pinch_off, t,
-                    fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", now_.neck.radius, now_.neck.z),
-                    "lower accuracy.r_min to follow the neck further"};
-        case well_posed:
-            return {Stop::ill_posed, t,
-                    fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
-                                now_.o.s_symbol),
-                    "no resolution helps: the energy does not resist short waves there"};
-        default:
-            return {
-                Stop::mesh_lost, t,
-                fmt::format("the parameter of the profile is stretched {:.3g} times more at one place than at another",
-                            now_.o.g_max / now_.o.g_min),
-                "set discretisation.parametrisation = \"even\""};
-    }
+Guards CurveAttempt::guard_values(const Look& l) const {
+    Guards values;
+    for (const Guard& guard : guards()) values.push_back(guard.value(*this, l));
+    return values;
 }
 
 // By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
@@ -429,16 +443,15 @@ std::optional<StopReport> CurveAttempt::step() {
     write_outputs(t);
     if (last_row_ < t) write_row(t, l, flow_->x(), dissipated(t));
     if (recorded_) watch_.progress(t, l.o.energy, flow_->step_size());
-    if (outcome == Flow::Outcome::guard) return guard_report(flow_->tripped());
+    if (outcome == Flow::Outcome::guard) return guards()[flow_->tripped()].report(*this);
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
     return check(t);
 }
 
 StopReport CurveAttempt::go() {
     std::optional<StopReport> stop;
-    const Guards at_start = guards(now_);  // IDA sees only those that change their sign later
-    for (int guard = 0; guard < n_guards && !stop; ++guard)
-        if (!(at_start[guard] > 0)) stop = guard_report(guard);
+    for (const Guard& guard : guards())  // IDA sees only those that change their sign later
+        if (!stop && !(guard.value(*this, now_) > 0)) stop = guard.report(*this);
     while (!stop) stop = step();
     const double t = flow_->time();
     summary.stop = *stop;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <numeric>
 #include <set>
+#include <span>
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_error_transport.hpp"
@@ -33,8 +34,6 @@ constexpr int fewest_elements = 3;
 constexpr double overhang_steepness = 30;  // see Observation::steepness
 constexpr double hopeless_error = 0.1;     // of E_ref: explicit settings that lose the shape
 constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
-
-enum Guard { neck_floor, vertical_tangent, well_posed };
 
 // What a run is computed with. The asked accuracy sets it, a failed attempt tightens it.
 struct Settings {
@@ -109,8 +108,14 @@ private:
     StopReport end_with(const StopReport& stop);
     bool estimate_error(const Observation& o);
     std::optional<StopReport> check(Flow::Outcome outcome, const Observation& o);
-    Guards guards(const Observation& o) const;
-    StopReport guard_report(int guard, const Observation& o) const;
+    // Each is positive while all is well; what to report once it is not.
+    struct Guard {
+        double (*value)(const Attempt& run, const Observation& o);
+        StopReport (*report)(const Attempt& run, const Observation& o);
+    };
+    static std::span<const Guard> guards();
+    Guards guard_values(const Observation& o) const;
+    StopReport overhang(const Observation& o) const;
     void write_outputs(double until, const Observation& o);
     void write_row(double t, const Observation& o, const double* x, double dissipated);
     void write_frame(double t, const Observation& o, const double* x, const double* v, double dissipated);
@@ -199,8 +204,9 @@ void Attempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, doub
         return observe(when, at, rate).dissipation;
     };
     system.guards = [this](double when, const double* at, const double* rate) {
-        return guards(observe(when, at, rate));
+        return guard_values(observe(when, at, rate));
     };
+    system.n_guards = guards().size();
     flow_ = std::make_unique<Flow>(std::move(system), x, v, t, control);
     stage_->transport.begin(flow_->x(), flow_->v());
     dissipation_last_ = observe(t, flow_->x(), flow_->v()).dissipation;
@@ -354,42 +360,48 @@ bool Attempt::estimate_error(const Observation& o) {
     return gave_up_;
 }
 
-Guards Attempt::guards(const Observation& o) const {
-    return {o.r_min - case_.accuracy.r_min, overhang_steepness - o.steepness, o.symbol - least_symbol_.value_or(0)};
+std::span<const Attempt::Guard> Attempt::guards() {
+    using Run = const Attempt&;
+    using State = const Observation&;
+    static const Guard list[]{
+        {[](Run run, State o) { return o.r_min - run.case_.accuracy.r_min; },
+         [](Run run, State o) {
+             return StopReport{Stop::pinch_off, run.flow_->time(),
+                               fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, run.place(o.z_min)),
+                               "lower accuracy.r_min to follow the neck further"};
+         }},
+        {[](Run, State o) { return overhang_steepness - o.steepness; },
+         [](Run run, State o) { return run.overhang(o); }},
+        {[](Run run, State o) { return o.symbol - run.least_symbol_.value_or(0); },
+         [](Run run, State o) {
+             return StopReport{
+                 Stop::ill_posed, run.flow_->time(),
+                 fmt::format("the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to "
+                             "{:.3g} at x = kappa_theta",
+                             run.place(o.z_symbol), o.symbol),
+                 "no refinement helps; k40 or k42 is too negative for the curvatures of this shape"};
+         }}};
+    return list;
 }
 
-StopReport Attempt::guard_report(int guard, const Observation& o) const {
-    StopReport stop;
-    stop.time = flow_->time();
-    switch (guard) {
-        case neck_floor:
-            stop.reason = Stop::pinch_off;
-            stop.message = fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, place(o.z_min));
-            stop.advice = "lower accuracy.r_min to follow the neck further";
-            break;
-        case vertical_tangent:
-            stop.reason = Stop::overhang;
-            stop.message = fmt::format(
-                "the profile r(z) turned vertical at z = {:.6g} (|r'| = {:.3g} at a place where that is no neck)",
-                place(o.z_steep),
-                std::abs(stage_->space.evaluate(flow_->x(), stage_->space.element_at(o.z_steep), o.z_steep)[1]));
-            stop.advice =
-                "the shape is about to overhang, which a graph r(z) cannot follow; the results until here are valid";
-            break;
-        default:
-            stop.reason = Stop::ill_posed;
-            stop.message = fmt::format(
-                "the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to {:.3g} at x = "
-                "kappa_theta",
-                place(o.z_symbol), o.symbol);
-            stop.advice = "no refinement helps; k40 or k42 is too negative for the curvatures of this shape";
-    }
-    return stop;
+Guards Attempt::guard_values(const Observation& o) const {
+    Guards values;
+    for (const Guard& guard : guards()) values.push_back(guard.value(*this, o));
+    return values;
+}
+
+StopReport Attempt::overhang(const Observation& o) const {
+    const double steepness =
+        std::abs(stage_->space.evaluate(flow_->x(), stage_->space.element_at(o.z_steep), o.z_steep)[1]);
+    return {Stop::overhang, flow_->time(),
+            fmt::format("the profile r(z) turned vertical at z = {:.6g} (|r'| = {:.3g} away from a neck)",
+                        place(o.z_steep), steepness),
+            "the shape is about to overhang, which a graph r(z) cannot follow; the results until here are valid"};
 }
 
 std::optional<StopReport> Attempt::check(Flow::Outcome outcome, const Observation& o) {
     const double t = flow_->time();
-    if (outcome == Flow::Outcome::guard) return guard_report(flow_->tripped(), o);
+    if (outcome == Flow::Outcome::guard) return guards()[flow_->tripped()].report(*this, o);
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
     if (case_.time.stationary &&
         o.dissipation * (case_.time.end - t) < *case_.time.stationary * summary.reference_energy)
@@ -421,7 +433,7 @@ std::optional<StopReport> Attempt::remesh(double target) {
     const Observation o = now_;
     auto breaks = refined_breaks(stage_->space, defect_, target);
     if (static_cast<int>(breaks.size()) > most_elements + 1) {
-        if (o.steepness > overhang_steepness / 4) return guard_report(vertical_tangent, o);
+        if (o.steepness > overhang_steepness / 4) return overhang(o);
         return StopReport{Stop::resolution_lost, t,
                           fmt::format("the profile needs more than {} elements per cell near z = {:.6g}", most_elements,
                                       place(o.z_steep)),
@@ -480,7 +492,7 @@ std::string Attempt::suspects() const {
 StopReport Attempt::give_up(const std::string& what) {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(good_x_.size());
     const Observation o = look(good_x_.data(), rest.data());
-    if (o.steepness > overhang_steepness / 4) return guard_report(vertical_tangent, o);
+    if (o.steepness > overhang_steepness / 4) return overhang(o);
     return {Stop::solver_failed, good_t_, fmt::format("{} ({})", what, suspects()),
             "ask for more accuracy, or lower discretisation.time_order"};
 }
@@ -494,9 +506,8 @@ std::optional<StopReport> Attempt::recover() {
 
 std::optional<StopReport> Attempt::go() {
     // A start beyond a limit stops at once: the integrator only sees limits being crossed.
-    const Guards values = guards(now_);
-    for (int i = 0; i < n_guards; ++i)
-        if (values[i] <= 0) return end_with(guard_report(i, now_));
+    for (const Guard& guard : guards())
+        if (guard.value(*this, now_) <= 0) return end_with(guard.report(*this, now_));
 
     std::optional<StopReport> stop;
     try {

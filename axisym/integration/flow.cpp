@@ -162,7 +162,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
         require(IDASetNonlinearSolver(s.ida, s.newton), "the nonlinear solver");
         require(SUNNonlinSolSetConvTestFn(s.newton, has_converged<Impl>, &s), "the test of convergence");
     }
-    require(IDARootInit(s.ida, n_guards, guard_values<Impl>), "the guards");
+    require(IDARootInit(s.ida, static_cast<int>(s.system.n_guards), guard_values<Impl>), "the guards");
     require(IDASetNoInactiveRootWarn(s.ida), "the guards");
     s.dissipated = N_VNew_Serial(1, s.context);
     N_VConst(0, s.dissipated);
@@ -178,7 +178,7 @@ Flow::Outcome Flow::advance(double t_end) {
     if (status == IDA_TSTOP_RETURN) return Outcome::end;
     if (status == IDA_ROOT_RETURN) {
         N_VScale(1, s.slope, s.v);  // the corrector's rates are those of the step's end, beyond the guard
-        std::array<int, n_guards> found{};
+        std::vector<int> found(s.system.n_guards);
         IDAGetRootInfo(s.ida, found.data());
         s.guard =
             static_cast<int>(std::find_if(found.begin(), found.end(), [](int f) { return f != 0; }) - found.begin());

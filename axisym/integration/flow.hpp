@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
-#include <array>
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace tubule::axisym {
 
@@ -28,8 +28,7 @@ struct FlowCounters {
 };
 
 // Guards are functions of the state, positive while all is well; a step that takes one of them through zero ends there.
-inline constexpr int n_guards = 3;
-using Guards = std::array<double, n_guards>;
+using Guards = std::vector<double>;
 
 // What moves, and what is watched. All but `residual` and `jacobian` see accepted states, by time, unknowns and rates.
 struct FlowSystem {
@@ -43,6 +42,7 @@ struct FlowSystem {
     Eigen::VectorXd differential;  // 0 for unknowns without a rate, whose local errors do not count; empty: 1
     std::function<double(double t, const double* x, const double* v)> dissipation;
     std::function<Guards(double t, const double* x, const double* v)> guards;
+    std::size_t n_guards = 0;  // how many these are
 };
 
 class Flow {
