@@ -15,6 +15,7 @@
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/series/table.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -134,10 +135,61 @@ Dissipation dissipation(const Model& model) {
     }
 }
 
+int elements_of(const Equilibrium& e) {
+    return e.space->images() * e.space->splines().elements();
+}
+
+// What the values of a row come from: a shape.
+struct ShapeRow {
+    int number;
+    const BranchPoint& point;
+    const CurveObservation& o;
+    const ShapeMeasures& measures;
+    const std::vector<ModeRates>& modes;
+    double distance_to_start, wall_seconds;
+};
+
+SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
+    SeriesTable<ShapeRow> table;
+    table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
+    if (choices.branch.parameter)
+        table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
+                   {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
+    table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
+    table.add_family("energy_<kl>", energy_term_numbers(),
+                     [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    table.add({{"area", [](const ShapeRow& r) { return r.o.area; }},
+               {"volume", [](const ShapeRow& r) { return r.o.volume; }},
+               {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
+               {"sigma", [](const ShapeRow& r) { return r.point.shape.sigma; }},
+               {"P", [](const ShapeRow& r) { return r.point.shape.P; }},
+               {"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
+               {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
+               {"height", [](const ShapeRow& r) { return r.measures.height; }},
+               {"r_middle", [](const ShapeRow& r) { return r.measures.r_middle; }},
+               {"r_max", [](const ShapeRow& r) { return r.measures.r_max; }},
+               {"pole_curvature", [](const ShapeRow& r) { return r.measures.pole_curvature; }},
+               {"distance_to_start", [](const ShapeRow& r) { return r.distance_to_start; }}});
+    std::vector<std::string> waves;
+    for (int m = 0; m <= choices.modes.value_or(-1); ++m) waves.push_back(std::to_string(m));
+    table.add_family("growth_<m>", waves, [](const ShapeRow& r, std::size_t m) {
+        return r.modes[m].rates.empty() ? 0 : r.modes[m].rates[0];
+    });
+    table.add({{"energy_error",
+                [](const ShapeRow& r) { return r.point.shape.estimated_error * r.point.shape.reference_energy; }},
+               {"elements", [](const ShapeRow& r) { return static_cast<double>(elements_of(r.point.shape)); }},
+               {"wall_seconds", [](const ShapeRow& r) { return r.wall_seconds; }}});
+    return table;
+}
+
 class Writer {
 public:
     Writer(const Case& c, const Task& task, RunObserver& observer)
-        : c_(c), task_(task), observer_(observer), started_(std::chrono::steady_clock::now()) {}
+        : c_(c),
+          task_(task),
+          observer_(observer),
+          series_(shape_series(*c.equilibrium)),
+          started_(std::chrono::steady_clock::now()) {}
 
     void operator()(const BranchPoint& point) {
         const Equilibrium& e = point.shape;
@@ -158,21 +210,9 @@ public:
 private:
     std::vector<double> row(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
         const Equilibrium& e = point.shape;
-        const CurveObservation& o = e.observed;
-        const ShapeMeasures m = measures(*e.space, e.x);
-        std::vector<double> values{static_cast<double>(count_)};
-        if (task_.set) values.insert(values.end(), {point.parameter, static_cast<double>(point.kind)});
-        values.push_back(o.energy);
-        values.insert(values.end(), o.energy_term.begin(), o.energy_term.end());
-        values.insert(values.end(),
-                      {o.area, o.volume, reduced_volume(o.area, o.volume), e.sigma, e.P,
-                       static_cast<double>(point.index), o.length, m.height, m.r_middle, m.r_max, m.pole_curvature,
-                       hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)))});
-        for (const ModeRates& mode : modes) values.push_back(mode.rates.empty() ? 0 : mode.rates[0]);
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-        values.insert(values.end(), {e.estimated_error * e.reference_energy,
-                                     static_cast<double>(e.space->images() * e.space->splines().elements()), seconds});
-        return values;
+        const double moved = hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)));
+        return series_.values({count_, point, e.observed, measures(*e.space, e.x), modes, moved, seconds});
     }
 
     Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
@@ -226,6 +266,7 @@ private:
     const Case& c_;
     const Task& task_;
     RunObserver& observer_;
+    SeriesTable<ShapeRow> series_;
     std::chrono::steady_clock::time_point started_;
     int count_ = 0;
     double worst_ = 0;
@@ -247,16 +288,7 @@ std::string advice_for(Stop stop) {
 }  // namespace
 
 std::vector<std::string> equilibrium_series_names(const Case& c) {
-    std::vector<std::string> names{"time"};
-    if (c.equilibrium->branch.parameter) names.insert(names.end(), {"parameter", "special"});
-    names.push_back("energy");
-    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"area", "volume", "reduced_volume", "sigma", "P", "negative_directions", "meridian_length",
-                             "height", "r_middle", "r_max", "pole_curvature", "distance_to_start"})
-        names.push_back(name);
-    for (int m = 0; m <= c.equilibrium->modes.value_or(-1); ++m) names.push_back(fmt::format("growth_{}", m));
-    for (const char* name : {"energy_error", "elements", "wall_seconds"}) names.push_back(name);
-    return names;
+    return shape_series(*c.equilibrium).names();
 }
 
 void check_equilibrium(const Case& c) {
@@ -290,7 +322,7 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
         write(point);
         s.energy = point.shape.observed.energy;
         s.reference_energy = point.shape.reference_energy;
-        s.elements = point.shape.space->images() * point.shape.space->splines().elements();
+        s.elements = elements_of(point.shape);
     }
     s.estimated_error = write.worst();
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;

@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <optional>
 #include <string>
@@ -22,6 +21,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/series/catalogue.hpp"
 
 namespace tubule {
 
@@ -50,64 +50,6 @@ struct OpenNames {
     std::vector<std::string> listed;
     bool (*accepts)(std::string_view name);
 };
-
-// The series a run writes, as far as [expect] knows them; mode_<n> and growth_<m> stand for every wave number.
-inline std::vector<std::string> known_series() {
-    std::vector<std::string> names{"time", "energy"};
-    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"dissipation",
-                             "identity_defect",
-                             "area",
-                             "volume",
-                             "r_min",
-                             "r_max",
-                             "energy_error",
-                             "integral_H2",
-                             "integral_K",
-                             "gauss_bonnet_defect",
-                             "elements",
-                             "kinetic_energy",
-                             "speed",
-                             "momentum_x",
-                             "momentum_y",
-                             "momentum_z",
-                             "angular_momentum_x",
-                             "angular_momentum_y",
-                             "angular_momentum_z",
-                             "stretching",
-                             "quality",
-                             "turn",
-                             "correction_energy",
-                             "lambda",
-                             "parameter",
-                             "special",
-                             "reduced_volume",
-                             "sigma",
-                             "P",
-                             "negative_directions",
-                             "meridian_length",
-                             "height",
-                             "r_middle",
-                             "pole_curvature",
-                             "distance_to_start",
-                             "tier"})
-        names.push_back(name);
-    names.push_back("mode_<n>");
-    names.push_back("growth_<m>");
-    return names;
-}
-
-inline bool is_series(std::string_view name) {
-    const std::size_t prefix = name.starts_with("mode_") ? 5 : name.starts_with("growth_") ? 7 : 0;
-    if (prefix > 0) {
-        const std::string_view digits = name.substr(prefix);
-        int n = 0;
-        const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
-        return error == std::errc{} && n >= 0 && digits == std::to_string(n);
-    }
-    const std::vector<std::string> names = known_series();
-    return std::find(names.begin(), names.end(), name) != names.end();
-}
 
 template <class Keys>
 void keys(Keys& k, Bending& energy) {
@@ -263,8 +205,8 @@ void keys(Keys& k, Expect& expect, double end) {
     k.choice("stop", expect.stop, stops);
 
     // Of series "time", the end has the time of stopping, also called so; at a moment, `time` is that moment.
-    OpenNames in_end{known_series(), [](std::string_view n) { return n == "stop_time" || is_series(n); }};
-    OpenNames in_moment{known_series(), [](std::string_view n) { return n != "time" && is_series(n); }};
+    OpenNames in_end{expectable_series(), [](std::string_view n) { return n == "stop_time" || is_expectable(n); }};
+    OpenNames in_moment{expectable_series(), [](std::string_view n) { return n != "time" && is_expectable(n); }};
     in_end.listed.push_back("stop_time");
     in_moment.listed.erase(in_moment.listed.begin());
     for (Expectation& value : at_end)

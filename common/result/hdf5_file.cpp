@@ -13,6 +13,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/vtk_grid.hpp"
+#include "common/series/catalogue.hpp"
 
 namespace tubule {
 
@@ -44,7 +45,12 @@ void put_series(hid_t file, const Contents& contents) {
     std::vector<double> column(contents.rows.size() / width);
     for (std::size_t j = 0; j < width; ++j) {
         for (std::size_t i = 0; i < column.size(); ++i) column[i] = contents.rows[i * width + j];
-        put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
+        const auto data =
+            put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
+        if (const SeriesEntry* entry = find_series(contents.series[j])) {
+            put_attribute(data, "unit", std::string(entry->unit));
+            put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
+        }
     }
 }
 

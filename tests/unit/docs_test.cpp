@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/case/case.hpp"
+#include "common/series/catalogue.hpp"
 
 namespace tubule {
 namespace {
@@ -24,6 +25,19 @@ TEST(Docs, TellEveryStopItsExitStatusAndWhenItIsGiven) {
     for (const StopKind& stop : stop_kinds) {
         const std::string row = fmt::format("\n| `{}` | {} | {} |\n", stop.name, stop.exit_code, stop.meaning);
         EXPECT_TRUE(has(results, row)) << "docs/results.md lacks the row" << row;
+    }
+}
+
+TEST(Docs, TellEverySeries) {
+    const std::string results = page("docs/results.md");
+    for (const SeriesEntry& series : series_catalogue) {
+        const std::string row = fmt::format("\n| `{}` | {} | {} |\n", series.name, series.unit, series.meaning);
+        EXPECT_TRUE(has(results, row)) << "docs/results.md lacks the row" << row;
+    }
+    const std::string keys = page("docs/case_files.md");
+    for (const SeriesEntry& series : series_catalogue) {
+        if (series.use != SeriesUse::effort) continue;
+        EXPECT_TRUE(has(keys, fmt::format("`{}`", series.name))) << "docs/case_files.md lacks " << series.name;
     }
 }
 

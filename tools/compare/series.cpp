@@ -1,10 +1,9 @@
 #include "tools/compare/series.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <set>
 
+#include "common/series/catalogue.hpp"
 #include "tools/compare/results.hpp"
 
 namespace tubule::compare {
@@ -14,11 +13,11 @@ namespace {
 constexpr double same_time = 1e-12;  // of the later one
 constexpr double halved = 4;         // by this at least the error falls if rows are half as far apart, at the ends, too
 
-// How the run went, not what it computed.
-const std::set<std::string> of_the_run{"time",         "step_size",           "order",      "newton_iterations",
-                                       "elements",     "wall_seconds",        "mesh_width", "identity_defect",
-                                       "energy_error", "gauss_bonnet_defect", "quality",    "turn",
-                                       "tier"};
+// What a run computes; series of other versions count as that.
+SeriesUse use_of(const std::string& name) {
+    const SeriesEntry* entry = find_series(name);
+    return entry ? entry->use : SeriesUse::quantity;
+}
 
 bool same(double s, double t) {
     return std::abs(s - t) <= same_time * std::max(std::abs(s), std::abs(t));
@@ -191,9 +190,9 @@ std::vector<SeriesDifference> compare_series(const Result& a, const Result& b) {
     };
     if (a.series.at("time").empty() || b.series.at("time").empty()) return out;
     for (const std::string& name : a.series_names) {
-        if (of_the_run.contains(name) || !has(b, name)) continue;
-        const bool is_energy = name.starts_with("energy") || name == "kinetic_energy";
-        add(name, trace_of(a, name), trace_of(b, name), is_energy ? reference_energy(a) : 0);
+        const SeriesUse use = use_of(name);
+        if (use == SeriesUse::effort || use == SeriesUse::diagnostic || !has(b, name)) continue;
+        add(name, trace_of(a, name), trace_of(b, name), use == SeriesUse::energy ? reference_energy(a) : 0);
     }
     if (has(a, "energy") && has(b, "energy") && a.series.at("time").size() > 1 && b.series.at("time").size() > 1)
         add("rate", rate_of(a), rate_of(b), 0);

@@ -1,0 +1,105 @@
+// Every series that a result can have, declared once: what [expect] accepts, how results are compared, the attributes
+// in the file, the labels of pictures and the table of docs/results.md derive from here.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tubule {
+
+enum class SeriesUse {
+    effort,      // how the run went: neither expected nor compared
+    diagnostic,  // what the numbers are worth: expected, but not compared
+    energy,      // compared relative to E_ref
+    quantity     // compared relative to its largest magnitude
+};
+
+struct SeriesEntry {
+    std::string_view name;     // of a family: up to <...>, which stands for a number
+    std::string_view unit;     // in powers of energy, length and time of the case
+    std::string_view meaning;  // a phrase, for tables and legends
+    SeriesUse use = SeriesUse::quantity;
+
+    constexpr bool is_family() const { return name.ends_with('>'); }
+    constexpr std::string_view stem() const { return name.substr(0, name.find('<')); }
+};
+
+// In the order of tables and messages.
+inline constexpr SeriesEntry series_catalogue[] = {
+    {"time", "time", "time; of stationary shapes their number", SeriesUse::diagnostic},
+    {"step_size", "time", "last step of the time integrator", SeriesUse::effort},
+    {"order", "1", "order of the last step", SeriesUse::effort},
+    {"newton_iterations", "1", "Newton iterations so far", SeriesUse::effort},
+    {"energy", "energy", "bending energy E", SeriesUse::energy},
+    {"energy_<kl>", "energy", "part of the term with modulus k<kl> in E", SeriesUse::energy},
+    {"dissipation", "energy/time", "dissipation, -dE/dt"},
+    {"identity_defect", "energy", "defect of the energy identity", SeriesUse::diagnostic},
+    {"area", "length^2", "area"},
+    {"volume", "length^3", "enclosed volume"},
+    {"reduced_volume", "1", "volume over that of the sphere with the same area"},
+    {"r_min", "length", "smallest radius"},
+    {"r_max", "length", "largest radius"},
+    {"mode_<n>", "length", "amplitude of mode <n> of the profile r(z)"},
+    {"kinetic_energy", "energy", "kinetic energy", SeriesUse::energy},
+    {"speed", "length/time", "largest speed"},
+    {"momentum_x", "energy time/length", "momentum along x"},
+    {"momentum_y", "energy time/length", "momentum along y"},
+    {"momentum_z", "energy time/length", "momentum along z"},
+    {"angular_momentum_x", "energy time", "angular momentum about the x axis"},
+    {"angular_momentum_y", "energy time", "angular momentum about the y axis"},
+    {"angular_momentum_z", "energy time", "angular momentum about the z axis"},
+    {"lambda", "energy/length^3", "multiplier of the volume, in the force -lambda nu"},
+    {"stretching", "1", "norm of div_P u over that of grad_P u"},
+    {"correction_energy", "energy", "energy spent on keeping area and volume"},
+    {"integral_H2", "1", "integral of H^2"},
+    {"integral_K", "1", "integral of K"},
+    {"gauss_bonnet_defect", "1", "integral of K less 2 pi times the Euler characteristic", SeriesUse::diagnostic},
+    {"quality", "1", "quality of the worst triangle", SeriesUse::diagnostic},
+    {"turn", "radian", "largest angle between normals of neighbouring nodes", SeriesUse::diagnostic},
+    {"parameter", "that of the key", "value of the key that varies along a branch"},
+    {"special", "1", "1 at a fold, 2 at a bifurcation, else 0"},
+    {"sigma", "energy/length^2", "multiplier of the area"},
+    {"P", "energy/length^3", "multiplier of the volume of a stationary shape"},
+    {"negative_directions", "1", "number of directions in which the energy falls"},
+    {"growth_<m>", "1/time", "growth rate of waves with m = <m> around the axis"},
+    {"meridian_length", "length", "length of the profile"},
+    {"height", "length", "height from pole to pole, or period"},
+    {"r_middle", "length", "radius at half the profile"},
+    {"pole_curvature", "1/length", "curvature at the south pole"},
+    {"distance_to_start", "length", "Hausdorff distance to the start, mean heights aligned"},
+    {"energy_error", "energy", "estimated error of the energy", SeriesUse::diagnostic},
+    {"elements", "1", "number of elements", SeriesUse::diagnostic},
+    {"mesh_width", "length", "edge of an equilateral triangle with the mean area", SeriesUse::effort},
+    {"tier", "1", "1: axisym, 2: surface3d", SeriesUse::diagnostic},
+    {"wall_seconds", "s", "wall time since the run began or was resumed", SeriesUse::effort},
+};
+
+// The entry of a series, be it a member of a family; nullptr if there is none.
+const SeriesEntry* find_series(std::string_view name);
+
+// Of a series with that entry, with its number in place of <...>.
+std::string meaning_of(const SeriesEntry& entry, std::string_view name);
+
+// Whether a series of this name can be expected, and the names to suggest: families as such but for the energy terms.
+bool is_expectable(std::string_view name);
+std::vector<std::string> expectable_series();
+
+// The numbers <kl> of the energy terms, in their order.
+std::vector<std::string> energy_term_numbers();
+
+// A name or family of the catalogue: any other does not compile.
+class SeriesName {
+public:
+    consteval SeriesName(const char* name) : entry_(nullptr) {
+        for (const SeriesEntry& entry : series_catalogue)
+            if (entry.name == name) entry_ = &entry;
+        if (!entry_) throw "the catalogue has no such series";
+    }
+    const SeriesEntry& entry() const { return *entry_; }
+
+private:
+    const SeriesEntry* entry_;
+};
+
+}  // namespace tubule
