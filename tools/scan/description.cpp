@@ -303,17 +303,49 @@ Axis parse_table(const std::string& text, const std::string& path) {
     return axis;
 }
 
+namespace {
+
+toml::table parsed(const std::string& text, const std::string& path) {
+    try {
+        return toml::parse(text, std::string_view(path));
+    } catch (const toml::parse_error& error) {
+        throw CaseError(fmt::format("{}:{}:{}: not valid TOML: {}", path, error.source().begin.line,
+                                    error.source().begin.column, error.description()));
+    }
+}
+
+// The command's values replace those of the file for the same key, and are another axis else.
+std::vector<Axis> axes_of(const std::vector<std::string>& of_file, const std::vector<std::string>& of_command) {
+    std::vector<Axis> axes;
+    for (const std::string& over : of_file) axes.push_back(parse_axis(over));
+    for (const std::string& over : of_command) {
+        Axis axis = parse_axis(over);
+        const auto end = axes.begin() + static_cast<std::ptrdiff_t>(of_file.size());
+        const auto same = std::find_if(axes.begin(), end, [&](const Axis& a) { return a.keys == axis.keys; });
+        if (same != end)
+            *same = std::move(axis);
+        else
+            axes.push_back(std::move(axis));
+    }
+    return axes;
+}
+
+void refuse_no_points_and_too_many(const Scan& scan) {
+    if (scan.axes.empty())
+        throw CaseError(fmt::format("{}: nothing varies: give --over key=values, or a table by --points", scan.path));
+    double size = 1;
+    for (const Axis& axis : scan.axes) size *= static_cast<double>(axis.size());
+    if (size > static_cast<double>(most_points))
+        throw CaseError(fmt::format("{}: {:.3g} points are too many; at most {}", scan.path, size, most_points));
+}
+
+}  // namespace
+
 Scan read_scan(const ScanChoices& choices) {
     Scan scan;
     scan.path = choices.file;
     const std::string text = read_text(choices.file);
-    toml::table root;
-    try {
-        root = toml::parse(text, std::string_view(choices.file));
-    } catch (const toml::parse_error& error) {
-        throw CaseError(fmt::format("{}:{}:{}: not valid TOML: {}", choices.file, error.source().begin.line,
-                                    error.source().begin.column, error.description()));
-    }
+    const toml::table root = parsed(text, choices.file);
     ScanFile file;
     if (root.contains("case")) {
         file = read_scan_file(root, choices.file);
@@ -330,27 +362,10 @@ Scan read_scan(const ScanChoices& choices) {
     scan.sets = file.sets;
     scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
 
-    // The command's values replace those of the file for the same key, and are another axis else.
-    for (const std::string& over : file.over) scan.axes.push_back(parse_axis(over));
-    for (const std::string& over : choices.over) {
-        Axis axis = parse_axis(over);
-        const auto same =
-            std::find_if(scan.axes.begin(), scan.axes.end(), [&](const Axis& a) { return a.keys == axis.keys; });
-        const bool given =
-            same != scan.axes.end() && same - scan.axes.begin() < static_cast<std::ptrdiff_t>(file.over.size());
-        if (given)
-            *same = std::move(axis);
-        else
-            scan.axes.push_back(std::move(axis));
-    }
+    scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_text(points), points));
-    if (scan.axes.empty())
-        throw CaseError(fmt::format("{}: nothing varies: give --over key=values, or a table by --points", scan.path));
-    double size = 1;
-    for (const Axis& axis : scan.axes) size *= static_cast<double>(axis.size());
-    if (size > static_cast<double>(most_points))
-        throw CaseError(fmt::format("{}: {:.3g} points are too many; at most {}", scan.path, size, most_points));
+    refuse_no_points_and_too_many(scan);
 
     const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;
     const auto seeds = choices.seeds ? choices.seeds : file.seeds;
