@@ -405,7 +405,7 @@ std::optional<StopReport> CurveAttempt::check(double t) {
         const CurvePoint p = space_->evaluate(x, (*crossing)[0]);
         return StopReport{Stop::self_intersection, t,
                           fmt::format("the profile meets itself or the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
-                          "the model knows no contact: what comes after is not meant"};
+                          "contact is not modelled: later results are invalid"};
     }
     const std::vector<double>& breaks = space_->splines().breaks();
     const int e = space_->splines().element_at(l.o.s_curvature);

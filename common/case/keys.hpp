@@ -156,7 +156,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
               {"exact", Recovery::exact}});
     k.number("smoothing", d.smoothing, {.from = 0});
     for (const char* key : {"scheme", "step", "time_tolerance", "relaxation", "follow_curvature"})
-        k.absent(key, "must be absent: it belongs to a motion, which has a table [time]");
+        k.absent(key, "must be absent: only valid with a table [time]");
 }
 
 template <class Keys>
@@ -299,7 +299,7 @@ void check_together(Keys& k, const Case& c) {
                 [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
         k.check("model.kind", [&] {
             return c.equilibrium->modes && c.model.kind == ModelKind::fluid
-                       ? "must not be \"fluid\" with equilibrium.modes: growth rates are told without inertia"
+                       ? "must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia"
                        : "";
         });
         k.check("shape.kind", [&] {

@@ -38,7 +38,7 @@ Vector3d area_vector(const TriangleMesh& mesh, std::size_t t) {
 
 void check_triangles(const ImportedMesh& in) {
     const TriangleMesh& mesh = in.mesh;
-    if (mesh.period != 0) fail(in, "a periodic mesh is no closed one");
+    if (mesh.period != 0) fail(in, "a periodic mesh is not closed");
     if (mesh.triangles.empty()) fail(in, "there are no triangles in it");
     const int points = int(mesh.points.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

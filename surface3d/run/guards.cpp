@@ -98,7 +98,7 @@ std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
     const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);
     return StopReport{Stop::self_intersection, 0,
                       fmt::format("the surface meets itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
-                      "the model knows no contact: what comes after is not meant"};
+                      "contact is not modelled: later results are invalid"};
 }
 
 }  // namespace tubule::surface3d

@@ -92,8 +92,8 @@ StopReport interruption() {
     return {Stop::interrupted, 0, "interrupted by a signal", ""};
 }
 
-// So many triangles, compared with a quarter and a sixteenth of them. No others have a say, so errors that change sign
-// are to be feared more.
+// So many triangles, compared with a quarter and a sixteenth of them. No other mesh is compared,
+// so that cancellation may understate the error.
 Answer on_elements(const Case& c, const Start& start, int elements, RunObserver& observer) {
     std::vector<double> energies;
     for (int part = 16;; part /= 4) {

@@ -117,7 +117,7 @@ TEST(EquilibriumCase, refusals) {
     expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
            "11:10: model.volume must be absent: equilibrium.held says what is held fixed");
     expect("[accuracy]", "[model]\nkind = \"fluid\"\n[accuracy]",
-           "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates are told without inertia");
+           "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia");
     expect("to = 0.0", "to = 0.12", " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; 1 to 10000 are possible");
     expect("modes = 1", "area = 1.0", " equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1");
 }

@@ -173,7 +173,7 @@ TEST(CloseMesh, RefusesBrokenMeshesInMemory) {
     EXPECT_EQ(refusal(imported(mesh)), "mesh: vertex 0 (0, nan, 0) is not finite");
     mesh = geodesic_sphere(2);
     mesh.period = 2;
-    EXPECT_EQ(refusal(imported(mesh)), "mesh: a periodic mesh is no closed one");
+    EXPECT_EQ(refusal(imported(mesh)), "mesh: a periodic mesh is not closed");
 }
 
 // The vertex of a fine sphere that is farthest down, pulled up beyond the top: its six triangles go through the others.

@@ -118,7 +118,7 @@ TEST(ShapeKeys, WhatEachTierTakes) {
     EXPECT_EQ(still("[model]\nkind = \"fluid\"\n"),
               "case.toml:6:1: model must be absent: without a table [time] nothing moves");
     EXPECT_EQ(still("[discretisation]\nstep = 0.1\n"),
-              "case.toml:7:8: discretisation.step must be absent: it belongs to a motion, which has a table [time]");
+              "case.toml:7:8: discretisation.step must be absent: only valid with a table [time]");
     EXPECT_EQ(still(time_span + "[discretisation]\nrecovery = \"patch\"\n"),
               "case.toml:9:12: discretisation.recovery must be absent: a surface that moves has its own curvatures");
     EXPECT_EQ(still(time_span + "[discretisation]\nscheme = \"paper\"\n"),

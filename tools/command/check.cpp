@@ -37,7 +37,7 @@ int check(const CheckOptions& options) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_status) {
-    CLI::App* command = app.add_subcommand("check", "Validate cases and print what they come to");
+    CLI::App* command = app.add_subcommand("check", "Validate cases and print the resolved cases");
     const auto options = std::make_shared<CheckOptions>();
     command->add_option("CASE", options->cases, "case files")->required();
     command->add_option("--set", options->sets, "override a key, such as --set energy.k42=0.06")
