@@ -69,7 +69,7 @@ AT_REST = [
     Scene(
         "spheroid-at-rest",
         "A spheroid, at rest",
-        "Half axes .5, .5, 1, energy of `cases/capsule_fluid.toml`. INT K is 4 pi.",
+        "Half axes 0.5, 0.5, 1, energy of `cases/capsule_fluid.toml`. INT K is 4 pi.",
         at_rest(
             spheroid(),
             {"integral_K": 4 * math.pi},
@@ -97,7 +97,7 @@ BEGINNINGS = [
     Scene(
         "tube-begins",
         "How a tube begins to move",
-        "Two waves of .1 and .05 on a tube of radius 1 and length 4 (energy of `cases/tube_waves_overdamped.toml`; Re = 2, gamma = .3), "
+        "Two waves of 0.1 and 0.05 on a tube of radius 1 and length 4 (energy of `cases/tube_waves_overdamped.toml`; Re = 2, gamma = 0.3), "
         "at t = 1e-6, fluid 1e-3. Waves: d/dt of their amplitudes; acceleration squared: INT (du/dt)^2.",
         beginnings(waves("overdamped"), ("1", "2"), 1e-6, 1e-3,
                    within(0.4, "dissipation") | within(0.02, "wave 1", "wave 2") | within(2e-3, "lambda") | within(0.6, "acceleration squared")),
@@ -105,7 +105,7 @@ BEGINNINGS = [
     Scene(
         "spheroid-begins",
         "How a spheroid begins to move",
-        "The spheroid above; Re = 2, gamma = .3; at t = 1e-7, fluid 3e-4. Waves: Y_2 and Y_4.",
+        "The spheroid above; Re = 2, gamma = 0.3; at t = 1e-7, fluid 3e-4. Waves: Y_2 and Y_4.",
         beginnings(spheroid(), ("2", "4"), 1e-7, 3e-4,
                    within(2e-2, "dissipation") | within(2e-3, "wave 2", "wave 4") | within(1e-3, "lambda") | within(0.05, "acceleration squared")),
     ),
@@ -116,8 +116,8 @@ RATES = [
         Scene(
             f"rates-{kind}",
             f"Rates of small waves (n, m), {kind}",
-            "A tube at rest, k20 = .5, k42 = .05, H0 = -1/R, volume free, q^2 R^2 = 3 for n = 1"
-            + ("; Re = 2, gamma = .3." if kind == "stokes" else "."),
+            "A tube at rest, k20 = 0.5, k42 = 0.05, H0 = -1/R, volume free, q^2 R^2 = 3 for n = 1"
+            + ("; Re = 2, gamma = 0.3." if kind == "stokes" else "."),
             rates(tube_at_rest(kind, 0.1), THREE, within(1e-3, *THREE) | within(3e-5, "tier 1"), 0.0015, finest),
         )
         for kind, finest in (("gradient-flow", 1000), ("overdamped", None), ("stokes", None))
@@ -125,7 +125,7 @@ RATES = [
     Scene(
         "rates-pearling",
         "Rate of a wave that grows: pearling, gradient flow",
-        "The same with k20 = 2.5, k42 = -.5 and q^2 R^2 = 1.25.",
+        "The same with k20 = 2.5, k42 = -0.5 and q^2 R^2 = 1.25.",
         rates(tube_at_rest("gradient-flow", 0.5, 1.25, k20=2.5, k42=-0.5), [(1, 0)], within(1e-3, (1, 0)) | within(3e-5, "tier 1"), 0.01),
     ),
     Scene(
@@ -172,7 +172,7 @@ MOVING_TUBES = [
     Scene(
         "rotation",
         "The same tube as a fluid in rotation",
-        "omega = .7 at first.",
+        "omega = 0.7 at first.",
         motion(waves("fluid", velocity={"initial": "rotation", "omega": 0.7}, time={"end": 0.1, "output": [0.02, 0.05]}), 1e-7, 8e-5,
                within(1e-4, "energy", "kinetic_energy", "dissipated", "angular_momentum_z") | within(1e-3, "shape, Hausdorff")
                | within(2e-3, "speed") | within(5e-3, "lambda")),
@@ -198,7 +198,7 @@ MOVING_CELLS = [
     Scene(
         "capsule-equilibrium",
         "The capsule's equilibrium",
-        "The cell l = 2, k42 = .06: at rest by Newton's method, and overdamped in 3D to t = 3. The error is how far tier 1 is from rest then.",
+        "The cell l = 2, k42 = 0.06: at rest by Newton's method, and overdamped in 3D to t = 3. The error is how far tier 1 is from rest then.",
         at_equilibrium(
             case("equilibrium_capsule", shape={"length": 2.0}, equilibrium={"modes": 0}),
             case("capsule_overdamped", time={"end": 3.0, "output": [], "stationary": None}),
