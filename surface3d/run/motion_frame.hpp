@@ -2,8 +2,8 @@
 #pragma once
 
 #include "common/result/result.hpp"
-#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/motion/motion_measures.hpp"
+#include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/motion_settings.hpp"
 
 namespace tubule::surface3d {

@@ -8,8 +8,8 @@
 #include "common/result/record.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
-#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/run/guards.hpp"
+#include "surface3d/run/mesh_record.hpp"
 
 namespace tubule::surface3d {
 namespace {

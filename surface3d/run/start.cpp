@@ -16,8 +16,8 @@
 #include "surface3d/curvature/exact_curvature.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
-#include "surface3d/mesh/mesh_record.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
+#include "surface3d/run/mesh_record.hpp"
 
 namespace tubule::surface3d {
 namespace {

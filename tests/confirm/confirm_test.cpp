@@ -7,7 +7,7 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
-#include "surface3d/mesh/mesh_record.hpp"
+#include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/start.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"

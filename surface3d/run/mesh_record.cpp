@@ -1,4 +1,4 @@
-#include "surface3d/mesh/mesh_record.hpp"
+#include "surface3d/run/mesh_record.hpp"
 
 namespace tubule::surface3d {
 
