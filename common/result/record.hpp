@@ -56,7 +56,7 @@ public:
     }
     template <class Values>
     void optional_array(const char* name, const Values& values, std::optional<Eigen::Index> = {}) {
-        if (values.size() > 0) array(name, values);
+        array(name, values);
     }
 
 private:
@@ -81,10 +81,11 @@ public:
     void array(const char* name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
     void array(const char* name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;
     void array(const char* name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count = {}) const;
-    // Stays empty where there is none.
+    // `count` rows or none: what only some runs have is written all the same.
     template <class Values>
     void optional_array(const char* name, Values& values, std::optional<Eigen::Index> count = {}) const {
-        if (find_array(record_, name)) array(name, values, count);
+        const Array* found = find_array(record_, name);
+        array(name, values, found && found->data.empty() ? std::optional<Eigen::Index>(0) : count);
     }
 
 private:

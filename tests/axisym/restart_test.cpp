@@ -6,7 +6,9 @@
 #include <filesystem>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/result/frame_profile.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/missing_fields.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -102,6 +104,35 @@ TEST(Restart, refusesRecordsOfAnotherKind) {
     record.kind = RecordKind::equilibrium;
     EXPECT_EQ(message(record),
               "cannot resume from this frame: it is of kind equilibrium, not graph; run the case without --resume");
+}
+
+// Expected: every field of the state is needed, for a run as a graph and one as a curve.
+TEST(Restart, refusesARecordThatLacksAField) {
+    Case c = relaxing(1e-3);
+    c.time.end = 1e-3, c.time.output.clear();
+    const Record graph = run_case(c).log.frames.front();
+    EXPECT_EQ(kind_of(graph), RecordKind::graph);
+    expect_each_field_is_needed<std::runtime_error>(graph, "restart_", check_restart);
+    c.discretisation.parametrisation = Parametrisation::even;
+    const Record curve = run_case(c).log.frames.front();
+    EXPECT_EQ(kind_of(curve), RecordKind::curve);
+    expect_each_field_is_needed<std::runtime_error>(curve, "restart_", check_restart);
+}
+
+// What a case may start from: the spline of a graph, else points.
+TEST(Frame, isNoStartWithoutItsProfile) {
+    const auto profile = [](const Record& record) { return tubule::profile_of(record); };
+    Case c = relaxing(1e-3);
+    c.time.end = 1e-3, c.time.output.clear();
+    Record frame = run_case(c).log.frames.front();
+    for (const char* field : {"degree", "length", "knots", "coefficients"})
+        expect_each_field_is_needed<std::invalid_argument>(frame, field, profile);
+    frame.kind = RecordKind::equilibrium;
+    for (const char* field : {"r", "z", "length"}) {
+        std::erase_if(frame.arrays, [](const Array& a) { return a.name.starts_with("restart_"); });
+        std::erase_if(frame.numbers, [](const auto& n) { return n.first.starts_with("restart_"); });
+        expect_each_field_is_needed<std::invalid_argument>(frame, field, profile);
+    }
 }
 
 TEST(Frame, holdsTheProfileOverThePeriod) {

@@ -63,6 +63,7 @@ def write(path, times=(0, 1, 2), pressure=True, sets=()):
         rows |= {"identity_defect": 1e-3 * t * (t - 1), "kinetic_energy": t**2, "energy_error": 0 * t}
         for name, values in rows.items():
             file[f"series/{name}"] = values
+            file[f"series/{name}"].attrs["meaning"] = f"what {name} is"
         mesh = file.create_group("meshes/000000")
         mesh.attrs["order"], mesh.attrs["period"] = 4, 0.0
         for i, time in enumerate(times):
@@ -201,10 +202,10 @@ class Pages(InFolder):
     def test_all_of_a_moving_surface(self):
         texts = "\n".join(self.drawn(write(self.folder / "a.hdf"))).split("\n")
         for words in ("(d)", "at rest", "|u\u2099| \u2264 2", "|u\u209c| \u2264 3", "|u\u209c| \u2264 6", "cut z = 0",
-                      "t\u2082 = 2", "dissipation \u2212dE/dt", "|defect of the identity|", "kinetic energy E\u2096"):  # fmt: skip
+                      "t\u2082 = 2", "what dissipation is", "what identity_defect is", "what kinetic_energy is"):  # fmt: skip
             self.assertIn(words, texts)
         self.assertTrue([text for text in texts if text.startswith("normal velocity")])
-        self.assertNotIn("estimated error of E", texts)  # all of it zero
+        self.assertNotIn("what energy_error is", texts)  # all of it zero
         self.assertFalse([text for text in texts if "curvature" in text])
 
     def test_colours_and_kinds(self):
@@ -217,7 +218,7 @@ class Pages(InFolder):
         self.assertIn("t\u2080 = 1", texts)
         self.assertIn("cut x = \u22120.25", self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25"))
         texts = self.drawn(file, "--kind", "balance")
-        self.assertIn("dissipation \u2212dE/dt", texts)
+        self.assertIn("what dissipation is", texts)
         self.assertNotIn("(a)", texts)
 
     def test_several_results(self):

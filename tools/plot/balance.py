@@ -8,12 +8,7 @@ from style import DASHES, line_colours
 
 HEIGHT = 1.7  # inches of the axes
 DECADES = 9  # shown at most, downwards from the largest value
-LINES = {  # series, what it is called
-    "dissipation": "dissipation \u2212dE/dt",
-    "kinetic_energy": "kinetic energy E\u2096",
-    "identity_defect": "|defect of the identity|",
-    "energy_error": "estimated error of E",
-}
+LINES = ("dissipation", "kinetic_energy", "identity_defect", "energy_error")  # series
 
 
 def has_balance(result):
@@ -66,7 +61,8 @@ class BalancePanel:
     def _legend_entries(self):
         lone = len(self.results) == 1
         shade = line_colours(1)[0] if lone else "0.3"
-        handles = [Line2D([], [], color=shade, linestyle=dashes, label=LINES[name]) for name, dashes in self.styles.items()]
+        names = {name: text for result in self.results for name, text in result.meanings.items()}
+        handles = [Line2D([], [], color=shade, linestyle=dashes, label=names[name]) for name, dashes in self.styles.items()]
         if not lone:
             colours = line_colours(len(self.results))
             handles = [Line2D([], [], color=c, label=", ".join(l)) for c, l in zip(colours, self.labels)] + handles

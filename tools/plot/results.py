@@ -2,7 +2,7 @@
 
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import h5py
 import numpy as np
@@ -80,6 +80,7 @@ class Result:
     series: dict  # name -> 1-D array, times strictly increasing
     frames: list  # of Frame, times strictly increasing
     surfaces: list  # of Surface, likewise
+    meanings: dict = field(default_factory=dict)  # name -> what the series is; older files do not say
 
     @property
     def title(self):
@@ -143,7 +144,9 @@ def read_result(path):
         try:
             case = effective_case(file["case"].asstr()[()], _strings(file["case"].attrs.get("set")))
             about = {key: _plain(value) for key, value in file["about"].attrs.items()} if "about" in file else {}
-            return Result(path, case, about, _series(file.get("series", {})), *_frames(path, file))
+            series = file.get("series", {})
+            meanings = {name: str(_plain(data.attrs.get("meaning", name))) for name, data in series.items()}
+            return Result(path, case, about, _series(series), *_frames(path, file), meanings)
         except BadCase as error:
             raise BadInput(f"{path}: {error}") from error
         except (OSError, KeyError, TypeError, ValueError, AttributeError) as error:
