@@ -1,4 +1,4 @@
-// Study: the critical amplitude as narrowly as the reference brackets it.
+// The critical amplitude as narrowly as the reference brackets it.
 #include <gtest/gtest.h>
 
 #include "tests/axisym/reference.hpp"
@@ -7,7 +7,7 @@
 namespace tubule::axisym {
 namespace {
 
-TEST(CriticalAmplitude, agreesWithTheReferenceToItsBracket) {
+TEST(CriticalAmplitudeStudy, agreesWithTheReferenceToItsBracket) {
     const auto pinches = [](double amplitude) {
         Case c = tube_case(bending(0.2, -2), 1, 2, {{amplitude, 1}}, 3);
         c.accuracy.energy = 1e-8;

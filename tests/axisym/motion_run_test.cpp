@@ -10,6 +10,7 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
+#include "tests/support/paths.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -300,9 +301,10 @@ TEST(CurveRun, anErrorThatIsNotKnownIsNotStatedAsSmall) {
 
 TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
     // An independent spectral curve code finds the profile vertical at t = .0086943.
-    std::ifstream file(std::string(TUBULE_CASES) + "/overhang.toml");
+    const std::string path = test::cases + "/overhang.toml";
+    std::ifstream file(path);
     const std::string text((std::istreambuf_iterator<char>(file)), {});
-    Case c = parse_case(text, {}, TUBULE_CASES "/overhang.toml");
+    Case c = parse_case(text, {}, path);
     c.discretisation.parametrisation.reset();
     c.time.output = {0.008, 0.01}, c.time.end = 0.01, c.accuracy.energy = 1e-4;
     Watch watch;

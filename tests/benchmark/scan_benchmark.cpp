@@ -6,6 +6,7 @@
 #include <map>
 #include <thread>
 
+#include "tests/support/paths.hpp"
 #include "tools/scan/dispatcher.hpp"
 
 namespace tubule {
@@ -18,7 +19,7 @@ void scan(benchmark::State& state, const std::string& name, const std::string& b
     ScanEffort effort;
     for (auto _ : state) {
         ScanChoices choices;
-        choices.file = TUBULE_CASES "/scans/" + name + ".toml";
+        choices.file = test::cases + "/scans/" + name + ".toml";
         choices.boundary = boundary;
         const Scan what = read_scan(choices);
         ScanWriter writer = ScanWriter::create(file, what, {});

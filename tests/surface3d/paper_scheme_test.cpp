@@ -126,6 +126,14 @@ TEST(PaperScheme, StepsAreLimitedByTheExplicitGaussianCurvature) {
     EXPECT_EQ(growth_by_the_paper(2, 0, 0.5, 12), 1);
 }
 
+TEST(PaperSchemeStudy, StableStepFallsAsTheSquareOfTheMeshWidth) {
+    // A prototype was stable and unstable at 3e-3 and 4.2e-3 (320 triangles), 7e-4 and 1e-3 (1280).
+    EXPECT_LT(growth_by_the_paper(4, 0.12, 3e-3, 60), 1.1);
+    EXPECT_GT(growth_by_the_paper(4, 0.12, 4.2e-3, 60), 10);
+    EXPECT_LT(growth_by_the_paper(8, 0.12, 3.5e-4, 60), 1.1);
+    EXPECT_GT(growth_by_the_paper(8, 0.12, 1e-3, 60), 10);
+}
+
 TEST(PaperScheme, RefusesWhatThePaperHasNot) {
     const CurvedMesh mesh = smooth_cell(2);
     const Bending bending{.k = {1, 0, 0}, .H0 = 0};

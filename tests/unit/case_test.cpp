@@ -12,6 +12,7 @@
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "tests/support/paths.hpp"
 
 namespace tubule {
 namespace {
@@ -498,7 +499,7 @@ TEST(CaseFile, ReadsWhatParseReads) {
 
 // What the program prints (both streams), and its exit status.
 std::pair<std::string, int> run_program(const std::string& arguments) {
-    FILE* pipe = popen((TUBULE_PROGRAM " " + arguments + " 2>&1").c_str(), "r");
+    FILE* pipe = popen((test::program + " " + arguments + " 2>&1").c_str(), "r");
     std::string output;
     for (int c; (c = std::fgetc(pipe)) != EOF;) output += static_cast<char>(c);
     const int status = pclose(pipe);
@@ -524,7 +525,7 @@ TEST(CheckCommand, PrintsTheEffectiveCaseAndLooksAtAllCases) {
 }
 
 TEST(CaseFile, TheDocumentedExampleIsOne) {
-    std::ifstream file(TUBULE_TESTS "/../docs/case_files.md");
+    std::ifstream file(test::sources + "/docs/case_files.md");
     const std::string guide{std::istreambuf_iterator<char>(file), {}};
     const std::string fence = "```toml\n";
     const std::size_t begin = guide.find(fence);

@@ -7,12 +7,13 @@
 
 #include "common/case/case.hpp"
 #include "common/series/catalogue.hpp"
+#include "tests/support/paths.hpp"
 
 namespace tubule {
 namespace {
 
 std::string page(const std::string& name) {
-    std::ifstream file(TUBULE_TESTS "/../" + name);
+    std::ifstream file(test::sources + "/" + name);
     return {std::istreambuf_iterator<char>(file), {}};
 }
 

@@ -6,7 +6,12 @@ set(precompiled_headers
   <fmt/format.h> <fmt/ranges.h>
   <Eigen/Dense> <Eigen/SparseCore>)
 
-# tubule_precompile(target [header...]): these, and further ones that this target uses throughout.
+# tubule_precompile(target [header...]): these, and further ones that this target uses throughout. Without further ones the
+# target shares what was compiled for tubule_common; its flags have to be the same.
 function(tubule_precompile target)
-  target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
+  if(target STREQUAL tubule_common OR ARGN)
+    target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
+  else()
+    target_precompile_headers(${target} REUSE_FROM tubule_common)
+  endif()
 endfunction()

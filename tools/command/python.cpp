@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include "build_config.hpp"
+
 namespace tubule {
 
 namespace {

@@ -1,5 +1,6 @@
-// Is the stated error honest? Cases nobody tuned anything for: drawn from a seed.
-#pragma once
+// Is the stated error honest? Cases nobody tuned anything for, drawn from a seed: the stated error against the true
+// one.
+#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
@@ -12,10 +13,11 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
+namespace {
 
 // A tube with 1 ... 4 modes of random waves, amplitudes and phases, random moduli with or without k40 and k42, a random
 // spontaneous curvature, a random time (around that in which a wave of the period decays) and a random accuracy.
-inline Case random_case(std::mt19937& engine) {
+Case random_case(std::mt19937& engine) {
     const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(engine); };
     const auto power = [&](double a, double b) { return std::exp(uniform(std::log(a), std::log(b))); };
     const auto pick = [&](int a, int b) { return std::uniform_int_distribution<int>(a, b)(engine); };
@@ -43,7 +45,7 @@ struct Honesty {
 
 // The error of a run over all of its rows against another run, on other settings and 1e3 times as accurate at
 // least. Nothing if the case does not finish.
-inline std::optional<Honesty> honesty(Case c) {
+std::optional<Honesty> honesty(Case c) {
     const Outcome o = run_case(c);
     if (o.summary.stop.reason != Stop::finished) return std::nullopt;
     const double asked = c.accuracy.energy;
@@ -82,7 +84,7 @@ struct Distribution {
     }
 };
 
-inline Distribution battery(unsigned seed, int cases) {
+Distribution battery(unsigned seed, int cases) {
     std::mt19937 engine(seed);
     Distribution d;
     while (static_cast<int>(d.all.size()) < cases)
@@ -91,4 +93,20 @@ inline Distribution battery(unsigned seed, int cases) {
     return d;
 }
 
+TEST(Estimate, isHonest) {
+    const Distribution d = battery(20240, 15);
+    EXPECT_GE(d.within(0.1, 1), 0.9);
+    EXPECT_LE(d.quantile(1), 1.2);
+    for (const Honesty& h : d.all) EXPECT_LE(h.error, h.asked);
+}
+
+TEST(EstimateStudy, isHonest) {
+    const Distribution d = battery(71, 100);
+    EXPECT_GE(d.within(0.1, 1), 0.9);
+    EXPECT_GE(d.within(0, 1.2), 0.97);
+    EXPECT_LE(d.quantile(1), 2.5);  // transients that come and go between two estimates, far below what was asked
+    for (const Honesty& h : d.all) EXPECT_LE(h.error, h.asked);
+}
+
+}  // namespace
 }  // namespace tubule::axisym
