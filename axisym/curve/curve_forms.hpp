@@ -22,7 +22,8 @@ struct Weights {
     double energy = 0, area = 0, volume = 0, gauge = 0;
 };
 
-// What a curve is worth, over the whole cell or period; extremes over the quadrature points.
+// Diagnostics of a curve, over the whole cell or period; extremes over the quadrature points. Many fields: a list of
+// measurements, found in one pass, that share no rule.
 struct CurveObservation {
     double energy = 0;
     std::array<double, n_bending_terms> energy_term{};

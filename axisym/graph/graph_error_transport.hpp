@@ -11,6 +11,7 @@
 
 namespace tubule::axisym {
 
+// Many fields: most are vectors that every step uses again.
 class ErrorTransport {
 public:
     // coarse must outlive the transport.

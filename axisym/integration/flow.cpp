@@ -22,6 +22,7 @@ FlowCounters& FlowCounters::operator+=(const FlowCounters& o) {
     return *this;
 }
 
+// Many fields: the objects of IDA, each to be freed.
 struct Flow::Impl {
     FlowSystem system;
     SUNContext context = nullptr;

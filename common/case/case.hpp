@@ -113,6 +113,7 @@ struct Expect {
     std::vector<Expectation> values;
 };
 
+// Many fields: one for each table of a case file.
 struct Case {
     std::string path;               // where it was read from, for messages
     std::string text;               // the file, verbatim

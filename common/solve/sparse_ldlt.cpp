@@ -157,6 +157,7 @@ Sources find_sources(const Supernodes& tree, const int* outer, const int* inner)
 
 }  // namespace
 
+// Many fields: what is found once for a pattern, then what is computed for its values.
 template <class Scalar>
 struct SparseLdlt<Scalar>::Impl {
     // Smaller pivots, after scaling, are taken for rounding.

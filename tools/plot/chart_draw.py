@@ -37,15 +37,9 @@ def words_beside(figure, left, lines, height):
     figure.text(left, 1 - 0.12 / height, "\n".join(wrapped), va="top", fontsize=5.8, linespacing=1.25)
 
 
-def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
-    """All runs, faint, and a line through the best of each series; crosses on the upper edge for those that failed,
-    numbers on the front of all, named beside."""
-    styles = series_styles(chart)
-    height = 3.9
-    figure = Figure(figsize=(style.WIDTH, height))
-    width = style.WIDTH - SIDE - 0.6
-    axes = figure.add_axes([0.6 / style.WIDTH, 0.42 / height, width / style.WIDTH, 1 - 0.72 / height])
-    by_series = {name: {} for name in styles}
+def sorted_runs(jobs, runs, truth, names):
+    """Runs of each series that reached all times, by key; and those that did not, with their jobs."""
+    by_series = {name: {} for name in names}
     failed = {}
     for job in jobs:
         run = runs[job.key]
@@ -55,6 +49,28 @@ def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
             by_series[job.series][run.key] = run
         else:
             failed[run.key] = (job, run)
+    return by_series, failed
+
+
+def stops_in_words(failed):
+    """A line for each way in which runs of a series stopped early."""
+    stops = {}
+    for job, run in failed.values():
+        stops.setdefault((job.series, run.outcome), []).append((job, run))
+    for (series, outcome), of in stops.items():
+        which = "; ".join(f"{' '.join(job.told)} (t = {run.stop_time:.3g})" for job, run in of)
+        yield f"{series}: {outcome}: {which}"
+
+
+def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
+    """All runs, faint, and a line through the best of each series; crosses on the upper edge for those that failed,
+    numbers on the front of all, named beside."""
+    styles = series_styles(chart)
+    height = 3.9
+    figure = Figure(figsize=(style.WIDTH, height))
+    width = style.WIDTH - SIDE - 0.6
+    axes = figure.add_axes([0.6 / style.WIDTH, 0.42 / height, width / style.WIDTH, 1 - 0.72 / height])
+    by_series, failed = sorted_runs(jobs, runs, truth, styles)
     for name, of in by_series.items():
         points = sorted((run.cpu_s, max(error_of(run, truth), FLOOR)) for run in of.values())
         best = [p for i, p in enumerate(points) if all(p[1] < q[1] for q in points[:i])]
@@ -89,13 +105,7 @@ def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
     axes.legend(handles=handles, loc="best", fontsize=SMALL)
     lines = ["The front, cheapest first:"] + [f"{n}  {named[run.key]}" for n, run in enumerate(front, 1)]
     if failed:
-        lines += ["", "Stopped early:"]
-        stops = {}
-        for job, run in failed.values():
-            stops.setdefault((job.series, run.outcome), []).append((job, run))
-        for (series, outcome), of in stops.items():
-            which = "; ".join(f"{' '.join(job.told)} (t = {run.stop_time:.3g})" for job, run in of)
-            lines.append(f"{series}: {outcome}: {which}")
+        lines += ["", "Stopped early:", *stops_in_words(failed)]
     words_beside(figure, 1 - (SIDE - 0.08) / style.WIDTH, lines, height)
     style.save(figure, list(map(str, outputs)))
 
