@@ -11,19 +11,15 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
 namespace {
 
 using Vector = Eigen::VectorXd;
 
-Vector random_vector(int n, double size, unsigned seed = 1) {
-    std::mt19937 engine(seed);
-    std::normal_distribution<double> normal;
-    Vector x(n);
-    for (double& c : x) c = size * normal(engine);
-    return x;
-}
+using test::random_vector;
 
 std::vector<double> uneven_breaks(int n) {
     std::vector<double> breaks = equal_breaks(n);
@@ -40,14 +36,7 @@ Vector rough(const CurveSpace& space, double size = 0.02) {
     return fit(space, space.images() == 2 ? half(whole) : whole) + random_vector(space.size(), size);
 }
 
-std::string message(const std::function<void()>& act) {
-    try {
-        act();
-    } catch (const std::invalid_argument& e) {
-        return e.what();
-    }
-    return "accepted";
-}
+using test::message_of;
 
 TEST(Field, parityAtTheEnds) {
     // Definition: an odd function and its second derivative vanish, an even one's first derivative does. Sizes for odd
@@ -77,11 +66,15 @@ TEST(Field, parityAtTheEnds) {
 }
 
 TEST(CurveSpace, refusesWhatMakesNoCurve) {
-    EXPECT_EQ(message([] { CurveSpace(Topology::cell, equal_breaks(4), 4, 3); }), "spline degree must be 3, 5 or 7");
-    EXPECT_EQ(message([] { CurveSpace(Topology::cell, {0, 1, 2}, 5, 4); }), "breaks must run from 0 to 1");
-    EXPECT_EQ(message([] { CurveSpace(Topology::cell, equal_breaks(4), 5, 4, 1.0); }),
+    EXPECT_EQ(message_of<std::invalid_argument>([] { CurveSpace(Topology::cell, equal_breaks(4), 4, 3); }),
+              "spline degree must be 3, 5 or 7");
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
+                  CurveSpace(Topology::cell, {0, 1, 2}, 5, 4);
+              }),
+              "breaks must run from 0 to 1");
+    EXPECT_EQ(message_of<std::invalid_argument>([] { CurveSpace(Topology::cell, equal_breaks(4), 5, 4, 1.0); }),
               "the length must be positive for a tube, 0 for a torus or a closed cell");
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   const CurveSpace a(Topology::cell, equal_breaks(4), 5, 4),
                       b(Topology::tube, equal_breaks(4), 5, 4, 1);
                   a.prolong(b, Vector::Zero(b.size()));
@@ -260,11 +253,12 @@ TEST(CurveForms, halvesAreWorthTheirWhole) {
         EXPECT_NEAR(a.volume, b.volume, 1e-10);
         EXPECT_NEAR(a.length, b.length, 1e-10);
     }
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   half(meridian(Sphere{1, {{0.2, 3, 0}}}));
               }),
               "the curve does not mirror itself about the middle of its parameter");
-    EXPECT_EQ(message([] { half(half(meridian(Sphere{}))); }), "this curve is a half already");
+    EXPECT_EQ(message_of<std::invalid_argument>([] { half(half(meridian(Sphere{}))); }),
+              "this curve is a half already");
 }
 
 TEST(CurveForms, tubesAgreeWithTheirGraphs) {
@@ -328,31 +322,36 @@ TEST(CurveStart, meridiansFromPointsAndCurves) {
 }
 
 TEST(CurveStart, refusals) {
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Sphere{1, {{0.2, 3, 2}}});
               }),
               "shape.mode.0.m must be 0, not 2: tier \"axisym\" is axisymmetric and has no waves around the axis");
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Tube{1, 2, {{0.2, 3, 1, 0}}});
               }),
               "shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no waves around the axis");
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Ellipsoid{1, 2, 1});
               }),
               "shape.b must be a = 1, not 2: tier \"axisym\" is axisymmetric about z");
     std::vector<std::array<double, 2>> points{{0, -1}, {0.5, -0.8}};
-    EXPECT_EQ(message([&] { meridian(points, Topology::cell); }), "a curve needs at least 7 points, not 2");
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
+              "a curve needs at least 7 points, not 2");
     points = {{0, -1}, {0.5, -0.8}, {0.8, -0.5}, {1, 0}, {0.8, 0.5}, {0.5, 0.8}, {0.1, 1}};
-    EXPECT_EQ(message([&] { meridian(points, Topology::cell); }), "the last point of a closed curve must have r = 0");
-    EXPECT_EQ(message([&] { meridian(points, Topology::half_cell); }), "the last point of a half cell must have z = 0");
-    EXPECT_EQ(message([&] { meridian(points, Topology::tube, 2); }), "point 0 of the curve has the radius 0");
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
+              "the last point of a closed curve must have r = 0");
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::half_cell); }),
+              "the last point of a half cell must have z = 0");
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::tube, 2); }),
+              "point 0 of the curve has the radius 0");
     points[3][0] = -1;
-    EXPECT_EQ(message([&] { meridian(points, Topology::cell); }), "point 3 of the curve has the radius -1");
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
+              "point 3 of the curve has the radius -1");
     points[3] = points[2];
-    EXPECT_EQ(message([&] { meridian(points, Topology::cell); }),
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
               "points 2 and 3 of the curve coincide or are not finite");
     const CurveSpace space(Topology::cell, equal_breaks(6), 5, 4);
-    EXPECT_EQ(message([&] { fit(space, meridian(Torus{})); }),
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { fit(space, meridian(Torus{})); }),
               "the curve does not have the topology or the period of its space");
 }
 

@@ -10,6 +10,7 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -39,13 +40,10 @@ std::string with(const std::string& old_text, const std::string& new_text) {
 }
 
 std::string refusal(const std::string& text) {
-    try {
+    return test::message_of<CaseError>([&] {
         RunObserver nobody;
         run_equilibrium(parse_case(text, {}, "case.toml"), nobody);
-    } catch (const CaseError& error) {
-        return error.what();
-    }
-    return "accepted";
+    });
 }
 
 struct Recorder : RunObserver {

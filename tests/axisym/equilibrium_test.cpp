@@ -10,6 +10,7 @@
 #include "axisym/equilibrium/continuation.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -34,14 +35,7 @@ EquilibriumSettings accurate(double accuracy) {
     return settings;
 }
 
-std::string message(const std::function<void()>& act) {
-    try {
-        act();
-    } catch (const std::invalid_argument& e) {
-        return e.what();
-    }
-    return "accepted";
-}
+using test::message_of;
 
 TEST(StationarySystem, jacobianIsThatOfTheResidual) {
     // Definition, by central differences; for every combination of constraints.
@@ -67,14 +61,14 @@ TEST(StationarySystem, jacobianIsThatOfTheResidual) {
 
 TEST(StationarySystem, refusals) {
     const auto with = [](const Constraints& c) {
-        return message([&] {
+        return message_of<std::invalid_argument>([&] {
             StationarySystem(std::make_shared<CurveSpace>(Topology::cell, equal_breaks(7), 5, 4), {bending(1), c}, 1);
         });
     };
     EXPECT_EQ(with({4.0, {}, 0.5}), "the reduced volume is held fixed alone: area and volume determine it already");
     EXPECT_EQ(with({-4.0, {}, {}}), "an area of -4 cannot be met");
     EXPECT_EQ(with({1.0, 1.0, {}}), "a reduced volume of 10.6347 cannot be met: a sphere has 1");
-    EXPECT_EQ(message([] {
+    EXPECT_EQ(message_of<std::invalid_argument>([] {
                   find_equilibrium({bending(1), {}}, meridian(Torus{}));
               }),
               "equilibria of a period need a start that mirrors itself, and half of it");
@@ -333,10 +327,11 @@ TEST(Branch, bifurcationOfTheOblates) {
 
 TEST(Branch, refusals) {
     Equilibrium none;
-    EXPECT_EQ(message([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, {}); }),
+    EXPECT_EQ(message_of<std::invalid_argument>([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, {}); }),
               "a branch starts from an equilibrium");
     none.stop = Stop::finished;
-    EXPECT_EQ(message([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, outputs(0.5, 0.5, {})); }),
+    EXPECT_EQ(message_of<std::invalid_argument>(
+                  [&] { follow_branch(vesicle(0.9), none, set_reduced_volume, outputs(0.5, 0.5, {})); }),
               "a branch needs an interval of its parameter");
 }
 

@@ -3,24 +3,20 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
-#include <random>
 
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/shapes/torus.hpp"
+#include "common/shapes/tube.hpp"
+#include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
 namespace {
 
 using Vector = Eigen::VectorXd;
 
-Vector random_vector(int n, double size, unsigned seed = 1) {
-    std::mt19937 engine(seed);
-    std::normal_distribution<double> normal;
-    Vector x(n);
-    for (double& c : x) c = size * normal(engine);
-    return x;
-}
+using test::random_vector;
 
 const Bending stiff{{0.2, 0.03, 0.1}, -0.7};
 const MotionLaw gradient_flow{.flows = false, .keeps_volume = false};

@@ -4,18 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "common/case/read.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
 
-std::string complaint(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const CaseError& error) {
-        return error.what();
-    }
-    return "no complaint";
-}
+using test::message_of;
 
 std::vector<std::string> values(const std::string& over) {
     std::vector<std::string> all;
@@ -40,7 +34,7 @@ TEST(Axis, List) {
 }
 
 TEST(Axis, Refusals) {
-    const auto refusal = [](const std::string& over) { return complaint([&] { parse_axis(over); }); };
+    const auto refusal = [](const std::string& over) { return message_of<CaseError>([&] { parse_axis(over); }); };
     EXPECT_NE(refusal("energy.k42").find("must have the form key=values"), std::string::npos);
     EXPECT_NE(refusal("energy.k42=").find("no values"), std::string::npos);
     EXPECT_NE(refusal("energy.k42=0,,1").find("a value is missing"), std::string::npos);
@@ -58,7 +52,9 @@ TEST(Axis, Table) {
     const Axis axis = parse_table("energy.k42, shape.length\n\n# comment\n0.1, 2.0\n0.2,3.0\n", "t.csv");
     EXPECT_EQ(axis.keys, (std::vector<std::string>{"energy.k42", "shape.length"}));
     EXPECT_EQ(axis.values, (std::vector<std::vector<std::string>>{{"0.1", "2.0"}, {"0.2", "3.0"}}));
-    const auto refusal = [](const std::string& text) { return complaint([&] { parse_table(text, "t.csv"); }); };
+    const auto refusal = [](const std::string& text) {
+        return message_of<CaseError>([&] { parse_table(text, "t.csv"); });
+    };
     EXPECT_NE(refusal("energy.k42,energy.H0\n1\n").find("t.csv:2: 1 values for 2 keys"), std::string::npos);
     EXPECT_NE(refusal("energy.k42\n").find("t.csv: no points"), std::string::npos);
     EXPECT_NE(refusal("energy.k42,\n1,2\n").find("t.csv:1: an empty cell"), std::string::npos);

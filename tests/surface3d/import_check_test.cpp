@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "surface3d/mesh/self_intersection.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
@@ -20,12 +21,7 @@ ImportedMesh imported(const TriangleMesh& mesh) {
 }
 
 std::string refusal(ImportedMesh mesh) {
-    try {
-        close_mesh(mesh);
-    } catch (const MeshError& error) {
-        return error.what();
-    }
-    return "accepted";
+    return test::message_of<MeshError>([&] { close_mesh(mesh); });
 }
 
 // Of a file of these vertices and faces, with the name cut to "a.obj".

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/message_of.hpp"
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
@@ -189,12 +190,7 @@ TEST(Fit, SmallMeshesGetLowerDegreesWithANote) {
 }
 
 std::string refusal(const TriangleMesh& mesh, int order) {
-    try {
-        fit_surface(closed(mesh), {.order = order});
-    } catch (const MeshError& error) {
-        return error.what();
-    }
-    return "accepted";
+    return test::message_of<MeshError>([&] { fit_surface(closed(mesh), {.order = order}); });
 }
 
 const std::string advice = "; the mesh is too coarse or too rough there for a smooth surface (smoothing may help)";

@@ -12,6 +12,7 @@
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/paths.hpp"
 
 namespace tubule {
@@ -66,12 +67,7 @@ std::string shape_kinds() {
 }
 
 std::string refusal(const std::string& text, const std::vector<std::string>& sets = {}) {
-    try {
-        parse_case(text, sets, "case.toml");
-    } catch (const CaseError& error) {
-        return error.what();
-    }
-    return "accepted";
+    return test::message_of<CaseError>([&] { parse_case(text, sets, "case.toml"); });
 }
 
 // A piece of the good case, what to write instead, and what that must be answered.

@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <optional>
 #include <random>
 #include <string>
@@ -20,6 +19,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/journal.hpp"
 #include "common/result/result.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -481,20 +481,13 @@ void break_disk(durable::Call call, int error) {
     };
 }
 
-std::string message_of(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "no error";
-}
+using test::message_of;
 
 TEST_F(Durability, AFullDiskIsReportedAndCostsNothingWritten) {
     auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
     writer.row(std::vector<double>{0, 1});
     break_disk(durable::Call::write, ENOSPC);
-    const std::string message = message_of([&] { writer.row(std::vector<double>{1, 2}); });
+    const std::string message = message_of<std::runtime_error>([&] { writer.row(std::vector<double>{1, 2}); });
     EXPECT_NE(message.find("run.hdf.journal: No space left on device"), std::string::npos) << message;
     EXPECT_THROW(writer.finish({}), std::runtime_error);
     EXPECT_FALSE(fs::exists(directory / "run.hdf.tmp"));
@@ -519,7 +512,10 @@ TEST_F(Durability, ATornRecordThatCannotBeCutOffStopsTheJournal) {
     EXPECT_THROW(writer.row(std::vector<double>{1, 2}), std::runtime_error);
     durable::fault = nullptr;
     // Accepting this row would promise what a kill would break.
-    EXPECT_NE(message_of([&] { writer.row(std::vector<double>{2, 3}); }).find("damaged"), std::string::npos);
+    EXPECT_NE(message_of<std::runtime_error>([&] {
+                  writer.row(std::vector<double>{2, 3});
+              }).find("damaged"),
+              std::string::npos);
     EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});
     writer.finish({});
     EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});
@@ -535,7 +531,9 @@ TEST_F(Durability, EveryFailingOperationOfCreateNamesTheFileAndKeepsTheOldResult
         clear();
         take({create("# before\n"), row(0), frame(0), finish("finished")}, file);
         break_disk(call, error);
-        const std::string message = message_of([&] { ResultWriter::create(file, {case_text, {}}, {}, series); });
+        const std::string message = message_of<std::runtime_error>([&] {
+            ResultWriter::create(file, {case_text, {}}, {}, series);
+        });
         durable::fault = nullptr;
         EXPECT_NE(message.find(file.string()), std::string::npos) << message;
         EXPECT_NE(message.find(words), std::string::npos) << message;
@@ -599,7 +597,7 @@ TEST_F(Durability, AnOldCopyOfTheFileBesideItsNewerJournalIsNotTakenForWhole) {
     writer.frame(make_record(0, 6000));  // outgrows the file: consolidated, the journal begins anew
     writer.row(std::vector<double>{1, 2});
     fs::copy_file(journal_path(file), journal_path(copy));
-    EXPECT_NE(message_of([&] { read_result(copy); }).find("old copy"), std::string::npos);
+    EXPECT_NE(message_of<std::runtime_error>([&] { read_result(copy); }).find("old copy"), std::string::npos);
 }
 
 // Damage in the middle of the journal, as a loss of power may cause: what is before it counts, what follows does not.

@@ -10,6 +10,7 @@
 #include "common/solve/gmres.hpp"
 #include "common/solve/sparse_ldlt.hpp"
 #include "tests/sphere_matrices.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -26,14 +27,7 @@ Matrix sparse(const Dense& A) {
     return A.sparseView(0, 0);
 }
 
-std::string message_of(const std::function<void()>& f) {
-    try {
-        f();
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "";
-}
+using test::message_of;
 
 // Symmetric, with this many positive and negative diagonal blocks' unknowns in random order: a random B between them,
 // of which a few entries a row are not zero, and diagonals that outweigh it or not. In units that differ by unknown.

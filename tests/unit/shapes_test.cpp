@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/case/read.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -15,12 +16,7 @@ const std::string axisym = "tier = \"axisym\"\n" + energy;
 const std::string time_span = "[time]\nend = 1.0\n";
 
 std::string refusal(const std::string& text) {
-    try {
-        parse_case(text, {}, "case.toml");
-    } catch (const CaseError& error) {
-        return error.what();
-    }
-    return "accepted";
+    return test::message_of<CaseError>([&] { parse_case(text, {}, "case.toml"); });
 }
 
 std::string shape(const std::string& keys) {

@@ -14,6 +14,7 @@
 #include "common/solve/progress.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -43,14 +44,7 @@ Vector waves(int n) {
     return Vector::LinSpaced(n, 0, 7).array().sin();
 }
 
-std::string message_of(const std::function<void()>& f) {
-    try {
-        f();
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "";
-}
+using test::message_of;
 
 TEST(SparseLu, solves) {
     // Expected: the x from which the right-hand side was made; |A| < 9, so rounding is far below 1e-13.

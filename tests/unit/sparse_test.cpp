@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "tests/sphere_matrices.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -37,14 +38,7 @@ Matrix sparse(const Dense& A) {
     return A.sparseView(0, 0);
 }
 
-std::string message_of(const std::function<void()>& f) {
-    try {
-        f();
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "";
-}
+using test::message_of;
 
 // |X - X_dense|_oo / |X_dense|_oo
 double difference_from_dense(const SparseSolver& solver, const Matrix& A, const Dense& B) {

@@ -5,6 +5,8 @@ import argparse
 import json
 import sys
 
+import command_line
+
 
 def curve_label(m):
     return f"m = {m}" + {0: ", pearling", 1: ", buckling"}.get(m, "")
@@ -108,16 +110,11 @@ def main():
     parser.add_argument("-o", "--output", action="append", required=True)
     options = parser.parse_args()
     try:
-        from results import BadInput
+        import results  # noqa: F401
     except ImportError as error:
         print(f"tubule stability --plot: {error}; install python3-matplotlib python3-h5py", file=sys.stderr)
         return 4
-    try:
-        draw(json.load(sys.stdin), options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return command_line.run(lambda outputs: draw(json.load(sys.stdin), outputs), options.output)
 
 
 if __name__ == "__main__":

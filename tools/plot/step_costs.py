@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Draws what a step in three dimensions takes with each measure of its linear system, from the table of step_costs."""
 
-import argparse
 import csv
-import os
 import sys
 from dataclasses import dataclass
+
+import command_line
 
 NUMBERS = ("order", "triangles", "threads", "whole", "analysis", "factors", "iterations")
 PARTS = ("solvers", "lagged")  # "threads" needs a quiet machine and may be missing
@@ -141,22 +141,5 @@ def draw(path, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.table, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    for path in options.output:
-        print(os.path.relpath(path))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw))

@@ -4,11 +4,12 @@
 tubular.py FOLDER -o PICTURE: results named l2.hdf ... (branches in k42) and length_0.hdf ... (as said in tools/figures).
 """
 
-import argparse
 import os
 import sys
 
 import numpy as np
+
+import command_line
 
 SHOWN = (0.0, 0.06, 0.12)  # k42
 
@@ -82,20 +83,5 @@ def draw(folder, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.folder, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw, "folder"))

@@ -2,12 +2,11 @@
 """Draws the paper's validation: its surface coloured by curvature, and errors of recovered curvatures against the mesh
 width, from the table that curvature_table prints."""
 
-import argparse
 import csv
 import math
-import os
 import sys
 
+import command_line
 from labels import SUPERSCRIPT
 
 SURFACE, MESH = "dumbbell", "structured"
@@ -164,22 +163,5 @@ def draw(path, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.table, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    for path in options.output:
-        print(os.path.relpath(path))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw))

@@ -1,11 +1,12 @@
 #!/usr/bin/python3
 """Draws branches of vesicles: energy against reduced volume, what is stable, and shapes on the way."""
 
-import argparse
 import os
 import sys
 
 import numpy as np
+
+import command_line
 
 LIMITS = (0.48, 0.97)  # of the reduced volume
 HEIGHT = 4.4  # inches
@@ -64,20 +65,5 @@ def draw(paths, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("results", nargs="+")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.results, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw, "results", "+"))

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """Draws error against CPU time from a table with the columns series, energy_asked, error, estimate, cpu_ms."""
 
-import argparse
 import csv
-import os
 import sys
+
+import command_line
 
 COLUMNS = ("energy_asked", "error", "estimate", "cpu_ms")
 # CPU milliseconds of the prototype with settings tuned by hand, quintic B-splines, for the errors it then had. Those were
@@ -74,22 +74,5 @@ def draw(path, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.table, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    for path in options.output:
-        print(os.path.relpath(path))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw))

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 """Draws error against CPU time of a fluid and of Stokes flow, from the table of tests/benchmark/work_precision_fluid.py."""
 
-import argparse
 import csv
-import os
 import sys
 from dataclasses import dataclass, replace
+
+import command_line
 
 MODELS = {"fluid": "fluid, with inertia", "stokes": "Stokes flow"}
 NUMBERS = ("asked", "error", "estimate", "cpu_s")
@@ -112,22 +112,5 @@ def draw(path, outputs):
     style.save(figure, outputs)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table")
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    from results import BadInput
-
-    try:
-        draw(options.table, options.output)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return 2
-    for path in options.output:
-        print(os.path.relpath(path))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.main(__doc__, draw))
