@@ -2,7 +2,11 @@
 // guards; refusals.
 #include "surface3d/run/run.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -126,6 +130,34 @@ TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
                                     {"discretisation.elements=80"});
     EXPECT_EQ(folded.summary.stop.reason, Stop::mesh_lost);
     EXPECT_NE(folded.summary.stop.message.find("folds at ("), std::string::npos) << folded.summary.stop.message;
+}
+
+TEST(Start, ReadsItsFileOnce) {
+    const auto path = std::filesystem::temp_directory_path() / fmt::format("tubule_start_{}.off", getpid());
+    std::filesystem::copy_file(TUBULE_CASES "/meshes/ellipsoid.off", path);
+    const Case c = parse_case(
+        "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"file\"\npath = \"" + path.string() + "\"\n", {},
+        "");
+    const Start start(c), other(c);
+    std::filesystem::remove(path);
+    EXPECT_FALSE(start.resizable());
+    for (const int order : {2, 3, 2}) {  // the same nodes whatever was made before
+        const CurvedMesh mesh = start.mesh(0, order).mesh;
+        EXPECT_EQ(mesh.order, order);
+        EXPECT_EQ(mesh.nodes, other.mesh(0, order).mesh.nodes);
+    }
+    EXPECT_THROW(Start{c}, CaseError);
+}
+
+TEST(Start, MeshesDoNotDependOnThoseMadeBefore) {
+    const Case c = parse_case(
+        "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"capsule\"\nradius = 0.5\nlength = 1.0\n"
+        "[discretisation]\nmesh = \"graded\"\n",
+        {}, "");
+    const Start start(c);
+    start.mesh(300, 3), start.mesh(100, 2);
+    EXPECT_EQ(start.mesh(200, 3).mesh.nodes, Start(c).mesh(200, 3).mesh.nodes);
+    EXPECT_EQ(start.mesh(200, 2).mesh.nodes, Start(c).mesh(200, 2).mesh.nodes);
 }
 
 TEST(SurfaceRun, InterruptedAtOnce) {
