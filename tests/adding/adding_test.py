@@ -112,7 +112,7 @@ class Adding(unittest.TestCase):
         copied()
         run(CMAKE, "-S", COPY, "-B", BUILD, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
             "-DCMAKE_CXX_FLAGS_RELEASE=-O1", "-DTUBULE_BENCHMARKS=OFF")  # fmt: skip
-        run(CMAKE, "--build", BUILD, "--target", "tubule", "case")
+        run(CMAKE, "--build", BUILD, "--target", "tubule", "unit_tests")
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -167,7 +167,7 @@ class Adding(unittest.TestCase):
 
     def test_docs_are_asked_for(self):
         words = subprocess.run(
-            [next(BUILD.rglob("tests/case")), "--gtest_filter=Docs.*"], capture_output=True, text=True
+            [BUILD / "tests" / "unit_tests", "--gtest_filter=Docs.*"], capture_output=True, text=True
         ).stdout
         for missing in ("lacks k22", "lacks the shape egg", "| `went-out` | 3 | the light went out |"):
             self.assertIn(missing, words)

@@ -10,6 +10,7 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "tests/support/paths.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -134,7 +135,7 @@ TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
 
 TEST(Start, ReadsItsFileOnce) {
     const auto path = std::filesystem::temp_directory_path() / fmt::format("tubule_start_{}.off", getpid());
-    std::filesystem::copy_file(TUBULE_CASES "/meshes/ellipsoid.off", path);
+    std::filesystem::copy_file(test::cases + "/meshes/ellipsoid.off", path);
     const Case c = parse_case(
         "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"file\"\npath = \"" + path.string() + "\"\n", {},
         "");
