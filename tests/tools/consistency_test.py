@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The suite behind docs/consistency.md: that it notices, and what it writes. Its scenes themselves: test
-consistency_study.
+"""The suite behind docs/consistency.md: what it detects, and what it writes. Test consistency_study runs its scenes.
 
     consistency_test.py TUBULE
 """

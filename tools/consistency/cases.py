@@ -1,4 +1,4 @@
-"""Cases as nested dicts: read, changed, written as text that the program reads. Standard library only."""
+"""Cases as nested dicts: reads, changes and writes them as text for the program. Standard library only."""
 
 import copy
 import tomllib
@@ -8,8 +8,7 @@ CASES = Path(__file__).resolve().parents[2] / "cases"
 
 
 def case(name, **changes):
-    """cases/NAME.toml without its expectations; `changes` are tables, laid over (a dict) or put in place of (None: taken
-    out; a list: modes) what is there."""
+    """cases/NAME.toml without its expectations. `changes` are tables: a dict is merged, a list (modes) replaces, None removes."""
     out = tomllib.loads((CASES / f"{name}.toml").read_text())
     out.pop("expect", None)
     return changed(out, **changes)

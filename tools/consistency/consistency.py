@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Both tiers on the same scenes: differences, how they fall with the mesh width, and what they cost.
+"""Both tiers on the same scenes: their differences, the convergence with the mesh width, and the cost.
 
     consistency.py TUBULE FOLDER [-o docs/consistency.md]     minutes; results are kept in FOLDER
     consistency.py TUBULE FOLDER --only figure --only rotation
 
-Ends with status 0 if all differences are within their bounds, 1 if not, 2 if a run fails. With -o it writes the page,
-its table (.csv) and its picture (.svg) too. `tools/figures consistency` calls it.
+Exits with status 0 if all differences are within their bounds, 1 if not, 2 if a run fails. With -o it writes the page,
+its table (.csv) and its picture (.svg). `tools/figures consistency` calls it.
 """
 
 import argparse
@@ -24,7 +24,7 @@ def main(arguments, scenes):
     """The exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tubule", type=Path, help="the program")
-    parser.add_argument("folder", type=Path, help="for results: those that this program made already are used")
+    parser.add_argument("folder", type=Path, help="for results; existing ones of this program are reused")
     parser.add_argument("-o", "--output", type=Path, help="the page; needs all scenes")
     parser.add_argument("--only", action="append", choices=[scene.name for scene in scenes], metavar="SCENE")
     options = parser.parse_args(arguments)

@@ -1,5 +1,5 @@
-"""How both tiers are compared: runs of each, and the rows that come of them. A measure is a function (Tools, Cost) -> list
-of Row. Bounds are of differences on the finest mesh, relative."""
+"""Comparisons of both tiers: the runs of each and the resulting rows. A measure is a function (Tools, Cost) -> list of
+Row. Bounds apply to relative differences on the finest mesh."""
 
 import math
 from dataclasses import dataclass
@@ -9,19 +9,20 @@ from rows import Row
 
 MODELS = ("gradient-flow", "overdamped", "stokes", "fluid")
 ORDER = 4  # of triangles
-STEPS = 6  # of a beginning; for fewer frames no wave is fitted
-# Errors in time are to fall as those in space do, with the fourth power of the mesh width: the tolerance, whose power
-# 2/3 they follow, with the third power of the number of triangles. Steps of a given length are short enough for all meshes.
+STEPS = 6  # for the first moments; a fit of a wave needs as many frames
+# Errors in time should decrease like those in space, with the fourth power of the mesh width. They follow the tolerance
+# to the power 2/3, so the tolerance decreases with the third power of the number of triangles. Fixed steps are short
+# enough for all meshes.
 FALL = {"time_tolerance": 3, "step": 0}
-LOOSER = 10  # accuracy of the second run of tier 1: what it differs by is the error of the first, but for energies
-AMPLITUDE = 1e-3  # of small waves: what is left out is of relative size 1e-6
+LOOSER = 10  # accuracy of the second run of tier 1; the difference is the error of the first, except for energies
+AMPLITUDE = 1e-3  # of small waves: nonlinear terms are of relative size 1e-6
 SHAPES = ("shape, Hausdorff", "shape, L2")
 BENDING = ("energy", "energy_20", "energy_40", "energy_42", "kinetic_energy", "dissipated")  # relative to E_ref
 
 
 @dataclass
 class Tools:
-    """With what a scene is measured, and on how many triangles."""
+    """The program and the numbers of triangles for a scene."""
 
     program: object  # Program
     elements: tuple
@@ -39,7 +40,7 @@ def surface(tools, cost, start, elements, **in_time):
     less = tools.elements[0] / elements
     discretisation = {key: value * less ** FALL[key] for key, value in in_time.items()}
     discretisation |= {"elements": elements, "order": ORDER}
-    # What is asked decides nothing but when a step is refused for a rise of the energy: so small a rise is noise.
+    # The requested accuracy only decides which increase of the energy rejects a step; smaller increases are noise.
     accuracy = {"energy": 1e-3, **({"r_min": 1e-2} if "time" in start else {})}
     run = tools.program.run(
         changed(start, tier="surface3d", accuracy=accuracy, discretisation=discretisation), f"3D, {elements} triangles"
@@ -49,8 +50,8 @@ def surface(tools, cost, start, elements, **in_time):
 
 
 def at_rest(start, exact, bounds, accuracy=1e-9, mesh="uniform", must_fall=True):
-    """Geometry and energies of a start. `exact`: values known in closed form; the rest is of tier 1's first row and frame.
-    In 3D nothing moves, so curvatures are those of the patch recovery."""
+    """Geometry and energies of a start. `exact`: values in closed form; all others are from the first row and frame of
+    tier 1. In 3D the surface is at rest, so curvatures are those of the patch recovery."""
 
     def measure(tools, cost):
         still = changed(start, time={"end": 1e-9, "output": []})
@@ -74,7 +75,7 @@ def at_rest(start, exact, bounds, accuracy=1e-9, mesh="uniform", must_fall=True)
 
 
 def beginning(run):
-    """Of the first row and frame."""
+    """Values of the first row and frame."""
     out = {name: float(values[0]) for name, values in run.series.items()}
     for name in ("H", "K"):
         out[f"min {name}"], out[f"max {name}"] = run.extremes(name)
@@ -82,14 +83,14 @@ def beginning(run):
 
 
 def beginnings(start, waves, at_once, with_inertia, bounds):
-    """How each model begins, so early that nothing has moved yet: dissipation, the force that keeps the volume, and how
-    fast waves change; of a fluid, which begins at rest, the acceleration. `at_once`, `with_inertia`: the time of that. It is longer
-    for a fluid, as volumes are kept to 1e-12: over the square of a step this is what its lambda may be off by."""
+    """First moments of each model, before anything has moved noticeably: dissipation, the force that keeps the volume, the
+    rates of waves and, for a fluid from rest, the acceleration. `at_once`, `with_inertia`: the time of the comparison. It
+    is longer for a fluid: volumes are kept to 1e-12, and this over the square of a step is the error of lambda."""
 
     def measure(tools, cost):
         rows = []
         for kind in MODELS:
-            # The first step, of first order, leaves positions of what begins at rest with errors of their own order.
+            # From rest, the first step is of first order and leaves errors in the positions as large as the displacements.
             names = ["acceleration squared"] if kind == "fluid" else ["dissipation", *(f"wave {wave}" for wave in waves)]
             if kind != "gradient-flow":
                 names.append("lambda")
@@ -129,8 +130,8 @@ def drives(tools, run, names, end, per):
 
 
 def rates(start, waves, bounds, step, finest=None):
-    """Growth or decay of small waves (n, m), all in one run of tier 3D. Beside it spectrum and run of tier 1; the error
-    of both is their distance from the closed form."""
+    """Growth or decay of small waves (n, m), all in one run in 3D, with the spectrum and a run of tier 1; the error of
+    both is their distance from the closed form."""
 
     def measure(tools, cost):
         end = start["time"]["end"]
@@ -163,7 +164,7 @@ def closed_form(tools, start):
 
 
 def spectra(tools, start):
-    """Rates of tier 1 by m. With area and volume kept the tension of a tube is open: that of one whose volume is free."""
+    """Rates of tier 1 by m. With fixed area and volume the tension of a tube is undetermined; this uses that with free volume."""
     volume = "free" if start["model"]["kind"] == "gradient-flow" else "fixed"
     straight = waved(changed(start, model={"volume": volume}, accuracy={"energy": 1e-9}), [])
     tension = tools.program.stability(waved(start, []), "--waves", 1)["models"][0]["tension"]
@@ -185,7 +186,7 @@ def motion(start, accuracy, tolerance, bounds, must_fall=True):
             error = max(abs(a - b) for a, b in zip(values, other)) / scale
             if name in SHAPES:
                 error, values = max(distances(tools, fine, loose, name, times)), [0.0] * len(times)
-            falls = must_fall and name not in ("r_min", "r_max")  # of nodes, which do not stand at the extreme
+            falls = must_fall and name not in ("r_min", "r_max")  # extremes over nodes, which miss the true extreme
             rows.append(Row(name, values, scale, bound, fine.stated_error if name == "energy" else error, times, {}, falls))
         for elements in tools.elements:
             run = surface(tools, cost, start, elements, time_tolerance=tolerance)
@@ -206,14 +207,14 @@ def along(tools, run, name, times):
 
 
 def distances(tools, a, b, name, times):
-    """Relative to the size of the shape."""
+    """Distances relative to the size of the shape."""
     found = {time: (hausdorff / size, l2 / size) for time, hausdorff, l2, size in tools.program.frames(a, b)}
     return [found[min(found, key=lambda t: abs(t - time))][SHAPES.index(name)] for time in times]
 
 
 def at_equilibrium(resting, moving, bounds, tolerance):
-    """A stationary shape of tier 1 by Newton's method, and where a run in 3D comes to. Its error: how far a run of
-    tier 1 is from it at that time."""
+    """A stationary shape of tier 1 by Newton's method, and the final shape of a run in 3D. The error is the distance of a
+    run of tier 1 from the stationary shape at that time."""
 
     def measure(tools, cost):
         rest = tools.program.run(resting, "tier 1, at rest", command="equilibrium")

@@ -2,13 +2,14 @@
 
 import csv
 import io
+import textwrap
 from pathlib import Path
 
 from runs import keep
 
 
 def table(scene):
-    """A scene in Markdown."""
+    """The table of a scene in Markdown."""
     meshes = sorted({triangles for row in scene.rows for triangles in row.found})
     head = ["quantity", "tier 1", "its error", *(f"T = {triangles}" for triangles in meshes), "order", "bound"]
     lines = [_line(head), "|" + "---|" * len(head)]
@@ -31,7 +32,7 @@ def _name(row):
 
 
 def numbers(tables):
-    """Everything at every time, as CSV."""
+    """All values at all times, as CSV."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(("scene", "quantity", "time", "triangles", "tier_1", "error_of_tier_1", "tier_3d", "difference", "bound"))
@@ -46,33 +47,34 @@ def numbers(tables):
                                      "" if row.bound is None else row.bound))  # fmt: skip
     return out.getvalue()
 
-READING = """**In short.** Where a start is smooth both tiers say the same, and what they differ by vanishes as the mesh is
-refined. On the finest meshes here integrals at rest differ by {at_rest} at most, rates of small waves by {rates},
-energies in motion by {motion} of E_ref at all output times ({figure} for the figure's tube, {equilibrium} where the cell
-comes to rest), what was dissipated by {dissipated}, shapes in motion by {shapes} of their size.
+READING = """**Summary.** For smooth starts both tiers agree, and their differences vanish as the mesh is refined. On the finest
+meshes here, integrals at rest differ by at most {at_rest}, growth rates of small waves by {rates}, and
+energies in motion by {motion} of E_ref at all output times ({figure} for the figure's tube, {equilibrium} where the cell comes to
+rest). The dissipated energy differs by {dissipated}, and shapes in motion differ by {shapes} of their size.
 
-**What limits it.** *At rest* the recovery of curvature: integrals are of order 5 and more; values at single points, such
-as the extremes of H and K ({extremes}), are far less accurate than integrals. *In motion* the time steps of 3D: of waves
-at rest the fixed step leaves (rate x step)^2/3, the rest follows the tolerance. *At the first moment* the force: it
-takes four derivatives of the surface, so that of an interpolated start a part of it is noise of the size of triangles.
-By it the overdamped tube dissipates {noise_coarse} times too much on the coarsest mesh and {noise_fine} times on the
-finest, where its smooth waves begin right to {waves}. Without inertia the noise is gone in a moment.
-A fluid seems to keep it as waves of little energy that show in what is taken at a point or an instant: its largest speed and lambda differ by up to {pointwise}.
+**Limits of the accuracy.** *At rest* the recovery of curvature limits the accuracy. Integrals are of order 5 and
+higher; values at single points, such as the extremes of H and K ({extremes}), are far less accurate. *In motion* the
+time steps of 3D limit it: for growth rates the fixed step leaves (rate x step)^2/3, all other errors follow the
+tolerance. *At the start* the force limits it: it takes four derivatives of the surface, so on an interpolated start a
+part of it is noise at the scale of the triangles. This noise adds {noise_coarse} times
+the true dissipation of the overdamped tube on the coarsest mesh and {noise_fine} times on the finest, where the rates
+of its smooth waves have an error of {waves}. Without inertia the noise disappears at once. A fluid seems to keep
+it as waves of little energy, which affect values at a point or an instant: the largest speed and lambda differ by up to {pointwise}.
 
-**Where they part.** *Where curvature jumps*, at the seams of the capsule: its energy at rest is off by {seams} and falls
-with the first order at best, extremes of H and K not at all; as a fluid it sends out waves that no mesh resolves, and
-energies differ by {capsule}, where tier 1 itself is known to {capsule_known} only.
-*Least and largest radius* are those of nodes in 3D, hence without an order; of closed surfaces they are something else
-(distances from the centre, in tier 1 from the axis), so not compared."""
+**Where the tiers differ.** *Where curvature jumps*, at the seams of the capsule: the energy at rest is off by {seams}
+and converges with first order at best; extremes of H and K do not converge. As a fluid, the capsule emits waves that
+no mesh resolves; the energies differ by {capsule}, and the energy of tier 1 itself is only known to {capsule_known}.
+*Smallest and largest radius* in 3D are those of nodes, so they have no order of convergence. For closed surfaces the
+tiers define them differently (distances from the centre in 3D, from the axis in tier 1), so they are not compared."""
 
-HEAD = """# Do both tiers say the same?
+HEAD = """# Consistency of the two tiers
 
-Every quantity that tier 1 (`axisym`) and tier 3D (`surface3d`) can both compute, on the same starts. This page, [all
-numbers](consistency.csv) and the picture are made by
+This page compares every quantity that both tier 1 (`axisym`) and tier 2 (`surface3d`, "3D" below) compute, on the
+same starts. This page, [all numbers](consistency.csv) and the picture are made by
 
     tools/figures consistency        # {minutes:.0f} minutes of one core
 
-which ends with status 1 if a difference exceeds its bound. Do not edit them: the texts are in `tools/consistency/`.
+which exits with status 1 if a difference exceeds its bound. Do not edit them: the texts are in `tools/consistency/`.
 
 {reading}
 
@@ -80,18 +82,19 @@ which ends with status 1 if a difference exceeds its bound. Do not edit them: th
 
 ## How to read the tables
 
-- *Tier 1* is asked for an accuracy far beyond that of 3D; the last value is shown if there are several times.
-- *Its error* is what it states for the energy; for all else, how far a run asked for ten times less is from it. Where an
-  exact value is named, that is the reference and the error is zero.
-- *T* triangles of order 4. *Differences* are the largest of all output times (in `consistency.csv` each by itself),
-  relative to E_ref for energies and for what was dissipated, to the size of the shape for distances (radius of the
-  sphere of the same area, or of the tube), to 4 pi for INT K, else to the largest value of tier 1.
-- *Order* is that of the difference in the mesh width, to the finest mesh from the one with the largest difference (the coarsest, unless it is
-  right by accident); empty where tier 1's error or rounding would decide it. The tolerance of the time steps falls with T^-3, so that errors in time fall as those in
-  space should, with the fourth power of the mesh width; fixed steps (rates) are the same on all meshes.
-- *Bound*: more than that on the finest mesh fails the command, and so does an order below 1 if more than a tenth of the
-  bound is left (but for extremes, and where curvature jumps). Empty: only told.
-- *CPU seconds* of one thread, in 3D with the coarser run that it makes for its own error; the machine was busy.
+- *Tier 1* has a requested accuracy far beyond that of 3D; if there are several times, its last value is shown.
+- *Its error* is the stated one for the energy; for other quantities it is the difference from a run with a ten times
+  smaller requested error. If an exact value is given, that is the reference and the error is zero.
+- *T* triangles of order 4. *Differences* are the largest over all output times (`consistency.csv` has each of them).
+  They are relative to E_ref for energies and for dissipated energy, to the size of the shape for distances (radius of
+  the sphere of the same area, or of the tube), to 4 pi for INT K, else to the largest value of tier 1.
+- *Order* is the order of the difference in the mesh width, between the mesh with the largest difference (the
+  coarsest, unless its difference is accidentally small) and the finest. It is empty where the error of tier 1 or
+  rounding would determine it. The tolerance of the time steps decreases with T^-3, so that errors in time decrease as
+  those in space should, with the fourth power of the mesh width; fixed steps (rates) are the same on all meshes.
+- *Bound*: the command fails if the difference on the finest mesh is larger, or if the order is below 1 while the
+  difference exceeds a tenth of the bound (except for extremes, and where curvature jumps). Empty: not checked.
+- *CPU seconds* are of one thread and, in 3D, include the coarser run for the error estimate; the machine was busy.
 """
 
 
@@ -103,10 +106,10 @@ RATES = ("rates-gradient-flow", "rates-overdamped", "rates-stokes", "rates-pearl
 
 
 def reading(tables):
-    """What the tables say, in words."""
+    """The summary of the tables in words."""
 
     def largest(scenes, *quantities, what=lambda row: row.difference(row.meshes[-1])):
-        """Of such rows, all if none are named; differences on the finest meshes."""
+        """Largest value over these rows (all if none are named), by default of the difference on the finest mesh."""
         found = [
             what(row)
             for scene in tables
@@ -135,13 +138,13 @@ def reading(tables):
 
 
 def write(path, tables):
-    """PATH, and beside it the same name with .csv and .svg."""
+    """Writes PATH and, beside it, the same name with .csv and .svg."""
     path = Path(path)
     parts = [HEAD.format(reading=reading(tables), minutes=sum(scene.cost.total for scene in tables) / 60)]
     for scene in tables:
-        parts.append(f"## {scene.title}\n\n{scene.words}\n\n{table(scene)}\n")
+        parts.append(f"## {scene.title}\n\n{textwrap.fill(scene.words, 118)}\n\n{table(scene)}\n")
     keep(path, "\n".join(parts))
     keep(path.with_suffix(".csv"), numbers(tables))
-    import picture  # needs matplotlib, which tables do not
+    import picture  # needs matplotlib, unlike the tables
 
     picture.draw(tables, path.with_suffix(".svg"))

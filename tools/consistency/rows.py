@@ -1,20 +1,20 @@
-"""Rows of the table: a quantity by tier 1, or exactly, and by tier 3D on meshes of more and more triangles."""
+"""Rows of the table: a quantity from tier 1, or its exact value, and from 3D on a sequence of finer meshes."""
 
 import math
 from dataclasses import dataclass, field
 
 
-ENOUGH = 0.1  # of the bound: nearer than that, nothing is asked of the order
+ENOUGH = 0.1  # of the bound: for smaller differences the order is not checked
 
 
 @dataclass
 class Row:
-    """Numbers are lists, one for each time. Differences are relative to `scale`, of all times the largest."""
+    """Numbers are lists with one entry per time. Differences are the largest over all times, relative to `scale`."""
 
     quantity: str
     reference: list
     scale: float
-    bound: float | None  # of the difference on the finest mesh, or of `error` without any; None: it is only told
+    bound: float | None  # of the difference on the finest mesh, or of `error` without meshes; None: not checked
     error: float = 0.0  # of the reference, relative to scale
     times: list = field(default_factory=lambda: [0.0])
     found: dict = field(default_factory=dict)  # triangles -> list
@@ -29,8 +29,8 @@ class Row:
 
     @property
     def order(self):
-        """In the mesh width, from the mesh with the largest difference (the coarsest, unless it is right by accident)
-        to the finest; None where the reference's error is in the way, or nothing is left but rounding."""
+        """Order in the mesh width, from the mesh with the largest difference (the coarsest, unless its difference is
+        accidentally small) to the finest; None where the error of the reference or rounding would determine it."""
         if len(self.found) < 2:
             return None
         last = self.meshes[-1]
@@ -41,7 +41,7 @@ class Row:
         return math.log(coarse / fine) / (0.5 * math.log(last / first)) if coarse > 0 else -math.inf
 
     def complaints(self):
-        """What is not as it should be, in words."""
+        """Violated bounds, in words."""
         if self.bound is None:
             return []
         out, finest = [], self.difference(self.meshes[-1]) if self.found else self.error

@@ -1,5 +1,5 @@
-"""Runs of both tiers, each a process of its own, and what their results say. A result that the same program made of the
-same case is not made again, so that a suite that was stopped goes on where it was."""
+"""Runs of both tiers, each in its own process, and access to their results. Results that the same program made from the
+same case are reused, so that a suite that was stopped continues."""
 
 import hashlib
 import json
@@ -17,12 +17,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "plot"))
 from raster import division, lagrange  # noqa: E402
 from results import read_result  # noqa: E402
 
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # CPU time is then what a run needs
-PIECES = 8  # of the side of a triangle, where extremes are looked for
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # CPU times are then comparable
+PIECES = 8  # subdivision of a triangle side in the search for extremes
 
 
 class Failed(Exception):
-    """A run or a question to the program that did not end as it should."""
+    """A run or another call of the program failed."""
 
 
 @dataclass
@@ -43,7 +43,7 @@ class Run:
         return float(self.series[name][i])
 
     def dissipated(self, time):
-        """What was dissipated until then: identity_defect = E + E_kinetic - that of the start + this."""
+        """Energy dissipated until then: identity_defect = E + E_kinetic - that of the start + this."""
         def total(t):
             return self.at("energy", t) + (self.at("kinetic_energy", t) if "kinetic_energy" in self.series else 0)
 
@@ -62,7 +62,7 @@ class Run:
         return int(self.about["elements"])
 
     def extremes(self, name):
-        """Least and largest H or K of the first frame; on a surface within the triangles too."""
+        """Smallest and largest H or K of the first frame; on a surface also inside the triangles."""
         drawn = read_result(self.path)
         if drawn.surfaces:
             places, _ = division(PIECES)
@@ -73,7 +73,7 @@ class Run:
 
 
 def _largest(values):
-    """Of samples along a profile: that of the parabola through the largest and its neighbours."""
+    """Maximum along a profile: that of the parabola through the largest sample and its neighbours."""
     i = int(values.argmax())
     if i in (0, len(values) - 1):
         return float(values[i])
@@ -83,7 +83,7 @@ def _largest(values):
 
 
 def keep(path, text):
-    """Whole or not at all."""
+    """Writes the file completely or not at all."""
     aside = path.with_name(path.name + ".part")
     aside.write_text(text)
     os.replace(aside, path)
@@ -96,7 +96,7 @@ class Program:
         self.made_by = hashlib.sha256(self.path.read_bytes()).hexdigest()
 
     def ask(self, *arguments):
-        """What the program prints as JSON. Names of files tell what is in them, so that an answer holds for ever."""
+        """JSON output of the program. File names identify the contents, so answers can be cached."""
         words = [Path(word).name if isinstance(word, Path) else str(word) for word in arguments]
         answer = self.folder / f"{hashlib.sha256(' '.join([self.made_by, *words]).encode()).hexdigest()[:16]}.answer"
         if answer.exists():
@@ -114,7 +114,7 @@ class Program:
         return path
 
     def run(self, case, label, command="run"):
-        """Must finish as asked."""
+        """Runs a case; raises Failed unless it finishes."""
         path = self.case_file(case)
         result, note = path.with_suffix(".hdf"), path.with_suffix(".json")
         if not (result.exists() and note.exists()):

@@ -69,7 +69,7 @@ AT_REST = [
     Scene(
         "spheroid-at-rest",
         "A spheroid, at rest",
-        "Half axes 0.5, 0.5, 1, energy of `cases/capsule_fluid.toml`. INT K is 4 pi.",
+        "Half axes 0.5, 0.5, 1; energy of `cases/capsule_fluid.toml`. INT K is 4 pi.",
         at_rest(
             spheroid(),
             {"integral_K": 4 * math.pi},
@@ -78,8 +78,8 @@ AT_REST = [
     ),
     Scene(
         "capsule-at-rest",
-        "A capsule, at rest: curvature that jumps",
-        "`cases/capsule_fluid.toml` at t = 0, graded triangles. All by closed forms: H is -4 on the caps and -2 on the cylinder, "
+        "A capsule, at rest: discontinuous curvature",
+        "`cases/capsule_fluid.toml` at t = 0, graded triangles. All values are closed forms: H is -4 on the caps and -2 on the cylinder, "
         "K 4 and 0.",
         at_rest(
             case("capsule_fluid"),
@@ -96,16 +96,16 @@ AT_REST = [
 BEGINNINGS = [
     Scene(
         "tube-begins",
-        "How a tube begins to move",
+        "First moments of a tube",
         "Two waves of 0.1 and 0.05 on a tube of radius 1 and length 4 (energy of `cases/tube_waves_overdamped.toml`; Re = 2, gamma = 0.3), "
-        "at t = 1e-6, fluid 1e-3. Waves: d/dt of their amplitudes; acceleration squared: INT (du/dt)^2.",
+        "at t = 1e-6, for the fluid 1e-3. Waves: d/dt of their amplitudes; acceleration squared: INT (du/dt)^2.",
         beginnings(waves("overdamped"), ("1", "2"), 1e-6, 1e-3,
                    within(0.4, "dissipation") | within(0.02, "wave 1", "wave 2") | within(2e-3, "lambda") | within(0.6, "acceleration squared")),
     ),
     Scene(
         "spheroid-begins",
-        "How a spheroid begins to move",
-        "The spheroid above; Re = 2, gamma = 0.3; at t = 1e-7, fluid 3e-4. Waves: Y_2 and Y_4.",
+        "First moments of a spheroid",
+        "The spheroid above; Re = 2, gamma = 0.3; at t = 1e-7, for the fluid 3e-4. Waves: Y_2 and Y_4.",
         beginnings(spheroid(), ("2", "4"), 1e-7, 3e-4,
                    within(2e-2, "dissipation") | within(2e-3, "wave 2", "wave 4") | within(1e-3, "lambda") | within(0.05, "acceleration squared")),
     ),
@@ -124,14 +124,14 @@ RATES = [
     ),
     Scene(
         "rates-pearling",
-        "Rate of a wave that grows: pearling, gradient flow",
+        "Rate of a growing wave: pearling, gradient flow",
         "The same with k20 = 2.5, k42 = -0.5 and q^2 R^2 = 1.25.",
         rates(tube_at_rest("gradient-flow", 0.5, 1.25, k20=2.5, k42=-0.5), [(1, 0)], within(1e-3, (1, 0)) | within(3e-5, "tier 1"), 0.01),
     ),
     Scene(
         "rates-buckling",
-        "Rate of a wave that grows: buckling, overdamped",
-        "The same with H0 = -3/R: m = 1 grows, which tier 1 knows of by its spectrum alone.",
+        "Rate of a growing wave: buckling, overdamped",
+        "The same with H0 = -3/R: m = 1 grows, which tier 1 only shows in its spectrum.",
         rates(tube_at_rest("overdamped", 0.1, H0=-3.0), [(1, 1)], within(1e-3, (1, 1)), 0.0015),
     ),
 ]
@@ -172,7 +172,7 @@ MOVING_TUBES = [
     Scene(
         "rotation",
         "The same tube as a fluid in rotation",
-        "omega = 0.7 at first.",
+        "Initially omega = 0.7.",
         motion(waves("fluid", velocity={"initial": "rotation", "omega": 0.7}, time={"end": 0.1, "output": [0.02, 0.05]}), 1e-7, 8e-5,
                within(1e-4, "energy", "kinetic_energy", "dissipated", "angular_momentum_z") | within(1e-3, "shape, Hausdorff")
                | within(2e-3, "speed") | within(5e-3, "lambda")),
@@ -190,7 +190,7 @@ MOVING_CELLS = [
     ),
     Scene(
         "capsule-fluid",
-        "The capsule as a fluid: a start where curvature jumps",
+        "The capsule as a fluid: a start with discontinuous curvature",
         "`cases/capsule_fluid.toml`.",
         motion(case("capsule_fluid", time={"end": 0.05, "output": [0.01, 0.02]}), 5e-3, 8e-5,
                within(1e-2, "energy", "kinetic_energy", "dissipated", *SHAPES), must_fall=False),
@@ -198,7 +198,7 @@ MOVING_CELLS = [
     Scene(
         "capsule-equilibrium",
         "The capsule's equilibrium",
-        "The cell l = 2, k42 = 0.06: at rest by Newton's method, and overdamped in 3D to t = 3. The error is how far tier 1 is from rest then.",
+        "The cell l = 2, k42 = 0.06: at rest by Newton's method, compared with overdamped motion in 3D to t = 3. The error is the distance of tier 1 from rest at that time.",
         at_equilibrium(
             case("equilibrium_capsule", shape={"length": 2.0}, equilibrium={"modes": 0}),
             case("capsule_overdamped", time={"end": 3.0, "output": [], "stationary": None}),
