@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "axisym/splines/pack.hpp"
+#include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
 
 namespace tubule::axisym {
@@ -261,12 +262,9 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
                 if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
             });
             const auto f = density(bending_, p.H, p.K);
-            const auto symbol = [&](const Pack& kappa) { return f.HH + kappa * (2.0 * f.HK + kappa * f.KK); };
-            const Pack s = symbol(p.kappa_theta);
-            // Of a parabola in x the minimum over an interval is at an end or at its clamped vertex.
+            const Pack s = principal_symbol(f, p.kappa_theta);
             const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-            const Pack vertex = stdx::clamp(-f.HK * f.KK / (f.KK * f.KK + 1e-300), low, high);
-            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(stdx::min(s, stdx::min(symbol(p.kappa_s), symbol(vertex)))));
+            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
             const Pack ig2 = p.inverse_speed * p.inverse_speed;
             stiffness[e] += stdx::reduce(dA * ig2 * ig2 * stdx::abs(s));
             const Pack bent = stdx::max(stdx::abs(low), stdx::abs(high));
@@ -292,9 +290,6 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
     const ProfileSpace& splines = space_.splines();
     const int n = splines.elements(), p = splines.degree();
     const auto& breaks = splines.breaks();
-    // Squared norm |B_2m|/(2m)! of the Bernoulli spline that is left of a polynomial of degree p + 1 when its second
-    // derivative is approximated by splines of degree p - 2; m = p - 1.
-    const double bernoulli = p == 3 ? 1.0 / 720 : p == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
     const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
     const auto top = [&](int e) {
         return Eigen::Vector2d(space_.r().top_derivative(x.data(), e),
@@ -316,7 +311,7 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
     }
     std::vector<double> defect(n);
     for (int e = 0; e < n; ++e)
-        defect[e] = images_ * bernoulli / 4 * std::pow(size(e), 2 * (p - 1)) * stiffness[e] *
+        defect[e] = images_ * splines.bernoulli_norm() / 4 * std::pow(size(e), 2 * (p - 1)) * stiffness[e] *
                     (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
     return defect;
 }

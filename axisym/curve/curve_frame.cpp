@@ -7,14 +7,13 @@
 #include <filesystem>
 #include <memory>
 
+#include "axisym/curve/curve_samples.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
 
 namespace tubule::axisym {
 namespace {
-
-constexpr int samples_per_element = 6;
 
 // What a run needs to resume, by name.
 template <class Fields, class State>
@@ -35,13 +34,10 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     const CurveSpace& space = motion.space();
     const MotionLayout& at = motion.layout();
     const CurvePoint c = space.evaluate(state.y.head(space.size()), s);
-    // At a pole the curvature around the axis is that along the profile: just beside it, they agree to rounding.
-    constexpr double aside = 1e-5;
-    const bool pole = space.closed() && (s < aside || (space.topology() == Topology::cell && s > 1 - aside));
-    if (pole) {
-        Sample beside = sample(motion, state, s < 0.5 ? aside : 1 - aside);
-        beside.r = 0, beside.z = c.z, beside.u_t = 0, beside.u_theta = 0;
-        return beside;
+    if (const double beside = beside_pole(space, s); beside != s) {
+        Sample pole = sample(motion, state, beside);
+        pole.r = 0, pole.z = c.z, pole.u_t = 0, pole.u_theta = 0;
+        return pole;
     }
     const auto p = profile_point(c.r, c.r1, c.r2, c.z1, c.z2);
     const double t_r = c.r1 * p.inverse_speed, t_z = c.z1 * p.inverse_speed;
@@ -53,16 +49,6 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     if (at.swirl >= 0) out.u_theta = space.r().evaluate(state.y.data() + at.swirl, s)[0];
     if (at.p >= 0) out.p = motion.pressures().evaluate(state.y.data() + at.p, s)[0];
     return out;
-}
-
-// The other half of what mirrors itself about the plane z = height.
-void complete(std::vector<Sample>& samples, double height) {
-    for (std::size_t i = samples.size() - 1; i-- > 0;) {
-        Sample image = samples[i];
-        image.z = 2 * height - image.z;
-        image.u_t = -image.u_t;
-        samples.push_back(image);
-    }
 }
 
 Result read_start(const Case& c, const ResultFrame& from) {
@@ -99,14 +85,8 @@ struct MakeMeridian {
 
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy) {
     const CurveSpace& space = motion.space();
-    std::vector<Sample> samples;
-    const std::vector<double>& breaks = state.breaks;
-    for (std::size_t e = 0; e + 1 < breaks.size(); ++e)
-        for (int i = 0; i < samples_per_element; ++i)
-            samples.push_back(sample(motion, state, breaks[e] + (breaks[e + 1] - breaks[e]) * i / samples_per_element));
-    samples.push_back(sample(motion, state, 1));
-    if (space.topology() == Topology::half_cell) complete(samples, 0);
-    if (space.topology() == Topology::half_tube) complete(samples, space.rise());
+    const std::vector<Sample> samples = sample_profile(
+        space, [&](double s) { return sample(motion, state, s); }, [](Sample& image) { image.u_t = -image.u_t; });
 
     Record out;
     out.time = time, out.kind = RecordKind::curve;

@@ -10,6 +10,7 @@
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/curve/curve_samples.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/equilibrium.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
@@ -116,12 +117,10 @@ struct Sample {
 };
 
 Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
-    // At a pole the curvature around the axis is that along the profile: just beside it, they agree to rounding.
-    constexpr double aside = 1e-5;
-    const bool south = space.closed() && s < aside, north = space.topology() == Topology::cell && s > 1 - aside;
-    const CurvePoint at = space.evaluate(x, s), c = space.evaluate(x, south ? aside : north ? 1 - aside : s);
+    const double beside = beside_pole(space, s);
+    const CurvePoint at = space.evaluate(x, s), c = space.evaluate(x, beside);
     const auto p = profile_point(c.r, c.r1, c.r2, c.z1, c.z2);
-    return {south || north ? 0 : at.r, at.z, p.H, p.K};
+    return {beside != s ? 0 : at.r, at.z, p.H, p.K};
 }
 
 Dissipation dissipation(const Model& model) {
@@ -217,22 +216,8 @@ private:
 
     Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
         const Equilibrium& e = point.shape;
-        constexpr int samples_per_element = 6;
-        const std::vector<double>& breaks = e.space->splines().breaks();
-        std::vector<Sample> samples;
-        for (std::size_t k = 0; k + 1 < breaks.size(); ++k)
-            for (int i = 0; i < samples_per_element; ++i)
-                samples.push_back(
-                    sample(*e.space, e.x, breaks[k] + (breaks[k + 1] - breaks[k]) * i / samples_per_element));
-        samples.push_back(sample(*e.space, e.x, 1));
-        if (e.space->images() == 2) {  // what lies beyond the plane of symmetry
-            const double plane = samples.back().z;
-            for (std::size_t i = samples.size() - 1; i-- > 0;) {
-                Sample image = samples[i];
-                image.z = 2 * plane - image.z;
-                samples.push_back(image);
-            }
-        }
+        const std::vector<Sample> samples = sample_profile(
+            *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
         out.numbers = {{"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"P", e.P}};

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "axisym/splines/pack.hpp"
+#include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -66,13 +67,9 @@ Forms::Forms(const ProfileSpace& space, const Bending& bending)
         const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[t.col() + 1];
         slots_.push_back(static_cast<int>(std::lower_bound(begin, end, t.row()) - pattern_.innerIndexPtr()));
     }
-    // Squared norm |B_2n|/(2n)! of the Bernoulli spline that is left of a polynomial of degree p + 1 when
-    // its second derivative is approximated by splines of degree p - 2; n = p - 1.
-    const int p = space.degree();
-    const double bernoulli = p == 3 ? 1.0 / 720 : p == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
     for (int e = 0; e < space.elements(); ++e)
-        defect_scale_.push_back(images_ * bernoulli / 4 *
-                                std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (p - 1)));
+        defect_scale_.push_back(images_ * space.bernoulli_norm() / 4 *
+                                std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (degree - 1)));
 }
 
 template <int P>
@@ -246,12 +243,9 @@ template <int P>
                 if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
             });
             const auto f = density(bending_, p.H, p.K);
-            const auto symbol = [&](const Pack& kappa) { return f.HH + kappa * (2.0 * f.HK + kappa * f.KK); };
-            const Pack s = symbol(p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
-            // Of a parabola in x the minimum over an interval is at an end or at its clamped vertex.
+            const Pack s = principal_symbol(f, p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
             const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-            const Pack vertex = stdx::clamp(-f.HK * f.KK / (f.KK * f.KK + 1e-300), low, high);
-            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(stdx::min(s, stdx::min(symbol(p.kappa_s), symbol(vertex)))));
+            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
             if (stiffness) {
                 const Pack ig2 = p.inverse_speed * p.inverse_speed;
                 stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));

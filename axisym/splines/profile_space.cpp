@@ -39,6 +39,10 @@ ProfileSpace::ProfileSpace(Cell cell, std::vector<double> breaks, int degree, in
     tabulate();
 }
 
+double ProfileSpace::bernoulli_norm() const {
+    return degree_ == 3 ? 1.0 / 720 : degree_ == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
+}
+
 double ProfileSpace::knot(int index) const {
     const int n = elements(), j = floor_div(index, multiplicity_), L = cell_.mirror ? 2 * n : n;
     const int turn = floor_div(j, L), k = j - turn * L;

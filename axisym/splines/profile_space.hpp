@@ -49,6 +49,9 @@ public:
     int groups() const { return degree_ <= 5 ? 1 : 2; }
     const Cell& cell() const { return cell_; }
     const std::vector<double>& breaks() const { return breaks_; }
+    // Squared norm |B_2n|/(2n)!, n = degree - 1, of the Bernoulli spline that is left of a polynomial of degree + 1
+    // when its second derivative is approximated by splines of degree - 2; of degree 3, 5 or 7.
+    double bernoulli_norm() const;
     const Basis& basis(int element, int group) const { return basis_[element * groups() + group]; }
     const int* dofs(int element) const { return &dofs_[element * width()]; }
 
