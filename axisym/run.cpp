@@ -14,8 +14,7 @@ namespace {
 
 // Whether the case can be computed as a graph r(z), and nothing else is asked for.
 bool begins_as_graph(const Case& c) {
-    return std::holds_alternative<Tube>(c.shape) && c.model.kind == ModelKind::gradient_flow &&
-           !c.model.keeps_volume.value_or(false) &&
+    return std::holds_alternative<Tube>(c.shape) && motion_law(c.model).unconstrained() &&
            c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
 }
 

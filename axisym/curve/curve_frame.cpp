@@ -41,7 +41,7 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     }
     const auto p = profile_point(c.r, c.r1, c.r2, c.z1, c.z2);
     const double t_r = c.r1 * p.inverse_speed, t_z = c.z1 * p.inverse_speed;
-    const bool flows = motion.law().flows;
+    const bool flows = motion.law().inextensible;
     const double* v = flows ? state.y.data() : state.rate.data();
     const double u = space.r().evaluate(v + (flows ? at.u_r : at.r), s)[0];
     const double w = space.z().evaluate(v + (flows ? at.u_z : at.z), s)[0];
@@ -97,7 +97,7 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
         out.arrays.push_back(array(name, std::move(values)));
     };
     add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K), add("u_n", &Sample::u_n);
-    if (motion.law().flows) add("u_t", &Sample::u_t), add("p", &Sample::p);
+    if (motion.law().inextensible) add("u_t", &Sample::u_t), add("p", &Sample::p);
     if (motion.law().swirls) add("u_theta", &Sample::u_theta);
     restart_fields(RecordWriter(out), state);
     return out;

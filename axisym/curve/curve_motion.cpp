@@ -39,12 +39,12 @@ struct PointFields {
 
 // The law per unit of s, but for the energy, the gauge and the volume.
 template <class S>
-std::array<S, n_rows> point_law(const PointFields<S>& f, const MotionLaw& law, double drift, double shift) {
+std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, double drift, double shift) {
     const S &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
     const S g2 = r_s * r_s + z_s * z_s, ig2 = inverse(g2), ig = inverse_sqrt(g2);
     std::array<S, n_rows> out;
     for (S& x : out) x = S(0.0);
-    if (!law.flows) {
+    if (!law.inextensible) {
         const S rate = (2 * pi) * (r * (f.r_t * z_s - f.z_t * r_s));  // X_t.nu dS/g
         out[kr] = rate * z_s * ig + shift * (2 * pi) * (r * r_s);
         out[kz] = shift * (2 * pi) * (r * z_s) - rate * r_s * ig;
@@ -139,7 +139,7 @@ struct CurveMotion::Local {
     }
 };
 
-CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const MotionLaw& law, double gauge,
+CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const CurveLaw& law, double gauge,
                          double area, double volume)
     : forms_(space, bending),
       law_(law),
@@ -158,15 +158,15 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     };
     at_.r = add(true, space.r().size());
     at_.z = add(true, space.z().size());
-    at_.u_r = add(law.flows, space.r().size());
-    at_.u_z = add(law.flows, space.z().size());
-    at_.swirl = add(law.flows && law.swirls, swirl_.size());
-    at_.p = add(law.flows, pressure_.size());
+    at_.u_r = add(law.inextensible, space.r().size());
+    at_.u_z = add(law.inextensible, space.z().size());
+    at_.swirl = add(law.inextensible && law.swirls, swirl_.size());
+    at_.p = add(law.inextensible, pressure_.size());
     at_.lambda = add(law.keeps_volume, 1);
-    at_.area = add(law.flows && law.holds_area, 1);
-    at_.volume = add(law.flows && law.keeps_volume && law.holds_volume, 1);
+    at_.area = add(law.inextensible && law.holds_area, 1);
+    at_.volume = add(law.inextensible && law.keeps_volume && law.holds_volume, 1);
     const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
-    at_.drift = add(law.flows && !held, 1);
+    at_.drift = add(law.inextensible && !held, 1);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
     parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},  {&space.r(), at_.u_r},
@@ -216,7 +216,7 @@ void CurveMotion::set_pattern() {
     for (int column = 0; column < of_forms.cols(); ++column)
         for (Eigen::SparseMatrix<double>::InnerIterator it(of_forms, column); it; ++it) {
             curve_slots_.push_back(slot_of(at_.r + it.row(), column));
-            momentum_slots_.push_back(law_.flows ? slot_of(at_.u_r + it.row(), column) : 0);
+            momentum_slots_.push_back(law_.inextensible ? slot_of(at_.u_r + it.row(), column) : 0);
         }
     for (const int number : {at_.lambda, at_.area, at_.volume, at_.drift, at_.shift}) {
         if (number < 0) continue;
@@ -269,13 +269,13 @@ bool CurveMotion::residual(const double* y, const double* rate, double* F) const
     if (!(stdx::hmin(smallest) > 0)) return false;
 
     const double lambda = at_.lambda < 0 ? 0 : y[at_.lambda];
-    forms_.add_gradient({.energy = 1, .volume = lambda}, y, law_.flows ? F + at_.u_r : F);
+    forms_.add_gradient({.energy = 1, .volume = lambda}, y, law_.inextensible ? F + at_.u_r : F);
     forms_.add_gradient(
         {.area = at_.area < 0 ? 0 : y[at_.area], .volume = at_.volume < 0 ? 0 : y[at_.volume], .gauge = gauge_}, y, F);
     if (at_.area >= 0) F[at_.area] = stdx::reduce(area) - area0_;
     if (at_.volume >= 0) F[at_.volume] = stdx::reduce(volume) - volume0_;
-    if (at_.lambda >= 0 && !law_.flows) F[at_.lambda] = stdx::reduce(volume) - volume0_;
-    if (at_.lambda >= 0 && law_.flows) {
+    if (at_.lambda >= 0 && !law_.inextensible) F[at_.lambda] = stdx::reduce(volume) - volume0_;
+    if (at_.lambda >= 0 && law_.inextensible) {
         const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
         F[at_.lambda] = slope.dot(Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, slope.size()));
     }
@@ -396,7 +396,7 @@ void CurveMotion::add_forms(const double* y, double* values) const {
         forms_.add_hessian(weights, y, entries.data());
         for (std::size_t i = 0; i < entries.size(); ++i) values[slots[i]] += entries[i];
     };
-    add(force, law_.flows ? momentum_slots_ : curve_slots_);
+    add(force, law_.inextensible ? momentum_slots_ : curve_slots_);
     add(along, curve_slots_);
 
     const int n = space().size();
@@ -409,7 +409,7 @@ void CurveMotion::add_forms(const double* y, double* values) const {
     if (at_.area >= 0) add_border(at_.area, 0, 0, gradient_at({.area = 1}, y));
     if (at_.lambda < 0) return;
     const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
-    if (!law_.flows) return add_border(at_.lambda, 0, 0, slope);
+    if (!law_.inextensible) return add_border(at_.lambda, 0, 0, slope);
     if (at_.volume >= 0) add_border(at_.volume, 0, 0, slope);
     add_border(at_.lambda, at_.u_r, at_.u_r, slope);
     Eigen::SparseMatrix<double> second = forms_.pattern();
@@ -430,7 +430,7 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
             const Pack &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
             const Pack g2 = r_s * r_s + z_s * z_s, ig = 1.0 / sqrt(g2);
             const Pack dS = images * load(splines.basis(e, g).weight) * (2 * pi) * r * g2 * ig;
-            if (!law_.flows) {
+            if (!law_.inextensible) {
                 const Pack normal = (f.r_t * z_s - f.z_t * r_s) * ig;
                 dissipation += dS * normal * normal;
                 speed = stdx::max(speed, normal * normal);

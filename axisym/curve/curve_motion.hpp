@@ -8,19 +8,17 @@
 #include <vector>
 
 #include "axisym/curve/curve_forms.hpp"
+#include "common/model/model.hpp"
 
 namespace tubule::axisym {
 
-// What moves the curve. The models of a case are special ones: see law_of.
-struct MotionLaw {
-    bool flows = true;     // a velocity u with div u = 0 along the membrane; else X_t.nu = b, the gradient flow
-    double inertia = 0;    // 1: fluid
-    double viscosity = 0;  // 1/Re
-    double friction = 0;   // gamma
-    bool keeps_volume = true;
-    // Of a flow: whether A(X) and V(X) are held against drift by errors in time. Where H varies little, both are the
-    // same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda nu and a
-    // constant pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
+// A law of motion as a curve follows it. An inextensible curve has a velocity u; else X_t.nu = b - lambda.
+struct CurveLaw : MotionLaw {
+    CurveLaw(const MotionLaw& law) : MotionLaw(law) {}
+
+    // Of an inextensible curve: whether A(X) and V(X) are held against drift by errors in time. Where H varies little,
+    // both are the same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda
+    // nu and a constant pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
     bool holds_area = true, holds_volume = true;
     bool lagrangian = false;  // the parameter goes with the flow, X_t = u, instead of staying even
     bool swirls = false;      // u has a component around the axis
@@ -46,14 +44,14 @@ struct MotionLayout {
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
-    CurveMotion(const CurveSpace& space, const Bending& bending, const MotionLaw& law, double gauge, double area,
+    CurveMotion(const CurveSpace& space, const Bending& bending, const CurveLaw& law, double gauge, double area,
                 double volume);
     CurveMotion(const CurveMotion&) = delete;
     CurveMotion& operator=(const CurveMotion&) = delete;
 
     const CurveSpace& space() const { return forms_.space(); }
     const CurveForms& forms() const { return forms_; }
-    const MotionLaw& law() const { return law_; }
+    const CurveLaw& law() const { return law_; }
     const MotionLayout& layout() const { return at_; }
     const Field& pressures() const { return pressure_; }
 
@@ -101,7 +99,7 @@ private:
     int width(int part) const { return parts_[part].field->splines().width(); }
 
     CurveForms forms_;
-    MotionLaw law_;
+    CurveLaw law_;
     double gauge_, area0_, volume0_;
     ProfileSpace pressure_splines_;
     Field swirl_, pressure_;

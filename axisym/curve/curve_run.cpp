@@ -35,22 +35,16 @@ constexpr double stretched = 1e-3;  // least over largest |X_s|
 constexpr int steps_between_looks = 10;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 constexpr int most_crawling = 2000;    // steps by which the time has not grown by a thousandth
-// 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see MotionLaw.
+// 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-MotionLaw law_of(const Case& c) {
-    MotionLaw law;
-    const Model& m = c.model;
-    law.flows = m.kind != ModelKind::gradient_flow;
-    law.inertia = m.kind == ModelKind::fluid ? 1 : 0;
-    law.viscosity = m.kind == ModelKind::stokes || m.kind == ModelKind::fluid ? 1 / m.Re : 0;
-    law.friction = m.kind == ModelKind::overdamped ? 1 : m.gamma;
-    law.keeps_volume = m.keeps_volume.value_or(law.flows);
-    law.lagrangian = law.flows && c.discretisation.parametrisation != Parametrisation::even;
+CurveLaw law_of(const Case& c) {
+    CurveLaw law = motion_law(c.model);
+    law.lagrangian = law.inextensible && c.discretisation.parametrisation != Parametrisation::even;
     law.swirls = c.velocity.rotates;
     return law;
 }
@@ -89,14 +83,9 @@ private:
 
 // How strongly the parameter is kept even: in the scale of the rows that it is added to (curve_motion.hpp).
 double gauge_of(const Case& c, double energy, double area) {
-    switch (c.model.kind) {
-        case ModelKind::stokes:
-            return energy * c.model.Re;
-        case ModelKind::fluid:
-            return std::sqrt(energy * area);
-        default:
-            return energy;
-    }
+    const MotionLaw law = motion_law(c.model);
+    if (law.inertia != 0) return std::sqrt(energy * area);
+    return law.viscosity != 0 ? energy * c.model.Re : energy;
 }
 
 std::vector<int> tracked_modes(const Case& c) {
@@ -229,10 +218,10 @@ CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, bool recorded, con
     summary.reference_energy = forms.reference_energy(x);
     summary.elements = space_->splines().elements() * space_->images();
     summary.time_tolerance = settings.tolerance;
-    MotionLaw law = law_of(c);
+    CurveLaw law = law_of(c);
     const double variation = variation_of_H(*space_, x);
     law.holds_area = variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
-    if (law.flows && variation <= same_everywhere) law.keeps_volume = false;
+    if (law.inextensible && variation <= same_everywhere) law.keeps_volume = false;
     motion_ = std::make_unique<CurveMotion>(*space_, c.energy, law, gauge_of(c, summary.reference_energy, start.area),
                                             start.area, start.volume);
     outputs_ = c.time.output;
@@ -516,7 +505,7 @@ void CurveAttempt::write_row(double t, const Look& l, const double* y, double di
     put(std::isfinite(l.neck.radius) ? l.neck.radius : 0);
     put(l.o.r_max);
     for (const int n : modes_) put(mode_amplitude(*space_, y, n));
-    if (motion_->law().flows)
+    if (motion_->law().inextensible)
         for (const double value : {l.balance.kinetic, l.balance.speed, l.balance.momentum_z, l.balance.angular_z,
                                    at.lambda < 0 ? 0 : y[at.lambda]})
             put(value);
@@ -551,7 +540,7 @@ Settings coarser(const Settings& s) {
 Settings first_settings(const Case& c, const Beginning& start) {
     const int images =
         start.meridian.topology == Topology::half_cell || start.meridian.topology == Topology::half_tube ? 2 : 1;
-    const bool waves = c.model.kind == ModelKind::fluid;
+    const bool waves = motion_law(c.model).inertia != 0;
     Settings s = finer({first_elements, (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy}, 1);
     if (c.discretisation.elements) s.elements = (*c.discretisation.elements + images - 1) / images;
     if (c.discretisation.time_tolerance) s.tolerance = *c.discretisation.time_tolerance;
@@ -566,7 +555,7 @@ std::vector<std::string> curve_series_names(const Case& c) {
     for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max"})
         names.push_back(name);
     for (const int n : tracked_modes(c)) names.push_back(fmt::format("mode_{}", n));
-    if (law_of(c).flows)
+    if (motion_law(c.model).inextensible)
         for (const char* name : {"kinetic_energy", "speed", "momentum_z", "angular_momentum_z", "lambda"})
             names.push_back(name);
     for (const char* name : {"energy_error", "elements", "wall_seconds"}) names.push_back(name);

@@ -123,17 +123,6 @@ Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
     return {beside != s ? 0 : at.r, at.z, p.H, p.K};
 }
 
-Dissipation dissipation(const Model& model) {
-    switch (model.kind) {
-        case ModelKind::gradient_flow:
-            return Dissipation::gradient_flow;
-        case ModelKind::overdamped:
-            return Dissipation::overdamped;
-        default:  // the reader allows no fluid here
-            return Dissipation::stokes(model.Re, model.gamma);
-    }
-}
-
 int elements_of(const Equilibrium& e) {
     return e.space->images() * e.space->splines().elements();
 }
@@ -195,7 +184,7 @@ public:
         StationaryProblem problem = task_.problem;
         if (task_.set) task_.set(problem, point.parameter);
         std::vector<ModeRates> modes;
-        if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, dissipation(c_.model));
+        if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, motion_law(c_.model));
         observer_.row(row(point, modes));
         observer_.frame([&] { return frame(point, modes); });
         observer_.progress(point.parameter, e.observed.energy, 0);

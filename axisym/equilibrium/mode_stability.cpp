@@ -162,10 +162,10 @@ std::vector<Parity> ModeStability::parities(int m) const {
     }
 }
 
-ModeRates ModeStability::rates(int m, Dissipation dissipation, int count) const {
+ModeRates ModeStability::rates(int m, const MotionLaw& law, int count) const {
     ModeRates out;
     out.m = m;
-    for (const Parity& parity : parities(m)) add_rates(m, dissipation, parity, count, out);
+    for (const Parity& parity : parities(m)) add_rates(m, law, parity, count, out);
     return out;
 }
 
@@ -301,15 +301,15 @@ Matrix ModeStability::regular(int m, const Field& field) const {
 
 // The dissipation of w nu with the best tangential velocity, as a quadratic form in w. That velocity is grad chi + nu x
 // grad psi, w and chi going with cos(m theta), psi with sin: inextensibility is Lap chi = H w, and psi is free.
-Matrix ModeStability::dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parity, const Field& field,
                                        const Forms& forms) const {
-    if (!dissipation.flows) return dissipation.friction * forms.mass;
+    if (!law.inextensible) return law.friction * forms.mass;
     const bool constants = m == 0 && mirror(parity) >= 0;
     const Matrix basis = constants ? complement(forms.mean) : regular(m, field);
     const Matrix L = basis.transpose() * forms.gradients * basis, S = basis.transpose() * forms.source;
     const Matrix X = -Eigen::LDLT<Matrix>(L).solve(S);  // chi of w, in the basis
-    Matrix M = dissipation.friction * (forms.mass + X.transpose() * L * X);
-    if (dissipation.viscosity == 0) return M;
+    Matrix M = law.friction * (forms.mass + X.transpose() * L * X);
+    if (law.viscosity == 0) return M;
 
     // sigma at each point as a linear map of (w, chi, psi): its components ss, theta theta, s theta times sqrt 2.
     const Parity turned{mirror(parity) == 0      ? parity.start
@@ -344,28 +344,28 @@ Matrix ModeStability::dissipation_form(int m, Dissipation dissipation, Parity pa
         }
     }
     const Matrix of_w = sigma.leftCols(n) + sigma.middleCols(n, n) * (basis * X);
-    M += 2 * dissipation.viscosity * of_w.transpose() * of_w;
+    M += 2 * law.viscosity * of_w.transpose() * of_w;
     if (swirls == 0) return M;
     // The best psi. Motions of the whole that cost nothing may be among its choices: least squares then.
     const Matrix basis_psi = regular(m, psi), of_psi = sigma.rightCols(swirls) * basis_psi;
-    const Matrix cross = 2 * dissipation.viscosity * of_psi.transpose() * of_w;
-    const Matrix own = 2 * dissipation.viscosity * of_psi.transpose() * of_psi +
-                       dissipation.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
+    const Matrix cross = 2 * law.viscosity * of_psi.transpose() * of_w;
+    const Matrix own = 2 * law.viscosity * of_psi.transpose() * of_psi +
+                       law.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
     return M - cross.transpose() * Eigen::CompleteOrthogonalDecomposition<Matrix>(own).solve(cross);
 }
 
 // What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
 // rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a tilt are odd, a
 // translation across it is even.
-Matrix ModeStability::fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
                                         const Matrix& M) const {
     const CurveSpace& space = *shape_.space;
     Matrix fixed(forms.mean.size(), 0);
     if (m == 0 && mirror(parity) >= 0) {
         const Constraints& c = problem_.constraints;
-        if (dissipation.flows || c.area) append(fixed, forms.area.normalized());
-        if (dissipation.flows || c.volume) append(fixed, forms.volume.normalized());
-        if (!dissipation.flows && c.reduced_volume) {
+        if (law.inextensible || c.area) append(fixed, forms.area.normalized());
+        if (law.inextensible || c.volume) append(fixed, forms.volume.normalized());
+        if (!law.inextensible && c.reduced_volume) {
             // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
             const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;
             const double whole = 2 * pi * space.images();
@@ -381,16 +381,16 @@ Matrix ModeStability::fixed_functionals(int m, Dissipation dissipation, Parity p
         const Vector motion = projection.solve(forms.rigid[k]);
         if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
         // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.
-        append(fixed, ((dissipation.friction > 0 ? M : forms.mass) * motion).normalized());
+        append(fixed, ((law.friction > 0 ? M : forms.mass) * motion).normalized());
     }
     return fixed;
 }
 
-void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const {
+void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const {
     const Field field(shape_.space->splines(), parity);
     Forms forms = assemble(m, field);
-    const Matrix M = dissipation_form(m, dissipation, parity, field, forms), basis = regular(m, field);
-    const Matrix fixed = fixed_functionals(m, dissipation, parity, forms, M);
+    const Matrix M = dissipation_form(m, law, parity, field, forms), basis = regular(m, field);
+    const Matrix fixed = fixed_functionals(m, law, parity, forms, M);
     const Matrix free = basis * complement(basis.transpose() * fixed);
     const Spectrum found =
         smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);
@@ -410,10 +410,10 @@ void ModeStability::add_rates(int m, Dissipation dissipation, Parity parity, int
 }
 
 std::vector<ModeRates> mode_stability(const StationaryProblem& problem, const Equilibrium& shape, int last,
-                                      Dissipation dissipation, int count) {
+                                      const MotionLaw& law, int count) {
     const ModeStability stability(problem, shape);
     std::vector<ModeRates> out;
-    for (int m = 0; m <= last; ++m) out.push_back(stability.rates(m, dissipation, count));
+    for (int m = 0; m <= last; ++m) out.push_back(stability.rates(m, law, count));
     return out;
 }
 

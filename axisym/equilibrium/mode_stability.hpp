@@ -1,5 +1,8 @@
 // Stability of a stationary shape against normal displacements w(s) cos(m theta): growth rates by the second variation
-// of E + sigma A + P V and the model's dissipation, one eigenproblem for each m.
+// of E + sigma A + P V and the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2, theory.md (3.14), one
+// eigenproblem for each m. Inertia is neglected. Of a law without inextensibility u is w nu alone, and the constraints
+// of the problem hold (for m = 0; for others they hold by themselves). With it the volume is fixed, too, and the
+// tangential velocity the one of least dissipation.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,21 +10,9 @@
 #include <vector>
 
 #include "axisym/equilibrium/equilibrium.hpp"
+#include "common/model/model.hpp"
 
 namespace tubule::axisym {
-
-// What the rate of a displacement is paid with: the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2
-// theory.md (3.14). Without flow u is w nu alone, and the constraints of the problem hold (for m = 0; for others they
-// hold by themselves). With flow the membrane is locally inextensible, its volume fixed, and the tangential velocity
-// the one of least dissipation.
-struct Dissipation {
-    bool flows = false;
-    double viscosity = 0, friction = 1;  // viscosity 1/Re
-    static const Dissipation gradient_flow, overdamped;
-    static Dissipation stokes(double Re, double gamma) { return {true, 1 / Re, gamma}; }
-};
-inline constexpr Dissipation Dissipation::gradient_flow{};
-inline constexpr Dissipation Dissipation::overdamped{.flows = true};
 
 struct ModeRates {
     int m = 0;
@@ -41,7 +32,7 @@ public:
     // The largest `count` growth rates for this m, of displacements with the period (or closed surface) of the shape;
     // for half a curve, of those that mirror themselves and those that do so with a change of sign. Throws SolveError
     // if the eigenproblem is not solved.
-    ModeRates rates(int m, Dissipation dissipation, int count = 3) const;
+    ModeRates rates(int m, const MotionLaw& law, int count = 3) const;
 
 private:
     struct Point {
@@ -59,11 +50,11 @@ private:
     int mirror(Parity parity) const;
     Forms assemble(int m, const Field& field) const;
     Eigen::MatrixXd regular(int m, const Field& field) const;
-    Eigen::MatrixXd dissipation_form(int m, Dissipation dissipation, Parity parity, const Field& field,
+    Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const Field& field,
                                      const Forms& forms) const;
-    Eigen::MatrixXd fixed_functionals(int m, Dissipation dissipation, Parity parity, Forms& forms,
+    Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
                                       const Eigen::MatrixXd& M) const;
-    void add_rates(int m, Dissipation dissipation, Parity parity, int count, ModeRates& out) const;
+    void add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const;
 
     StationaryProblem problem_;
     Equilibrium shape_;
@@ -72,6 +63,6 @@ private:
 
 // For m = 0 ... last.
 std::vector<ModeRates> mode_stability(const StationaryProblem& problem, const Equilibrium& shape, int last,
-                                      Dissipation dissipation, int count = 3);
+                                      const MotionLaw& law, int count = 3);
 
 }  // namespace tubule::axisym

@@ -13,17 +13,6 @@
 namespace tubule::axisym {
 namespace {
 
-Dissipation dissipation(const Model& model) {
-    switch (model.kind) {
-        case ModelKind::gradient_flow:
-            return Dissipation::gradient_flow;
-        case ModelKind::overdamped:
-            return Dissipation::overdamped;
-        default:
-            return Dissipation::stokes(model.Re, model.gamma);
-    }
-}
-
 // The shape on so many elements, with the multipliers that leave the least force, in the norm (INT b^2 dS)^(1/2).
 Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> sigma, const Meridian& shape,
                      int elements, double& unbalanced) {
@@ -84,25 +73,24 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-void refuse_what_has_none(const Model& model, int first) {
-    if (model.kind == ModelKind::fluid)
+void refuse_what_has_none(const MotionLaw& law, int first) {
+    if (law.inertia != 0)
         throw std::invalid_argument(
             "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
-    if (first == 0 && model.kind != ModelKind::gradient_flow && !model.keeps_volume.value_or(true))
+    if (first == 0 && law.inextensible && !law.keeps_volume)
         throw std::invalid_argument("the spectrum of a model that flows is that with the volume fixed");
 }
 
 }  // namespace
 
-Held held_by(const Model& model) {
-    if (model.kind != ModelKind::gradient_flow)
-        return model.keeps_volume.value_or(true) ? Held::area_and_volume : Held::area;
-    return model.keeps_volume.value_or(false) ? Held::volume : Held::nothing;
+Held held_by(const MotionLaw& law) {
+    if (law.inextensible) return law.keeps_volume ? Held::area_and_volume : Held::area;
+    return law.keeps_volume ? Held::volume : Held::nothing;
 }
 
-Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
+Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings) {
-    refuse_what_has_none(model, settings.first);
+    refuse_what_has_none(law, settings.first);
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
@@ -119,8 +107,7 @@ Spectrum spectrum(const Bending& bending, const Model& model, Held held, const M
         }
         const ModeStability stability(problem, e);
         std::vector<ModeRates> modes;
-        for (int m = settings.first; m <= settings.last; ++m)
-            modes.push_back(stability.rates(m, dissipation(model), settings.count));
+        for (int m = settings.first; m <= settings.last; ++m) modes.push_back(stability.rates(m, law, settings.count));
         const bool first = out.modes.empty();
         out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
         out.modes = std::move(modes);

@@ -6,7 +6,7 @@
 
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
-#include "common/case/case.hpp"
+#include "common/case/equilibrium_choices.hpp"
 
 namespace tubule::axisym {
 
@@ -29,17 +29,17 @@ struct Spectrum {
     bool at_rest() const { return unbalanced < 1e-3; }
 };
 
-// What a model holds fixed by itself: nothing, or the volume, in gradient flow; area and volume otherwise.
-Held held_by(const Model& model);
+// What a law holds fixed by itself: the volume if it keeps it, the area of an inextensible membrane.
+Held held_by(const MotionLaw& law);
 
 // Of a whole tube or cell. Of a shape that is not at rest in the gradient flow, the rates are those of the flow
 // linearised about its motion at this instant. For all else the multipliers are those that balance the force best, as
 // if the shape were held by them.
-// With m = 0 there are constraints: no rates then of a model that flows with the volume free, and none of a shape that
-// moves, but for the gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates; what
-// the motion itself does to waves is left out where the model flows, so they are an estimate. None of a fluid
-// (std::invalid_argument), as its inertia is not in the second variation. SolveError if an eigenproblem is not solved.
-Spectrum spectrum(const Bending& bending, const Model& model, Held held, const Meridian& shape,
+// With m = 0 there are constraints: no rates then of an inextensible membrane with the volume free, and none of a shape
+// that moves, but for the gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates;
+// what the motion itself does to waves is left out of inextensible ones, so they are an estimate. None of a law with
+// inertia (std::invalid_argument), which is not in the second variation. SolveError if an eigenproblem is not solved.
+Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings = {});
 
 }  // namespace tubule::axisym

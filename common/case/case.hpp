@@ -9,6 +9,7 @@
 #include "common/case/equilibrium_choices.hpp"
 #include "common/case/surface_choices.hpp"
 #include "common/energy/bending.hpp"
+#include "common/model/model.hpp"
 #include "common/shapes/capsule.hpp"
 #include "common/shapes/dumbbell.hpp"
 #include "common/shapes/ellipsoid.hpp"
@@ -23,19 +24,10 @@
 namespace tubule {
 
 enum class Tier { axisym, surface3d, automatic };
-enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
 
 using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
 
-// The law of motion: theory.md 3.
-struct Model {
-    ModelKind kind = ModelKind::gradient_flow;
-    double Re = 1;                     // stokes, fluid: 1/Re is the viscosity
-    double gamma = 0;                  // stokes, fluid: friction
-    std::optional<bool> keeps_volume;  // by default all but the gradient flow do
-};
-
-// How a fluid begins.
+// How a model with inertia begins.
 struct Velocity {
     bool rotates = false;  // about the z axis, rigidly; else at rest
     double omega = 0;      // angular velocity

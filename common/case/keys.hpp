@@ -74,25 +74,24 @@ void keys(Keys& k, Shape& shape) {
 
 template <class Keys>
 void keys(Keys& k, Model& model) {
-    k.choice("kind", model.kind,
-             {{"gradient-flow", ModelKind::gradient_flow},
-              {"overdamped", ModelKind::overdamped},
-              {"stokes", ModelKind::stokes},
-              {"fluid", ModelKind::fluid}});
-    if (model.kind == ModelKind::stokes || model.kind == ModelKind::fluid) {
+    Choices<ModelKind> kinds;
+    for (const ModelEntry& m : models) kinds.emplace_back(m.name, m.kind);
+    k.choice("kind", model.kind, kinds);
+    if (model_entry(model.kind).viscous) {
         k.number("Re", model.Re, {.above = 0});
         k.number("gamma", model.gamma, {.from = 0});
     } else {
         for (const char* key : {"Re", "gamma"})
-            k.absent(key, "must be absent: it belongs to kind \"stokes\" or \"fluid\"");
+            k.absent(key, "must be absent: it belongs to kind " + quoted_names(&ModelEntry::viscous));
     }
     k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
 }
 
 template <class Keys>
 void keys(Keys& k, Velocity& velocity, const Model& model) {
-    if (model.kind != ModelKind::fluid)
-        return k.absent("initial", "must be absent: only model.kind = \"fluid\" has a velocity at the start");
+    if (!model_entry(model.kind).inertia)
+        return k.absent("initial", "must be absent: only model.kind = " + quoted_names(&ModelEntry::inertia) +
+                                       " has a velocity at the start");
     k.choice("initial", velocity.rotates, {{"rest", false}, {"rotation", true}});
     if (velocity.rotates)
         k.number("omega", velocity.omega, {}, k.required);
@@ -263,6 +262,7 @@ void check_neck(Keys& k, const Case& c) {
 // What no table can tell alone.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
+    const MotionLaw law = motion_law(c.model);
     if (c.tier == Tier::automatic) {
         k.check("discretisation.scheme", [&] {
             return c.surface.scheme == Scheme::paper
@@ -276,8 +276,8 @@ void check_together(Keys& k, const Case& c) {
         if (c.surface.scheme != Scheme::paper) return;
         k.check("discretisation.scheme", [&]() -> std::string {
             if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not control it";
-            if (c.model.kind == ModelKind::gradient_flow) return "must not be \"paper\" for a gradient flow";
-            if (c.model.kind == ModelKind::stokes && c.model.gamma == 0)
+            if (!law.inextensible) return "must not be \"paper\" for a gradient flow";
+            if (law.inertia == 0 && law.friction == 0)
                 return "must not be \"paper\" for a Stokes flow without friction: it leaves rigid motions open";
             return {};
         });
@@ -287,10 +287,9 @@ void check_together(Keys& k, const Case& c) {
     k.check(key, [&] { return complaint; });
     k.check("discretisation.parametrisation", [&]() -> std::string {
         const auto chosen = c.discretisation.parametrisation;
-        const bool flows = c.model.kind != ModelKind::gradient_flow;
-        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || flows || c.model.keeps_volume == true))
+        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained()))
             return "must not be \"graph\": only the gradient flow of a tube with free volume is computed as one";
-        if (chosen == Parametrisation::material && !flows)
+        if (chosen == Parametrisation::material && !law.inextensible)
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
     });
@@ -298,8 +297,9 @@ void check_together(Keys& k, const Case& c) {
         k.check("model.volume",
                 [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
         k.check("model.kind", [&] {
-            return c.equilibrium->modes && c.model.kind == ModelKind::fluid
-                       ? "must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia"
+            return c.equilibrium->modes && law.inertia != 0
+                       ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
+                                     name(c.model))
                        : "";
         });
         k.check("shape.kind", [&] {

@@ -33,7 +33,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         if (sets.empty() || message.starts_with("--set ")) throw;
         throw CaseError(fmt::format("{} (with --set {})", message, fmt::join(sets, " --set ")));
     }
-    if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = c.model.kind != ModelKind::gradient_flow;
+    if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;
     if (root.contains("expect") && !c.expect.stop) c.expect.stop = Stop::finished;
     return c;

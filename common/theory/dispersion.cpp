@@ -70,10 +70,10 @@ std::vector<Complex> cubic_roots(double c2, double c1, double c0) {
     return roots;
 }
 
-// The denominator of theory.md (5.10): what resists in Stokes flow, over Q R^2.
-double stokes_drag(const Model& model, double R, double q, int m) {
-    const double mu = 1 / model.Re, Q = q * q + m * m / (R * R), twist = model.gamma + mu * Q, around = m / R;
-    const double drag = model.gamma * (Q * R * R + 1) + 4 * mu * q * q;
+// The denominator of theory.md (5.10): what resists without inertia, over Q R^2.
+double drag_of(const MotionLaw& law, double R, double q, int m) {
+    const double mu = law.viscosity, Q = q * q + m * m / (R * R), twist = law.friction + mu * Q, around = m / R;
+    const double drag = law.friction * (Q * R * R + 1) + 4 * mu * q * q;
     return m == 0 || q == 0 ? drag : drag - 4 * mu * mu * q * q * around * around / twist;
 }
 
@@ -111,48 +111,41 @@ double stiffness(const UniformSphere& sphere, int l) {
     return L / (R * R) * (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R)) + f.f - f.K / (R * R) + sphere.tension);
 }
 
-double mobility(const UniformTube& tube, const Model& model, double q, int m) {
+double mobility(const UniformTube& tube, const MotionLaw& law, double q, int m) {
     const double R = tube.radius, QR2 = squared_wave_number(tube, q, m) * R * R;
-    switch (model.kind) {
-        case ModelKind::gradient_flow:
-            return 1;
-        case ModelKind::overdamped:
-        case ModelKind::fluid:
-            return QR2 / (QR2 + 1);
-        default:
-            return q == 0 && m == 0 ? 0 : QR2 / stokes_drag(model, R, q, m);
-    }
+    if (!law.inextensible) return 1;
+    if (law.inertia != 0) return QR2 / (QR2 + 1);
+    return q == 0 && m == 0 ? 0 : QR2 / drag_of(law, R, q, m);
 }
 
-Growth growth(const UniformTube& tube, const Model& model, double q, int m) {
+Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m) {
     m = std::abs(m);
     const double R = tube.radius, Q = squared_wave_number(tube, q, m), G = stiffness(tube, m)(q);
-    if (model.kind == ModelKind::gradient_flow) return {{-G}};
+    if (!law.inextensible) return {{-G}};
     // A radius, or a place, that is kept.
     const bool rigid = q == 0 && m < 2;
-    if (model.kind != ModelKind::fluid) return {{rigid || G == 0 ? 0.0 : -mobility(tube, model, q, m) * G}};
+    if (law.inertia == 0) return {{rigid || G == 0 ? 0.0 : -mobility(tube, law, q, m) * G}};
     // theory.md (5.12), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
     // gamma, s [(a A + B)(a + D) - C] + Q R^2 G (a + D) = 0. Without C the factor a + D belongs to a swirl without a
     // wave.
-    const double mu = 1 / model.Re, gamma = model.gamma, A = Q * R * R + 1, B = 4 * mu * q * q, D = mu * Q,
+    const double mu = law.viscosity, gamma = law.friction, A = Q * R * R + 1, B = 4 * mu * q * q, D = mu * Q,
                  C = 4 * mu * mu * q * q * m * m / (R * R), F = rigid ? 0.0 : Q * R * R * G;
     if (C == 0) return {quadratic_roots(A, gamma * A + B, F)};
     return {cubic_roots((2 * A * gamma + A * D + B) / A, ((A * gamma + A * D + B) * gamma + B * D - C + F) / A,
                         F * (gamma + D) / A)};
 }
 
-Growth growth(const UniformSphere& sphere, const Model& model, int l) {
+Growth growth(const UniformSphere& sphere, const MotionLaw& law, int l) {
     const double R = sphere.radius, Lam = l * (l + 1.0), L = Lam - 2, G = stiffness(sphere, l);
-    if (model.kind == ModelKind::gradient_flow) return {{-G}};
+    if (!law.inextensible) return {{-G}};
     if (l < 2) return {{0.0}};  // its size, which is kept, and its place
-    const double drag = model.gamma * (Lam + 4) + 4 / model.Re * L / (R * R);
-    if (model.kind == ModelKind::overdamped) return {{-Lam * G / (Lam + 4)}};
-    if (model.kind == ModelKind::stokes) return {{-Lam * G / drag}};
+    const double drag = law.friction * (Lam + 4) + 4 * law.viscosity * L / (R * R);
+    if (law.inertia == 0) return {{-Lam * G / drag}};
     return {quadratic_roots(Lam + 4, drag, Lam * G)};
 }
 
-double toroidal_rate(const UniformSphere& sphere, const Model& model, int l) {
-    return -model.gamma - (l * (l + 1.0) - 2) / (model.Re * sphere.radius * sphere.radius);
+double toroidal_rate(const UniformSphere& sphere, const MotionLaw& law, int l) {
+    return -law.friction - law.viscosity * (l * (l + 1.0) - 2) / (sphere.radius * sphere.radius);
 }
 
 bool ill_posed_along(const UniformTube& tube) {
@@ -185,9 +178,9 @@ std::vector<Band> growing_bands(const UniformTube& tube, int m) {
     return bands;
 }
 
-std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& model, int m) {
+std::optional<FastestWave> fastest_wave(const UniformTube& tube, const MotionLaw& law, int m) {
     std::optional<FastestWave> best;
-    const auto rate = [&](double q) { return growth(tube, model, q, m).rate(); };
+    const auto rate = [&](double q) { return growth(tube, law, q, m).rate(); };
     for (const Band& band : growing_bands(tube, m)) {
         if (!std::isfinite(band.to) || !std::isfinite(rate(band.from))) return std::nullopt;
         // Rates have one or two maxima within a band: samples find the highest, golden sections refine it.
@@ -211,7 +204,8 @@ std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& mo
     return best;
 }
 
-std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const Model& model, double length, int last) {
+std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const MotionLaw& law, double length,
+                                                int last) {
     std::optional<FittingWave> best;
     for (int m = 0; m <= last; ++m)
         for (const Band& band : growing_bands(tube, m)) {
@@ -219,7 +213,7 @@ std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const M
             for (int n = static_cast<int>(std::ceil(band.from * length / (2 * pi))); 2 * pi * n / length < band.to;
                  ++n) {
                 if (n == 0 && m < 2) continue;
-                const double q = 2 * pi * n / length, rate = growth(tube, model, q, m).rate();
+                const double q = 2 * pi * n / length, rate = growth(tube, law, q, m).rate();
                 if (!std::isfinite(rate)) return std::nullopt;
                 if (rate > 0 && (!best || rate > best->rate)) best = {n, m, q, rate};
             }

@@ -9,8 +9,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/case/case.hpp"
 #include "common/energy/bending.hpp"
+#include "common/model/model.hpp"
 
 namespace tubule::theory {
 
@@ -44,20 +44,20 @@ struct Stiffness {
 Stiffness stiffness(const UniformTube& tube, int m);
 double stiffness(const UniformSphere& sphere, int l);
 
-// All rates of one wave, the fastest (largest real part) first: one, or two or three of a fluid. Infinite where a
-// Stokes flow without friction meets no resistance (q = 0, m >= 2).
+// All rates of one wave, the fastest (largest real part) first: one; with inertia two or three. Infinite where a
+// viscous flow without inertia and friction meets no resistance (q = 0, m >= 2).
 struct Growth {
     std::vector<std::complex<double>> roots;
     double rate() const { return roots.front().real(); }
     double frequency() const { return std::abs(roots.front().imag()); }
 };
-Growth growth(const UniformTube& tube, const Model& model, double q, int m);
-Growth growth(const UniformSphere& sphere, const Model& model, int l);
-// Of a sphere's tangential swirls, which leave its shape alone; for fluid and Stokes flow with friction.
-double toroidal_rate(const UniformSphere& sphere, const Model& model, int l);
+Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m);
+Growth growth(const UniformSphere& sphere, const MotionLaw& law, int l);
+// Of a sphere's tangential swirls, which leave its shape alone, of a law with inertia.
+double toroidal_rate(const UniformSphere& sphere, const MotionLaw& law, int l);
 
-// M of theory.md (5.16), (5.18): models without inertia move as a' = -M G a. For a fluid, of a''.
-double mobility(const UniformTube& tube, const Model& model, double q, int m);
+// M of theory.md (5.16), (5.18): laws without inertia move as a' = -M G a. With inertia, of a''.
+double mobility(const UniformTube& tube, const MotionLaw& law, double q, int m);
 
 // Where the principal symbol f_HH + 2 f_HK x + f_KK x^2 is not positive, waves grow the faster the shorter they are:
 // waves along the axis (x = -1/R), or around it (x = 0).
@@ -75,7 +75,7 @@ std::vector<Band> growing_bands(const UniformTube& tube, int m);
 struct FastestWave {
     double q = 0, rate = 0;
 };
-std::optional<FastestWave> fastest_wave(const UniformTube& tube, const Model& model, int m);
+std::optional<FastestWave> fastest_wave(const UniformTube& tube, const MotionLaw& law, int m);
 
 // The fastest growing wave with m = 0 ... last of those that fit a length, q = 2 pi n/length, rigid motions and the
 // change of radius left out. Nothing if none grows, or as above.
@@ -83,7 +83,7 @@ struct FittingWave {
     int n = 0, m = 0;
     double q = 0, rate = 0;
 };
-std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const Model& model, double length, int last);
+std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const MotionLaw& law, double length, int last);
 
 // Where waves of one m begin to grow as the tension changes: from `lowest` to `highest` none does. `q_...` is the wave
 // number that is neutral there, 0 for long waves. Nothing if some wave grows at any tension.

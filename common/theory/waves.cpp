@@ -21,21 +21,22 @@ namespace tubule::theory {
 
 namespace {
 
-// One wave's coefficients in theory.md (5.16), (5.18): Z, G without tension, the mobility M; of a fluid with inertia
+// One wave's coefficients in theory.md (5.16), (5.18): Z, G without tension, the mobility M; with inertia
 //   a'' = -(gamma + drag) a' + swirl y - M (G0 - p0 Z) a,     y' = a' - (gamma + decay) y.
 struct Coefficients {
     double Z, G0, M, drag, swirl, decay;
 };
 
 struct Motion {
-    Model model;
+    MotionLaw law;
     UniformTube tube;
     double length;
     std::vector<Wave> waves;
     std::vector<Coefficients> of;  // but for a radius that drifts
-    bool drifts, fluid, tension_is_outcome;
+    bool drifts, tension_is_outcome;
 
-    std::size_t per_wave() const { return fluid ? 3 : 1; }
+    bool swings() const { return law.inertia != 0; }
+    std::size_t per_wave() const { return swings() ? 3 : 1; }
     double q(const Wave& wave) const { return 2 * pi * wave.n / length; }
 };
 
@@ -43,22 +44,19 @@ Coefficients coefficients(const Motion& motion, const Wave& wave) {
     UniformTube slack = motion.tube;
     slack.tension = 0;
     const double R = slack.radius, q = motion.q(wave), Q = q * q + wave.m * wave.m / (R * R), A = Q * R * R + 1,
-                 mu = 1 / motion.model.Re;
+                 mu = motion.law.viscosity;
     const int m = std::abs(wave.m);
     return {Q - 1 / (R * R),
             stiffness(slack, m)(q),
-            mobility(slack, motion.model, q, m),
+            mobility(slack, motion.law, q, m),
             4 * mu * q * q / A,
             4 * mu * mu * q * q * m * m / (R * R) / A,
             mu * Q};
 }
 
-Motion prepared(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves) {
-    Motion motion{model, tube, length, waves, {}, false, model.kind == ModelKind::fluid, false};
-    const bool flows = model.kind != ModelKind::gradient_flow;
-    motion.drifts = !flows && !keeps_volume(model);
-    motion.tension_is_outcome = flows && keeps_volume(model);
-    if (flows) motion.tube.tension = keeps_volume(model) ? 0 : tension_of_free_volume(tube.energy, tube.radius);
+Motion prepared(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves) {
+    Motion motion{law, tube, length, waves, {}, law.unconstrained(), law.inextensible && law.keeps_volume};
+    if (law.inextensible) motion.tube.tension = law.keeps_volume ? 0 : tension_of_free_volume(tube.energy, tube.radius);
     std::set<std::pair<int, int>> seen;
     double moves = 0;
     for (const Wave& wave : waves) {
@@ -88,7 +86,7 @@ double tension(const Motion& motion, const double* y) {
         const double* at = y + k * motion.per_wave();
         const double a = at[0];
         above += Z * M * G0 * a * a;
-        if (motion.fluid) above += Z * (a * ((motion.model.gamma + drag) * at[1] - swirl * at[2]) - at[1] * at[1]);
+        if (motion.swings()) above += Z * (a * ((motion.law.friction + drag) * at[1] - swirl * at[2]) - at[1] * at[1]);
         below += Z * Z * M * a * a;
     }
     return -above / below;
@@ -111,11 +109,11 @@ int slope(double, const double* y, double* dy, void* parameters) {
         const auto& [Z, G0, M, drag, swirl, decay] = motion.of[k];
         const std::size_t at = k * motion.per_wave();
         const double force = -M * (G0 - p0 * Z) * y[at];
-        if (!motion.fluid) {
+        if (!motion.swings()) {
             dy[at] = force;
             continue;
         }
-        const double gamma = motion.model.gamma;
+        const double gamma = motion.law.friction;
         dy[at] = y[at + 1];
         dy[at + 1] = force - (gamma + drag) * y[at + 1] + swirl * y[at + 2];
         dy[at + 2] = y[at + 1] - (gamma + decay) * y[at + 2];
@@ -132,7 +130,7 @@ std::vector<double> start(const Motion& motion) {
     }
     for (const Wave& wave : motion.waves) {
         y.push_back(wave.amplitude);
-        if (motion.fluid) y.insert(y.end(), {wave.rate, 0});
+        if (motion.swings()) y.insert(y.end(), {wave.rate, 0});
     }
     return y;
 }
@@ -156,18 +154,14 @@ struct FreeDriver {
 
 }  // namespace
 
-bool keeps_volume(const Model& model) {
-    return model.keeps_volume.value_or(model.kind != ModelKind::gradient_flow);
-}
-
-double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves) {
-    const Motion motion = prepared(tube, model, length, waves);
+double tension_of_waves(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves) {
+    const Motion motion = prepared(tube, law, length, waves);
     return tension(motion, start(motion).data());
 }
 
-std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model, double length,
+std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& law, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times) {
-    Motion motion = prepared(tube, model, length, waves);
+    Motion motion = prepared(tube, law, length, waves);
     std::vector<double> y = start(motion);
     double scale = motion.drifts ? 1 : 0;
     for (const double value : y) scale = std::max(scale, std::abs(value));
@@ -203,25 +197,27 @@ std::optional<TubeStart> tube_start(const Case& c) {
             sums[{mode.n, mode.m}] += std::polar(1.0, mode.phase) * mode.amplitude;
     for (const auto& [wave, sum] : sums)
         if (std::abs(sum) > 0) start.waves.push_back({wave.first, wave.second, std::abs(sum), 0});
-    if (c.model.kind == ModelKind::gradient_flow) return start;
-    if (!keeps_volume(c.model))
+    const MotionLaw law = motion_law(c.model);
+    if (!law.inextensible) return start;
+    if (!law.keeps_volume)
         start.tube.tension = tension_of_free_volume(c.energy, start.tube.radius);
     else if (!start.waves.empty())
-        start.tube.tension = tension_of_waves(start.tube, c.model, start.length, start.waves);
+        start.tube.tension = tension_of_waves(start.tube, law, start.length, start.waves);
     return start;
 }
 
 std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to) try {
     std::optional<TubeStart> start = tube_start(c);
     if (!start || !(to > from)) return std::nullopt;
+    const MotionLaw law = motion_law(c.model);
     std::vector<Wave>& waves = start->waves;
     auto ours = std::find_if(waves.begin(), waves.end(), [&](const Wave& w) { return w.n == n && std::abs(w.m) == m; });
     if (ours == waves.end()) {
-        if (c.model.kind != ModelKind::gradient_flow && keeps_volume(c.model)) return std::nullopt;
+        if (law.inextensible && law.keeps_volume) return std::nullopt;
         ours = waves.insert(ours, {n, m, 1, 0});
     }
     const auto at = ours - waves.begin();
-    const auto states = waves_in_time(start->tube, c.model, start->length, waves, {from, to});
+    const auto states = waves_in_time(start->tube, law, start->length, waves, {from, to});
     const double rate = std::log(std::abs(states[1].amplitudes[at] / states[0].amplitudes[at])) / (to - from);
     return std::isfinite(rate) ? std::optional(rate) : std::nullopt;  // else it has decayed below all numbers
 } catch (const std::invalid_argument&) {  // a wave without meaning, such as one that is infinitely fast

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/case/case.hpp"
 #include "common/theory/dispersion.hpp"
 
 namespace tubule::theory {
@@ -20,22 +21,19 @@ struct WaveState {
 };
 
 // The waves at each of `times` (ascending, from 0), to about 1e-10 of the largest amplitude.
-//   Gradient flow: the radius drifts, theory.md (5.3), unless the model keeps the volume; amplitudes are multiplied by
+//   Gradient flow: the radius drifts, theory.md (5.3), unless the law keeps the volume; amplitudes are multiplied by
 //     exp INT s dt. The tension is that of the tube, constant.
-//   Other models: the radius stays. Volume fixed: the tension is what keeps SUM Z a^2 constant, theory.md (5.14), and
-//   is given
-//     back; that of the tube does not matter. Volume free: tension_of_free_volume, constant.
-//   Fluids with m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
+//   Inextensible membranes: the radius stays. Volume fixed: the tension is what keeps SUM Z a^2 constant, theory.md
+//     (5.14), and is given back; that of the tube does not matter. Volume free: tension_of_free_volume, constant.
+//   With inertia and m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
 // The equations leave out squares of amplitudes. Throws std::invalid_argument for waves without meaning (n = m = 0,
 // repeated, all without amplitude, infinitely fast), SolveError if the radius vanishes or the integrator fails.
-std::vector<WaveState> waves_in_time(const UniformTube& tube, const Model& model, double length,
+std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& law, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times);
 
-// The tension that the constraints ask for at the start, theory.md (5.17), (5.19); fluids, overdamped and Stokes flow
-// of fixed volume.
-double tension_of_waves(const UniformTube& tube, const Model& model, double length, const std::vector<Wave>& waves);
-
-bool keeps_volume(const Model& model);
+// The tension that the constraints ask for at the start, theory.md (5.17), (5.19), of an inextensible membrane of fixed
+// volume.
+double tension_of_waves(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves);
 
 // A case of motion that begins as a tube: that tube made straight, and its waves. The tension is that of the start; 0
 // where nothing decides it (fixed volume, no waves).

@@ -16,13 +16,13 @@ Dependence dependence(const Bending& bending) {
 }
 
 // Taylor-Hood where the surface flows.
-int pressure_order(const MotionLaw& law, const CurvedMesh& mesh) {
+int pressure_order(const SurfaceLaw& law, const CurvedMesh& mesh) {
     return !law.inextensible ? 0 : law.flows ? mesh.order - 1 : mesh.order;
 }
 
 }  // namespace
 
-MotionUnknowns::MotionUnknowns(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending)
+MotionUnknowns::MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending)
     : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K, pressure_order(law, mesh)) {
     int next = law.components() * nodes();
     if (dependence(bending).H) H = std::exchange(next, next + nodes());
@@ -54,7 +54,7 @@ struct CellWork {
 
 class Assembler {
 public:
-    Assembler(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+    Assembler(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base)
         : space_(space),
           unknowns_(unknowns),
@@ -94,7 +94,7 @@ private:
 
     const SurfaceSpace& space_;
     const MotionUnknowns& unknowns_;
-    const MotionLaw& law_;
+    const SurfaceLaw& law_;
     const Bending& bending_;
     const StepBase& base_;
     const Tabulation& table_;
@@ -346,7 +346,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
 
 }  // namespace
 
-void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system) {
     if (system.A.size() == 0) system.A = unknowns.pattern();
     std::fill_n(system.A.valuePtr(), system.A.nonZeros(), 0.0);

@@ -6,13 +6,13 @@
 #include "common/energy/bending.hpp"
 #include "surface3d/fem/field_unknowns.hpp"
 #include "surface3d/motion/motion_fields.hpp"
-#include "surface3d/motion/motion_law.hpp"
+#include "surface3d/motion/surface_law.hpp"
 
 namespace tubule::surface3d {
 
 // Which fields a law has, and the numbers of their unknowns.
 struct MotionUnknowns : FieldUnknowns {
-    MotionUnknowns(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending);
+    MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending);
 
     int H = -1, K = -1, p = -1;  // first number of each, or -1 where there is none; the velocity begins at 0
 };
@@ -42,7 +42,7 @@ struct StepSystem {
 
 // H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in
 // both: theory.md (10.5), (10.6), (10.7), (10.8).
-void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const MotionLaw& law, const Bending& bending,
+void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 
 }  // namespace tubule::surface3d

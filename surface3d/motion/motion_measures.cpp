@@ -66,7 +66,7 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 }  // namespace
 
 MotionMeasures measure(MotionStepper& stepper, const MotionState& s, const Bending& bending) {
-    const MotionLaw& law = stepper.law();
+    const SurfaceLaw& law = stepper.law();
     const SurfaceSpace& space = stepper.space();
     const CurvedMesh mesh = stepper.mesh(s.X);
     MotionMeasures m;

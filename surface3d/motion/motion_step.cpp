@@ -74,7 +74,7 @@ bool is_finite(const MotionState& s) {
     return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda);
 }
 
-MotionStepper::MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending,
+MotionStepper::MotionStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending,
                              const MotionControl& control)
     : mesh_(mesh),
       space_(mesh),

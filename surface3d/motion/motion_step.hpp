@@ -69,7 +69,7 @@ struct MotionStep {
 
 class MotionStepper {
 public:
-    MotionStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, const MotionControl& control);
+    MotionStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control);
 
     // SolveError where a system cannot be solved, or area or volume cannot be kept to 1e-8.
     MotionStep step(const MotionState& from, double tau);
@@ -93,7 +93,7 @@ public:
     const SurfaceSpace& space() const { return space_; }
     const MotionUnknowns& unknowns() const { return unknowns_; }
     const StepSystem& system() const { return system_; }  // of the last step, rows scaled to be almost symmetric
-    const MotionLaw& law() const { return law_; }
+    const SurfaceLaw& law() const { return law_; }
     MotionFields fields(const CurvedMesh& mesh);
     // (u.nu, phi) of a velocity as in MotionState.
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
@@ -122,7 +122,7 @@ private:
 
     CurvedMesh mesh_;
     SurfaceSpace space_;
-    MotionLaw law_;
+    SurfaceLaw law_;
     Bending bending_;
     MotionControl control_;
     MotionUnknowns unknowns_;

@@ -116,7 +116,7 @@ struct CellSystem {
 };
 
 // (u - u_old, v)/tau + (grad_w u, v) + gamma (u, v), each component alike
-void add_inertia(const Point& at, const MotionLaw& law, double tau, CellSystem& s) {
+void add_inertia(const Point& at, const SurfaceLaw& law, double tau, CellSystem& s) {
     const double rate = law.inertia / tau;
     const CellColumns<1> acting = (rate + law.friction) * at.phi + law.inertia * at.transport.transpose() * at.grad;
     const CellMatrix block = at.dS * at.phi.transpose() * acting;
@@ -127,7 +127,7 @@ void add_inertia(const Point& at, const MotionLaw& law, double tau, CellSystem& 
 }
 
 // (2/Re) (D(u), grad_P v)
-void add_viscosity(const Point& at, const MotionLaw& law, CellSystem& s) {
+void add_viscosity(const Point& at, const SurfaceLaw& law, CellSystem& s) {
     if (law.viscosity == 0) return;
     s.block(s.u, s.u, 3 * s.n, 3 * s.n).noalias() += (2 * law.viscosity * at.dS) * at.strain.transpose() * at.strain;
 }
@@ -185,7 +185,7 @@ void add_mesh_motion(const Point& at, double tau, const CellColumns<3>& X, CellS
 
 }  // namespace
 
-PaperStepper::PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, double smoothing)
+PaperStepper::PaperStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, double smoothing)
     : mesh_(mesh),
       space_(mesh),
       law_(law),

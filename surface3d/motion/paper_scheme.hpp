@@ -9,8 +9,8 @@
 #include "common/solve/sparse.hpp"
 #include "surface3d/fem/field_unknowns.hpp"
 #include "surface3d/fem/projection.hpp"
-#include "surface3d/motion/motion_law.hpp"
 #include "surface3d/motion/motion_step.hpp"
+#include "surface3d/motion/surface_law.hpp"
 
 namespace tubule::surface3d {
 
@@ -40,7 +40,7 @@ public:
     // The paper chose it by experiment and gives no value; 0 leaves an L2 projection. std::invalid_argument for eps < 0
     // and for what the scheme has no equations for: a gradient flow, other terms of the energy, and Stokes without
     // friction, whose rigid motions nothing decides.
-    PaperStepper(const CurvedMesh& mesh, const MotionLaw& law, const Bending& bending, double smoothing);
+    PaperStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, double smoothing);
 
     // Leaves `error` and `correction` of the answer 0: nothing is estimated, and area and volume drift.
     // SolveError where the system cannot be solved.
@@ -54,14 +54,14 @@ public:
     PaperFields fields(const CurvedMesh& mesh);
 
     const SurfaceSpace& space() const { return space_; }
-    const MotionLaw& law() const { return law_; }
+    const SurfaceLaw& law() const { return law_; }
 
 private:
     void assemble(const MotionState& from, double tau);
 
     CurvedMesh mesh_;
     SurfaceSpace space_;
-    MotionLaw law_;
+    SurfaceLaw law_;
     PaperModuli moduli_;
     double smoothing_;
     PaperUnknowns unknowns_;

@@ -69,7 +69,7 @@ double MotionAttempt::length() const {
 }
 
 void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
-    MotionLaw law = motion_law(case_.model);
+    SurfaceLaw law = motion_law(case_.model);
     if (case_.surface.scheme == Scheme::paper) {
         law.flows = true;  // it has all components of u in all models
         paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);

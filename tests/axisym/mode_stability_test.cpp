@@ -15,6 +15,8 @@
 namespace tubule::axisym {
 namespace {
 
+const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false}, overdamped{.friction = 1};
+
 // A shape made stationary by its multipliers.
 Equilibrium held(const Meridian& m, const Bending& law, int elements, int degree, double sigma, double P) {
     Equilibrium e;
@@ -54,13 +56,13 @@ TEST(ModeStability, sphere) {
             const Equilibrium e = held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, degree, law.sigma, P);
             const ModeStability stability(fixed(law.bending(), e), e);
             for (int mode = 0; mode <= 5; ++mode)
-                for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+                for (const MotionLaw& model : {gradient_flow, overdamped}) {
                     const auto found = stability.rates(mode, model, 3);
                     ASSERT_EQ(found.rates.size(), 3u);
                     EXPECT_TRUE(found.stable());
                     for (int i = 0; i < 3; ++i) {
                         const int l = std::max(mode, 2) + i, Lam = l * (l + 1);
-                        const double factor = model.flows ? Lam / (Lam + 4.0) : 1;
+                        const double factor = model.inextensible ? Lam / (Lam + 4.0) : 1;
                         EXPECT_NEAR(found.rates[i] / (factor * rate(l)), 1, 1e-7) << mode << " " << l << " " << degree;
                     }
                 }
@@ -74,7 +76,7 @@ TEST(ModeStability, convergesWithTheOrderOfTheEnergy) {
     for (int i = 0; i < 2; ++i) {
         const Equilibrium e = held(meridian(Sphere{}), bending(1), 8 << i, 5, -8, 16);
         const ModeStability stability(fixed(bending(1), e), e);
-        error[i] = std::abs(stability.rates(3, Dissipation::gradient_flow, 2).rates[1] / (-18.0 * 32) - 1);
+        error[i] = std::abs(stability.rates(3, gradient_flow, 2).rates[1] / (-18.0 * 32) - 1);
     }
     EXPECT_GT(std::log2(error[0] / error[1]), 7) << error[0] << " " << error[1];
     EXPECT_LT(error[1], 1e-6);
@@ -90,14 +92,14 @@ TEST(ModeStability, tube) {
         const Equilibrium e = held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, P);
         const ModeStability stability(fixed(law.bending(), e), e);
         for (int mode = 0; mode <= 3; ++mode)
-            for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+            for (const MotionLaw& model : {gradient_flow, overdamped}) {
                 std::vector<double> expected;
                 for (int n = 0; n <= 3; ++n) {
                     const double q = 2 * pi * n / length, Q = q * q + mode * mode / (R * R), Z = Q - 1 / (R * R);
                     if (n == 0 && mode < 2) continue;  // excluded, or rigid
                     const double s = -(law.F2(h) * Z * Z + (law.f(h) + law.F1(h) / R + law.sigma) * Z -
                                        2 * law.F1(h) * q * q / R + 2 * law.k42 * std::pow(q, 4) / (R * R));
-                    const double factor = model.flows ? Q * R * R / (Q * R * R + 1) : 1;
+                    const double factor = model.inextensible ? Q * R * R / (Q * R * R + 1) : 1;
                     expected.insert(expected.end(), n > 0 ? 2 : 1, factor * s);
                 }
                 std::sort(expected.begin(), expected.end(), std::greater<>());
@@ -114,7 +116,7 @@ TEST(ModeStability, stokesFlow) {
     const Law law;
     for (const double gamma : {0.0, 0.8}) {
         const double mu = 0.6;
-        const Dissipation stokes = Dissipation::stokes(1 / mu, gamma);
+        const MotionLaw stokes{.viscosity = mu, .friction = gamma};
         {
             const double R = 1.2, h = -2 / R - law.H0;
             const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4));
@@ -183,7 +185,7 @@ TEST(ModeStability, shapesThatMove) {
                                        (law.F2(h) * L / (R * R) + law.f(h) + law.k42 * (2 * Lam - 5) / std::pow(R, 4)));
             }
             std::sort(expected.begin(), expected.end(), std::greater<>());
-            const auto found = stability.rates(mode, Dissipation::gradient_flow, 2).rates;
+            const auto found = stability.rates(mode, gradient_flow, 2).rates;
             for (int i = 0; i < 2; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 1e-6) << mode << " " << i;
         }
     }
@@ -199,7 +201,7 @@ TEST(ModeStability, shapesThatMove) {
             if (n > 0) expected.push_back(expected.back());
         }
         std::sort(expected.begin(), expected.end(), std::greater<>());
-        const auto found = stability.rates(mode, Dissipation::gradient_flow, 3).rates;
+        const auto found = stability.rates(mode, gradient_flow, 3).rates;
         for (int i = 0; i < 3; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 1e-6) << mode << " " << i;
     }
 }
@@ -209,7 +211,7 @@ double rate_of_mode_two(const StationaryProblem& problem, const Meridian& start)
     settings.accuracy = 1e-8;
     const Equilibrium e = find_equilibrium(problem, start, settings);
     EXPECT_EQ(e.stop, Stop::finished) << e.message;
-    return ModeStability(problem, e).rates(2, Dissipation::gradient_flow).rates[0];
+    return ModeStability(problem, e).rates(2, gradient_flow).rates[0];
 }
 
 // Where a rate changes its sign, by bisection.
@@ -254,7 +256,7 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
     const Equilibrium &before = branch.points[0].shape, &after = branch.points[2].shape;
     EXPECT_EQ(negative_directions(at(0.655), before), 0);
     EXPECT_EQ(negative_directions(at(0.655), after), 1);
-    for (const Dissipation& model : {Dissipation::gradient_flow, Dissipation::overdamped}) {
+    for (const MotionLaw& model : {gradient_flow, overdamped}) {
         EXPECT_TRUE(ModeStability(at(0.655), before).rates(0, model).stable());
         const auto found = ModeStability(at(0.655), after).rates(0, model);
         EXPECT_FALSE(found.stable());
@@ -265,7 +267,7 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
     }
     // k20 alone knows no size: with the reduced volume alone held, the change of size is neutral.
     const StationaryProblem free_size{bending(1), {{}, {}, 0.655}};
-    const auto rates = ModeStability(free_size, after).rates(0, Dissipation::gradient_flow).rates;
+    const auto rates = ModeStability(free_size, after).rates(0, gradient_flow).rates;
     EXPECT_GT(rates[0], 0.1);
     EXPECT_NEAR(rates[1], 0, 1e-4);
     EXPECT_LT(rates[2], -0.1);

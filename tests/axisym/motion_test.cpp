@@ -19,14 +19,18 @@ using Vector = Eigen::VectorXd;
 using test::random_vector;
 
 const Bending stiff{{0.2, 0.03, 0.1}, -0.7};
-const MotionLaw gradient_flow{.flows = false, .keeps_volume = false};
-const MotionLaw gradient_flow_volume{.flows = false};
+const MotionLaw gradient_flow{.inextensible = false, .keeps_volume = false};
+const MotionLaw gradient_flow_volume{.inextensible = false};
 const MotionLaw overdamped{.friction = 1};
 const MotionLaw stokes{.viscosity = 0.5};
 const MotionLaw fluid{.inertia = 1, .viscosity = 0.5, .friction = 0.1};
-const MotionLaw swirling{.inertia = 1, .viscosity = 0.5, .friction = 0.1, .swirls = true};
-const MotionLaw lagrangian{.inertia = 1, .viscosity = 0.5, .friction = 0.1, .lagrangian = true, .swirls = true};
-const std::vector<MotionLaw> laws{gradient_flow, gradient_flow_volume, overdamped, stokes, fluid, swirling, lagrangian};
+CurveLaw curve_law(const MotionLaw& law, bool lagrangian, bool swirls) {
+    CurveLaw out = law;
+    out.lagrangian = lagrangian, out.swirls = swirls;
+    return out;
+}
+const CurveLaw swirling = curve_law(fluid, false, true), lagrangian = curve_law(fluid, true, true);
+const std::vector<CurveLaw> laws{gradient_flow, gradient_flow_volume, overdamped, stokes, fluid, swirling, lagrangian};
 
 Vector some_curve(const CurveSpace& space) {
     const Meridian whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
@@ -37,7 +41,7 @@ Vector some_curve(const CurveSpace& space) {
 
 TEST(CurveMotion, jacobianIsTheDerivative) {
     for (const Topology topology : {Topology::cell, Topology::half_cell, Topology::tube, Topology::half_tube})
-        for (const MotionLaw& law : laws) {
+        for (const CurveLaw& law : laws) {
             const bool tube = topology == Topology::tube || topology == Topology::half_tube;
             const CurveSpace space(topology, equal_breaks(6), 5, 4, tube ? 3 : 0);
             const CurveMotion motion(space, stiff, law, 0.3, 5, 2);
@@ -58,14 +62,14 @@ TEST(CurveMotion, jacobianIsTheDerivative) {
             const double h = 1e-3;
             const Vector slope = (8 * (F(h / 2) - F(-h / 2)) - (F(h) - F(-h))) / (6 * h), expected = J * v;
             EXPECT_LE((slope - expected).lpNorm<Eigen::Infinity>(), 1e-7 * expected.lpNorm<Eigen::Infinity>())
-                << static_cast<int>(topology) << " " << law.flows << law.inertia << law.swirls;
+                << static_cast<int>(topology) << " " << law.inextensible << law.inertia << law.swirls;
         }
 }
 
 // The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |D(u)|^2 dS.
 double inf_sup(const CurveSpace& space, const Vector& x) {
-    const CurveMotion motion(space, {}, {.viscosity = 0.5, .friction = 1, .keeps_volume = false, .lagrangian = true}, 1,
-                             1, 1);
+    const MotionLaw viscous{.viscosity = 0.5, .friction = 1, .keeps_volume = false};
+    const CurveMotion motion(space, {}, curve_law(viscous, true, false), 1, 1, 1);
     const MotionLayout& at = motion.layout();
     Vector y = Vector::Zero(at.size);
     y.head(space.size()) = x;

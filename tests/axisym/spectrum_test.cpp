@@ -23,8 +23,8 @@ namespace {
 using theory::UniformSphere;
 using theory::UniformTube;
 
-Model model(ModelKind kind, double Re = 1, double gamma = 0) {
-    return {.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}};
+MotionLaw law_of(ModelKind kind, double Re = 1, double gamma = 0) {
+    return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
 }
 
 TEST(Dispersion, theGraphsLinearisedOperator) {
@@ -43,7 +43,7 @@ TEST(Dispersion, theGraphsLinearisedOperator) {
         const Eigen::MatrixXd A = J, M = forms.mass(x);
         const Eigen::VectorXcd found = -Eigen::PartialPivLU<Eigen::MatrixXd>(M).solve(A).eigenvalues();
         for (int n = 0; n <= 5; ++n) {
-            const double q = 2 * pi * n / length, s = growth(tube, model(ModelKind::gradient_flow), q, 0).rate();
+            const double q = 2 * pi * n / length, s = growth(tube, law_of(ModelKind::gradient_flow), q, 0).rate();
             std::vector<double> distance;
             for (const auto& value : found) distance.push_back(std::abs(value - s));
             std::sort(distance.begin(), distance.end());
@@ -60,12 +60,12 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
     const double R = 0.8, length = 3;
     const Meridian tube = meridian(Tube{R, length, {}});
     const Meridian sphere = meridian(Sphere{1.2, {}});
-    for (const Model& law :
-         {model(ModelKind::gradient_flow), model(ModelKind::overdamped), model(ModelKind::stokes, 2, 0.3)}) {
+    for (const MotionLaw& law :
+         {law_of(ModelKind::gradient_flow), law_of(ModelKind::overdamped), law_of(ModelKind::stokes, 2, 0.3)}) {
         SpectrumSettings settings;
         settings.accuracy = 1e-8;
         const Spectrum found = spectrum(energy, law, held_by(law), tube, settings);
-        const bool flows = law.kind != ModelKind::gradient_flow;
+        const bool flows = law.inextensible;
         // Least multipliers that hold a tube: sigma/R + P = b0. Any of these give its rates for their tension.
         const double b0 = radius_rate(UniformTube{energy, R});
         if (flows) {
@@ -100,13 +100,13 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
 TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
     const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
     const Meridian straight = meridian(Tube{1, 3, {}});
-    const auto found = [](Model law, const Meridian& shape) {
+    const auto found = [](MotionLaw law, const Meridian& shape) {
         return spectrum(bending(1), law, held_by(law), shape).modes.size();
     };
-    EXPECT_EQ(found(model(ModelKind::gradient_flow), wavy), 3u);
-    EXPECT_THROW(found(model(ModelKind::overdamped), wavy), std::invalid_argument);
-    EXPECT_THROW(found(model(ModelKind::fluid), straight), std::invalid_argument);
-    Model free = model(ModelKind::overdamped);
+    EXPECT_EQ(found(law_of(ModelKind::gradient_flow), wavy), 3u);
+    EXPECT_THROW(found(law_of(ModelKind::overdamped), wavy), std::invalid_argument);
+    EXPECT_THROW(found(law_of(ModelKind::fluid), straight), std::invalid_argument);
+    MotionLaw free = law_of(ModelKind::overdamped);
     free.keeps_volume = false;
     EXPECT_THROW(found(free, straight), std::invalid_argument);
 }
@@ -114,7 +114,7 @@ TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
 TEST(Dispersion, wavesAroundTheAxisAlone) {
     // With m >= 1 nothing needs to be held: the closed forms of a tube whose volume is free, at the tension that holds
     // it, and the same rates as beside those of m = 0.
-    Model free = model(ModelKind::overdamped);
+    MotionLaw free = law_of(ModelKind::overdamped);
     free.keeps_volume = false;
     const Bending energy = bending(0.3, -1.6, 0, 0.15);
     const double R = 0.8, length = 3;
@@ -134,12 +134,12 @@ TEST(Dispersion, wavesAroundTheAxisAlone) {
     }
     // In motion: those of the gradient flow at this instant, whatever is held; of what flows, an estimate that says so.
     const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
-    const Model gradient = model(ModelKind::gradient_flow);
+    const MotionLaw gradient = law_of(ModelKind::gradient_flow);
     const Spectrum whole = spectrum(bending(1), gradient, Held::nothing, wavy),
                    part = spectrum(bending(1), gradient, Held::nothing, wavy, around);
     EXPECT_NEAR(part.modes[0].rates[0] / whole.modes[1].rates[0], 1, 1e-5);
     EXPECT_FALSE(spectrum(bending(1), free, held_by(free), wavy, around).at_rest());
-    EXPECT_THROW(spectrum(bending(1), model(ModelKind::fluid), Held::nothing, wavy, around), std::invalid_argument);
+    EXPECT_THROW(spectrum(bending(1), law_of(ModelKind::fluid), Held::nothing, wavy, around), std::invalid_argument);
 }
 
 TEST(ProfileModes, ofTubesAndCells) {
@@ -184,7 +184,7 @@ TEST(Growth, fittedToRunsAtThePreferredRadius) {
         const Outcome o = run_case(c);
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         const UniformTube tube{c.energy, 1};
-        const double exact = growth(tube, c.model, 2 * pi / length, 0).rate();
+        const double exact = growth(tube, motion_law(c.model), 2 * pi / length, 0).rate();
         EXPECT_EQ(exact > 0, k42 < 0);
         const auto frames = fit_of_frames(o.log.frames, 1), series = theory::fit_growth(o["time"], o["mode_1"]);
         EXPECT_NEAR(frames.rate / exact, 1, 1e-6) << k42;
@@ -199,17 +199,15 @@ TEST(Growth, fittedToAFlowWithFreeVolume) {
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {
         const double length = 9, end = kind == ModelKind::fluid ? 30 : 10;
         Case c = tube_case(bending(1, -1.3, 0, 0.05), 1, length, {{1e-4, 1, 0, 0}}, end, equally_spaced(end, 20));
-        c.model = model(kind, 2, 0.3);
-        if (kind == ModelKind::overdamped) c.model = model(kind);
-        c.model.keeps_volume = false;
+        c.model = {.kind = kind, .Re = 2, .gamma = 0.3, .keeps_volume = false};
         c.accuracy.energy = 1e-8;
         const Outcome o = run_case(c);
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         const UniformTube tube{c.energy, 1, theory::tension_of_free_volume(c.energy, 1)};
-        const double exact = growth(tube, c.model, 2 * pi / length, 0).rate();
+        const double exact = growth(tube, motion_law(c.model), 2 * pi / length, 0).rate();
         const auto fit = fit_of_frames(o.log.frames, 1);
         EXPECT_NEAR(fit.rate / exact, 1, 1e-3) << exact << " found " << fit.rate << " +- " << fit.error;
-        const auto waves = theory::waves_in_time(tube, c.model, length, {{1, 0, 1e-4}}, {end});
+        const auto waves = theory::waves_in_time(tube, motion_law(c.model), length, {{1, 0, 1e-4}}, {end});
         EXPECT_NEAR(o.last("mode_1") / std::abs(waves[0].amplitudes[0]), 1, 2e-3);
     }
 }

@@ -53,7 +53,7 @@ void stability(benchmark::State& state) {
     const Capsule c{0.5, 3};
     const StationaryProblem problem = problem_of(c, 1);
     const Equilibrium e = find_equilibrium(problem, meridian(c));
-    for (auto _ : state) benchmark::DoNotOptimize(mode_stability(problem, e, 5, Dissipation::gradient_flow));
+    for (auto _ : state) benchmark::DoNotOptimize(mode_stability(problem, e, 5, motion_law({})));
     state.counters["elements"] = e.space->splines().elements();
 }
 BENCHMARK(stability)->Unit(benchmark::kMillisecond);

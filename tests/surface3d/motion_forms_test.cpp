@@ -19,8 +19,8 @@ namespace tubule::surface3d {
 namespace {
 
 const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.1, 3, 2}}};
-const MotionLaw gradient_flow = motion_law({});
-const MotionLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5, .keeps_volume = {}});
+const SurfaceLaw gradient_flow = motion_law({});
+const SurfaceLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5, .keeps_volume = {}});
 
 template <class Shape>
 CurvedMesh mesh_of(const Shape& shape, const TriangleMesh& base, int order) {
@@ -65,7 +65,7 @@ auto rate_of(const CurvedMesh& mesh, const VectorField& v, const Quantity& quant
 
 // The system of a step te on a surface at rest.
 struct AtRest {
-    AtRest(const CurvedMesh& on, const MotionLaw& law, const Bending& bending, double te)
+    AtRest(const CurvedMesh& on, const SurfaceLaw& law, const Bending& bending, double te)
         : mesh(on), space(mesh), law(law), bending(bending), unknowns(mesh, law, bending) {
         base.mesh = &mesh;
         base.fields = fields_of(mesh);
@@ -86,7 +86,7 @@ struct AtRest {
 
     CurvedMesh mesh;
     SurfaceSpace space;
-    MotionLaw law;
+    SurfaceLaw law;
     Bending bending;
     MotionUnknowns unknowns;
     StepBase base;
@@ -166,7 +166,7 @@ TEST(CurvatureEvolution, IsThatOfASurfaceThatMoves) {
     // theory.md (2.4), (2.5): dH = Lap w + |B|^2 w, dK = div((HP-B) grad w) + H K w for a displacement w nu: tested
     // with a smooth function against differences of the fields of displaced surfaces.
     const double te = 0.3;
-    for (const MotionLaw& law : {gradient_flow, fluid}) {
+    for (const SurfaceLaw& law : {gradient_flow, fluid}) {
         double H_rate = 0, K_rate = 0, of_H = 0, of_K = 0;
         for (const bool K : {false, true}) {
             const Fall fall = fall_of(4, [&](const CurvedMesh& mesh) {
@@ -245,7 +245,7 @@ TEST(StepMatrix, IsSymmetricWhereNothingStretches) {
     // which vanish with f_H and f_K: at H = H0 and K = 0.
     Bending bending{.k = {1, 0, 1}, .H0 = -0.5};
     const double te = 0.1;
-    for (const MotionLaw& law : {gradient_flow, fluid}) {
+    for (const SurfaceLaw& law : {gradient_flow, fluid}) {
         AtRest rest(mesh_of(wavy, icosphere(1), 3), law, bending, te);
         rest.base.fields.H.setConstant(bending.H0);
         rest.base.fields.K.setZero();
@@ -349,8 +349,8 @@ void scale(AtRest& rest) {
 
 TEST(StepSolve, AgreesWithLu) {
     const Bending bending{.k = {1, 0, 0.5}, .H0 = -0.5};
-    for (const MotionLaw& law :
-         {gradient_flow, motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}}), fluid}) {
+    for (const SurfaceLaw& law :
+         {gradient_flow, SurfaceLaw(motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}})), fluid}) {
         AtRest rest(mesh_of(wavy, icosphere(2), 3), law, bending, 1e-3);
         rest.assembled();
         scale(rest);
@@ -378,7 +378,7 @@ TEST(StepSolve, AgreesWithLu) {
 TEST(StepSolve, HoldsRigidMotions) {
     // Stokes flow without friction: the matrix is singular, or nearly so, in the six rigid motions, which the border
     // holds at the rates given.
-    MotionLaw law = motion_law({.kind = ModelKind::stokes, .keeps_volume = {}});
+    SurfaceLaw law = motion_law({.kind = ModelKind::stokes, .keeps_volume = {}});
     law.friction = 1e-5;
     AtRest rest(mesh_of(wavy, icosphere(2), 3), law, {.k = {1, 0, 0}}, 1e-3);
     rest.assembled();

@@ -88,7 +88,7 @@ SphereAt sphere_at(double end, const Bending& energy, double R, int l = 2) {
     const double h = end / steps;
     const auto rate = [&](const Eigen::Vector2d& y) {
         const theory::UniformSphere s{energy, y[0], 0};
-        return Eigen::Vector2d(theory::radius_rate(s), theory::growth(s, {}, l).rate());
+        return Eigen::Vector2d(theory::radius_rate(s), theory::growth(s, motion_law({}), l).rate());
     };
     Eigen::Vector2d y(R, 0);
     for (int i = 0; i < steps; ++i) {  // the classical method of Runge and Kutta
@@ -173,7 +173,8 @@ double error_of_waves(const Bending& energy, const Model& model, const std::vect
     }
     Motion motion(tube_mesh(tube, 8, 8, 4), model, energy);
     motion.until(end, steps);
-    const theory::WaveState exact = theory::waves_in_time({energy, 1, 0}, model, length, waves, {end}).back();
+    const theory::WaveState exact =
+        theory::waves_in_time({energy, 1, 0}, motion_law(model), length, waves, {end}).back();
     const CurvedMesh mesh = motion.mesh();
     for (std::size_t i = 0; i < waves.size(); ++i) {
         const double a = tube_wave(mesh, waves[i].n, waves[i].m, phased[i].phase);

@@ -23,8 +23,8 @@ using J = Jet<double, 1, 2>;
 Bending bending(double k20, double H0 = 0, double k40 = 0, double k42 = 0) {
     return {.k = {k20, k40, k42}, .H0 = H0};
 }
-Model model(ModelKind kind, double Re = 1, double gamma = 0) {
-    return {.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}};
+MotionLaw law_of(ModelKind kind, double Re = 1, double gamma = 0) {
+    return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
 }
 const ModelKind all_models[] = {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid};
 
@@ -133,10 +133,9 @@ TEST(Dispersion, theSameForSpheres) {
 // The linearised equations theory.md (3.1), (3.2) for (w, u_z, u_theta, p, a) on a tube unrolled to y = R theta, all
 // going with exp(i q z + i m theta + s t): K - s M. B = -1/R in the direction of theta, so that sigma_thth = d_y
 // u_theta + w/R, and the viscous force has the normal part 2 mu B:sigma = -2 mu sigma_thth/R.
-Eigen::Matrix<Complex, 5, 5> equations(const UniformTube& tube, const Model& law, double q, int m, Complex s) {
-    const double R = tube.radius, mu = law.kind == ModelKind::overdamped ? 0 : 1 / law.Re,
-                 gamma = law.kind == ModelKind::overdamped ? 1 : law.gamma;
-    const Complex i(0, 1), z = i * q, y = i * (m / R), inertia = law.kind == ModelKind::fluid ? s + gamma : gamma;
+Eigen::Matrix<Complex, 5, 5> equations(const UniformTube& tube, const MotionLaw& law, double q, int m, Complex s) {
+    const double R = tube.radius, mu = law.viscosity, gamma = law.friction;
+    const Complex i(0, 1), z = i * q, y = i * (m / R), inertia = law.inertia * s + gamma;
     Eigen::Matrix<Complex, 5, 5> A = Eigen::Matrix<Complex, 5, 5>::Zero();
     // p0 Z a and s_a a together are -G a, G with the tension.
     A.row(0) << -inertia - 2 * mu / (R * R), 0, -2 * mu / R * y, 1 / R, -stiffness(tube, m)(q);
@@ -155,7 +154,7 @@ TEST(Dispersion, ratesSolveTheLinearisedEquations) {
             for (int m = 0; m <= 3; ++m)
                 for (const double q : {0.0, 0.4, 1.3, 3.0}) {
                     if (q == 0 && (m < 2 || gamma == 0)) continue;
-                    const Model law = model(kind, Re, gamma);
+                    const MotionLaw law = law_of(kind, Re, gamma);
                     const Growth found = growth(tube, law, q, m);
                     EXPECT_EQ(found.roots.size(), kind != ModelKind::fluid ? 1u : m == 0 || q == 0 ? 2u : 3u);
                     const auto singular = [&](Complex s) {
@@ -179,42 +178,42 @@ TEST(Dispersion, modelsAgreeInTheirLimits) {
     for (int m = 0; m <= 2; ++m)
         for (const double q : {0.5, 1.0, 2.0}) {
             // Much viscosity or friction: inertia does not matter, and a fluid is a Stokes flow, to the order Re^2.
-            const double stokes = growth(tube, model(ModelKind::stokes, 1e-7, 0), q, m).rate(),
-                         fluid = growth(tube, model(ModelKind::fluid, 1e-7, 0), q, m).rate();
+            const double stokes = growth(tube, law_of(ModelKind::stokes, 1e-7, 0), q, m).rate(),
+                         fluid = growth(tube, law_of(ModelKind::fluid, 1e-7, 0), q, m).rate();
             EXPECT_NEAR(fluid / stokes, 1, 1e-5) << m << " " << q;
             // Friction 1 alone: the overdamped model.
-            const double overdamped = growth(tube, model(ModelKind::overdamped), q, m).rate();
-            EXPECT_NEAR(growth(tube, model(ModelKind::stokes, 1e10, 1), q, m).rate() / overdamped, 1, 1e-8);
-            EXPECT_NEAR(growth(tube, model(ModelKind::fluid, 1e12, 1e4), q, m).rate() * 1e4 / overdamped, 1, 1e-5);
+            const double overdamped = growth(tube, law_of(ModelKind::overdamped), q, m).rate();
+            EXPECT_NEAR(growth(tube, law_of(ModelKind::stokes, 1e10, 1), q, m).rate() / overdamped, 1, 1e-8);
+            EXPECT_NEAR(growth(tube, law_of(ModelKind::fluid, 1e12, 1e4), q, m).rate() * 1e4 / overdamped, 1, 1e-5);
             // A wave grows in every model or in none.
             (overdamped > 0 ? grows : decays) = true;
             for (const ModelKind kind : all_models)
-                EXPECT_EQ(growth(tube, model(kind, 2, 0.3), q, m).rate() > 0, stiffness(tube, m)(q) < 0);
+                EXPECT_EQ(growth(tube, law_of(kind, 2, 0.3), q, m).rate() > 0, stiffness(tube, m)(q) < 0);
         }
     EXPECT_TRUE(grows);
     EXPECT_TRUE(decays);
     for (const ModelKind kind : all_models) {
-        const Growth one = growth(tube, model(kind, 2, 0.3), 0.7, 1),
-                     other = growth(tube, model(kind, 2, 0.3), 0.7, -1);
+        const Growth one = growth(tube, law_of(kind, 2, 0.3), 0.7, 1),
+                     other = growth(tube, law_of(kind, 2, 0.3), 0.7, -1);
         for (std::size_t i = 0; i < one.roots.size(); ++i) EXPECT_EQ(one.roots[i], other.roots[i]);
     }
     // theory.md (5.11): m = 0, gamma = 0: s = -Re R^2 G/4.
-    EXPECT_NEAR(growth(tube, model(ModelKind::stokes, 2, 0), 0.7, 0).rate(),
+    EXPECT_NEAR(growth(tube, law_of(ModelKind::stokes, 2, 0), 0.7, 0).rate(),
                 -2 * 0.8 * 0.8 / 4 * stiffness(tube, 0)(0.7), 1e-12);
     // A ring wave is not sheared: without friction nothing resists it.
-    EXPECT_EQ(growth(tube, model(ModelKind::stokes, 2, 0), 0, 2).rate(), -std::numeric_limits<double>::infinity());
-    EXPECT_EQ(growth(tube, model(ModelKind::fluid, 2, 0), 0, 1).rate(), 0);
+    EXPECT_EQ(growth(tube, law_of(ModelKind::stokes, 2, 0), 0, 2).rate(), -std::numeric_limits<double>::infinity());
+    EXPECT_EQ(growth(tube, law_of(ModelKind::fluid, 2, 0), 0, 1).rate(), 0);
     // theory.md (6.7): the sphere's fluid is its Stokes flow where that is slow, and one with friction 1 the
     // overdamped.
     const UniformSphere sphere{bending(0.3, -0.4, 0.02, 0.15), 1.2, 0.7};
     for (int l = 2; l <= 5; ++l) {
-        const double stokes = growth(sphere, model(ModelKind::stokes, 1e-4, 0), l).rate();
-        EXPECT_NEAR(growth(sphere, model(ModelKind::fluid, 1e-4, 0), l).rate() / stokes, 1, 1e-5);
-        EXPECT_NEAR(growth(sphere, model(ModelKind::stokes, 1e12, 1), l).rate() /
-                        growth(sphere, model(ModelKind::overdamped), l).rate(),
+        const double stokes = growth(sphere, law_of(ModelKind::stokes, 1e-4, 0), l).rate();
+        EXPECT_NEAR(growth(sphere, law_of(ModelKind::fluid, 1e-4, 0), l).rate() / stokes, 1, 1e-5);
+        EXPECT_NEAR(growth(sphere, law_of(ModelKind::stokes, 1e12, 1), l).rate() /
+                        growth(sphere, law_of(ModelKind::overdamped), l).rate(),
                     1, 1e-9);
     }
-    EXPECT_NEAR(toroidal_rate(sphere, model(ModelKind::fluid, 2, 0.3), 1), -0.3, 1e-15);  // a rotation: friction alone
+    EXPECT_NEAR(toroidal_rate(sphere, law_of(ModelKind::fluid, 2, 0.3), 1), -0.3, 1e-15);  // a rotation: friction alone
 }
 
 // ---- thresholds, for k40 = 0, in the reduced tension, c = H0 R, beta = k42/(k20 R^2): theory.md (5.20) and after
@@ -266,7 +265,7 @@ TEST(Thresholds, tubeAtItsPreferredRadius) {
     // theory.md (5.27): s = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], largest at x = 1/(1 + beta).
     const UniformTube grows = tube_of(0, -1, -0.2);
     ASSERT_EQ(growing_bands(grows, 0).size(), 1u);
-    const auto fastest = fastest_wave(grows, model(ModelKind::gradient_flow), 0);
+    const auto fastest = fastest_wave(grows, law_of(ModelKind::gradient_flow), 0);
     ASSERT_TRUE(fastest);
     EXPECT_NEAR(fastest->q * 1.3, std::sqrt(1 / 0.8), 1e-7);
     EXPECT_NEAR(fastest->rate, 0.8 / std::pow(1.3, 4) * (1 / 0.8 - 1), 1e-14);
@@ -321,7 +320,7 @@ TEST(Thresholds, illPosed) {
     EXPECT_TRUE(ill_posed_along(tube_of(0, -0.5, -1.001)));
     EXPECT_FALSE(stable_tensions(tube_of(0, -0.5, -1.001), 0));
     EXPECT_EQ(growing_bands(tube_of(0, -0.5, -1.001), 0).back().to, std::numeric_limits<double>::infinity());
-    EXPECT_FALSE(fastest_wave(tube_of(0, -0.5, -1.001), model(ModelKind::gradient_flow), 0));
+    EXPECT_FALSE(fastest_wave(tube_of(0, -0.5, -1.001), law_of(ModelKind::gradient_flow), 0));
     EXPECT_FALSE(ill_posed_around({bending(0.6, 0, -0.0999), 1}));
     EXPECT_TRUE(ill_posed_around({bending(0.6, 0, -0.1001), 1}));
 }
@@ -333,7 +332,7 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
         tube.tension = tension;
         for (int m = 0; m <= 2; ++m)
             for (const ModelKind kind : all_models) {
-                const Model law = model(kind, 2, 0.3);
+                const MotionLaw law = law_of(kind, 2, 0.3);
                 const auto fastest = fastest_wave(tube, law, m);
                 ASSERT_EQ(fastest.has_value(), !growing_bands(tube, m).empty());
                 if (!fastest) continue;
@@ -343,7 +342,7 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
                 EXPECT_EQ(growth(tube, law, fastest->q, m).rate(), fastest->rate);
             }
         // Of those that fit: the best of all.
-        const Model law = model(ModelKind::fluid, 2, 0.3);
+        const MotionLaw law = law_of(ModelKind::fluid, 2, 0.3);
         theory::FittingWave best;
         for (int m = 0; m <= 2; ++m)
             for (int n = m < 2 ? 1 : 0; n < 10; ++n) {
@@ -375,14 +374,14 @@ TEST(Waves, aDriftingTube) {
     const int n = 2000;
     for (int i = 0; i <= n; ++i)
         integral += (i == 0 || i == n ? 1 : i % 2 == 1 ? 4 : 2) * rate(end * i / n) * end / n / 3;
-    const auto states = waves_in_time(tube, model(ModelKind::gradient_flow), length, {{1, 0, 1e-3}}, {0, 1, end});
+    const auto states = waves_in_time(tube, law_of(ModelKind::gradient_flow), length, {{1, 0, 1e-3}}, {0, 1, end});
     ASSERT_EQ(states.size(), 3u);
     EXPECT_EQ(states[0].amplitudes[0], 1e-3);
     EXPECT_NEAR(states[0].rates[0], 1e-3 * rate(0), 1e-15);
     EXPECT_NEAR(states[2].radius, radius(end), 1e-10);
     EXPECT_NEAR(states[2].amplitudes[0] / 1e-3 / std::exp(integral), 1, 1e-9);
     // At a radius that is kept: the exponential.
-    Model fixed = model(ModelKind::gradient_flow);
+    MotionLaw fixed = law_of(ModelKind::gradient_flow);
     fixed.keeps_volume = true;
     EXPECT_NEAR(waves_in_time(tube, fixed, length, {{1, 2, 1e-3}}, {end})[0].amplitudes[0],
                 1e-3 * std::exp(end * growth(tube, fixed, q, 2).rate()), 1e-13);
@@ -400,7 +399,7 @@ TEST(Waves, meetTheReferenceRunsOnceSmall) {
                            Run{0.06, 0.8838568455555245, 0.8840842908078685, 0.00011372262691308577, 0.7035518268561033,
                                0.7035518274564397, 3.001695680452704e-10}}) {
         const UniformTube tube{bending(0.2, -2, 0, run.k42), (run.r_min + run.r_max) / 2};
-        const auto end = waves_in_time(tube, model(ModelKind::gradient_flow), 2, {{1, 0, run.mode}}, {0.3})[0];
+        const auto end = waves_in_time(tube, law_of(ModelKind::gradient_flow), 2, {{1, 0, run.mode}}, {0.3})[0];
         const double squares = run.mode * run.mode;
         EXPECT_NEAR(end.radius, (run.r_min_end + run.r_max_end) / 2, squares + 1e-9);
         EXPECT_NEAR(end.amplitudes[0] / run.mode_end, 1, 60 * squares + 1e-13 / run.mode_end);
@@ -412,7 +411,7 @@ TEST(Waves, areConservedTogether) {
     const UniformTube tube{bending(1, 0, 0, 0.1), 1};
     const double length = 6;
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {
-        const Model law = model(kind, 2, 0.3);
+        const MotionLaw law = law_of(kind, 2, 0.3);
         const std::vector<Wave> waves{{1, 0, 1e-3}, {2, 0, 5e-4}, {1, 1, 2e-4}, {0, 2, 3e-4}};
         const auto states = waves_in_time(tube, law, length, waves, {0, 0.2, 1});
         const auto sum = [&](const WaveState& state) {
@@ -437,7 +436,7 @@ TEST(Waves, ofAFluidFollowTheCubic) {
     // With the volume free the tension is constant, and a(t) is a sum of exponentials of the roots: that which has a,
     // a' = 0 and a'' = -M G a at the start, as the swirl is at rest.
     const UniformTube tube{bending(1, -0.3, 0, 0.1), 1.1};
-    Model law = model(ModelKind::fluid, 2, 0.3);
+    MotionLaw law = law_of(ModelKind::fluid, 2, 0.3);
     law.keeps_volume = false;
     const double length = 6, t = 1.5;
     UniformTube held = tube;
@@ -464,11 +463,11 @@ TEST(Waves, ofAFluidFollowTheCubic) {
 
 TEST(Waves, meaninglessOnesAreRefused) {
     const UniformTube tube{bending(1), 1};
-    const Model fluid = model(ModelKind::fluid, 1, 0);
+    const MotionLaw fluid = law_of(ModelKind::fluid, 1, 0);
     EXPECT_THROW(waves_in_time(tube, fluid, 6, {{0, 0, 1e-3}}, {1}), std::invalid_argument);
     EXPECT_THROW(waves_in_time(tube, fluid, 6, {{1, 0, 1e-3}, {1, 0, 1e-4}}, {1}), std::invalid_argument);
     EXPECT_THROW(waves_in_time(tube, fluid, 6, {{1, 0, 0}}, {1}), std::invalid_argument);
-    EXPECT_THROW(waves_in_time(tube, model(ModelKind::stokes), 6, {{0, 2, 1e-3}}, {1}), std::invalid_argument);
+    EXPECT_THROW(waves_in_time(tube, law_of(ModelKind::stokes), 6, {{0, 2, 1e-3}}, {1}), std::invalid_argument);
     EXPECT_THROW(waves_in_time(tube, fluid, 6, {{1, 0, 1e-3}}, {1, 0.5}), std::invalid_argument);
 }
 

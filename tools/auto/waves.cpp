@@ -17,12 +17,13 @@ namespace {
 constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
-axisym::Spectrum spectrum_of(const Case& c, Model model, const Meridian& profile) {
+// Inertia left out.
+axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Meridian& profile) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
     settings.max_elements = most_elements;
-    if (model.kind == ModelKind::fluid) model.kind = ModelKind::stokes;
-    return axisym::spectrum(c.energy, model, axisym::held_by(model), profile, settings);
+    law.inertia = 0;
+    return axisym::spectrum(c.energy, law, axisym::held_by(law), profile, settings);
 }
 
 double fastest(const axisym::ModeRates& mode) {
@@ -40,14 +41,15 @@ double rate_with_inertia(double stokes, double overdamped) {
 
 WaveRates wave_rates(const Case& c, const Record& frame) {
     const Meridian profile = axisym::frame_meridian(frame);
-    const axisym::Spectrum found = spectrum_of(c, c.model, profile);
+    const MotionLaw law = motion_law(c.model);
+    const axisym::Spectrum found = spectrum_of(c, law, profile);
     WaveRates out;
     for (const axisym::ModeRates& mode : found.modes) out.rates.push_back(fastest(mode));
-    out.estimated = c.model.kind != ModelKind::gradient_flow && !found.at_rest();
+    out.estimated = law.inextensible && !found.at_rest();
     out.accuracy = found.estimated_error;
-    if (c.model.kind != ModelKind::fluid) return out;
-    Model overdamped = c.model;
-    overdamped.kind = ModelKind::overdamped;
+    if (law.inertia == 0) return out;
+    MotionLaw overdamped = law;
+    overdamped.viscosity = 0, overdamped.friction = 1;
     const axisym::Spectrum inert = spectrum_of(c, overdamped, profile);
     for (std::size_t i = 0; i < out.rates.size(); ++i)
         out.rates[i] = rate_with_inertia(out.rates[i], fastest(inert.modes[i]));
@@ -58,7 +60,7 @@ WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector
     const auto [r, z, length] = profile_points(frame);
     WavedProfile out{profile_curve(r, z, length), {}, {}};
     const double radius = *std::max_element(r.begin(), r.end());
-    const axisym::Spectrum found = spectrum_of(c, c.model, axisym::frame_meridian(frame));
+    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), axisym::frame_meridian(frame));
     for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
         const axisym::ModeRates& mode = found.modes[i];
         if (relative_amplitudes[i] == 0 || mode.shape.empty()) continue;
@@ -68,7 +70,7 @@ WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector
     }
     const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
                 *around = find_array(frame, "u_theta");
-    if (c.model.kind == ModelKind::fluid && normal && along)
+    if (motion_law(c.model).inertia != 0 && normal && along)
         out.velocity =
             profile_velocity(out.curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
     return out;

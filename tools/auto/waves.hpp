@@ -12,7 +12,7 @@ namespace tubule {
 
 struct WaveRates {
     std::vector<double> rates;  // the fastest of m = 1 ... auto.modes
-    bool estimated = false;     // the shape moves, and the model flows: what that does to waves is left out
+    bool estimated = false;     // the shape moves, and is inextensible: what that does to waves is left out
     double accuracy = 0;        // relative to the larger of a rate and the slowest one
 };
 

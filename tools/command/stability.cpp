@@ -25,15 +25,9 @@
 
 namespace tubule {
 
-std::string name(ModelKind kind) {
-    static const char* names[] = {"gradient-flow", "overdamped", "stokes", "fluid"};
-    return names[static_cast<int>(kind)];
-}
-
 std::string words(const Model& model) {
-    std::string text = name(model.kind);
-    if (model.kind == ModelKind::stokes || model.kind == ModelKind::fluid)
-        text += fmt::format(", Re = {:g}, gamma = {:g}", model.Re, model.gamma);
+    std::string text = name(model);
+    if (model_entry(model.kind).viscous) text += fmt::format(", Re = {:g}, gamma = {:g}", model.Re, model.gamma);
     if (model.keeps_volume) text += *model.keeps_volume ? ", volume fixed" : ", volume free";
     return text;
 }
@@ -44,8 +38,6 @@ namespace {
 struct NoPicture {
     int status;
 };
-
-const ModelKind all_models[] = {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid};
 
 bool is_result(const std::string& file) {
     return std::filesystem::path(file).extension() == ".hdf";
@@ -88,18 +80,19 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
     const bool all = options.model == "all";
     std::vector<Model> models;
     bool viscous = false;
-    for (const ModelKind kind : all_models) {
-        if (!all && (options.model.empty() ? kind != own.kind : options.model != name(kind))) continue;
+    for (const ModelEntry& other : tubule::models) {
+        if (!all && (options.model.empty() ? other.kind != own.kind : options.model != other.name)) continue;
         Model model = own;
-        model.kind = kind;
-        if (kind != own.kind) model.keeps_volume.reset();
+        model.kind = other.kind;
+        if (other.kind != own.kind) model.keeps_volume.reset();
         if (options.Re) model.Re = *options.Re;
         if (options.gamma) model.gamma = *options.gamma;
-        viscous = viscous || kind == ModelKind::stokes || kind == ModelKind::fluid;
+        viscous = viscous || other.viscous;
         models.push_back(model);
     }
     if (!viscous && (options.Re || options.gamma))
-        throw std::invalid_argument("--Re and --gamma belong to --model stokes, fluid or all");
+        throw std::invalid_argument("--Re and --gamma belong to --model " + quoted_names(&ModelEntry::viscous) +
+                                    " or \"all\"");
     return models;
 }
 
@@ -220,10 +213,11 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required();
     command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
-    command->add_option("--model", o->model, "another model than the case's, or all")
-        ->check(CLI::IsMember({"gradient-flow", "overdamped", "stokes", "fluid", "all"}));
-    command->add_option("--Re", o->Re, "of stokes and fluid, where the case has none")->check(CLI::PositiveNumber);
-    command->add_option("--gamma", o->gamma, "friction of stokes and fluid, where the case has none")
+    std::vector<std::string> names{"all"};
+    for (const ModelEntry& m : models) names.insert(names.end() - 1, m.name);
+    command->add_option("--model", o->model, "another model than the case's, or all")->check(CLI::IsMember(names));
+    command->add_option("--Re", o->Re, "of viscous models, where the case has none")->check(CLI::PositiveNumber);
+    command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
         ->check(CLI::NonNegativeNumber);
     command->add_option("--tension", o->tension, "sigma (default: what model, case and shape come to)");
     command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")

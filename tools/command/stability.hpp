@@ -52,8 +52,7 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
 // What the picture of --plot is drawn from, as JSON.
 std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
 
-// "gradient-flow", ...; and with its numbers.
-std::string name(ModelKind kind);
+// Name and numbers.
 std::string words(const Model& model);
 
 }  // namespace tubule

@@ -20,8 +20,8 @@ struct Found {
 };
 
 // What the case says is held, where it looked for an equilibrium.
-Held held_in(const Case& c, const Model& model) {
-    return c.equilibrium && model.kind == ModelKind::gradient_flow ? c.equilibrium->held : axisym::held_by(model);
+Held held_in(const Case& c, const MotionLaw& law) {
+    return c.equilibrium && !law.inextensible ? c.equilibrium->held : axisym::held_by(law);
 }
 
 std::string words_of(const std::vector<Found>& found) {
@@ -58,7 +58,7 @@ std::string csv_of(const std::vector<Found>& found) {
     for (const auto& [model, spectrum] : found)
         for (const axisym::ModeRates& mode : spectrum.modes)
             for (std::size_t i = 0; i < mode.rates.size(); ++i)
-                out += fmt::format("{},{},{},{:.17g}\n", name(model.kind), mode.m, i, mode.rates[i]);
+                out += fmt::format("{},{},{},{:.17g}\n", name(model), mode.m, i, mode.rates[i]);
     return out;
 }
 
@@ -72,8 +72,8 @@ std::string json_of(const std::vector<Found>& found) {
         models += fmt::format(
             "{}\n{{\"model\": {}, \"at_rest\": {}, \"sigma\": {}, \"P\": {}, \"estimated_error\": {}, \"elements\": "
             "{}, \"modes\": [{}]}}",
-            models.empty() ? "" : ",", json(name(model.kind)), spectrum.at_rest() ? "true" : "false",
-            json(spectrum.sigma), json(spectrum.P), json(spectrum.estimated_error), spectrum.elements, modes);
+            models.empty() ? "" : ",", json(name(model)), spectrum.at_rest() ? "true" : "false", json(spectrum.sigma),
+            json(spectrum.P), json(spectrum.estimated_error), spectrum.elements, modes);
     }
     return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
 }
@@ -90,11 +90,11 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
     std::vector<Found> found;
     std::string refused;
     for (const Model& model : models) try {
-            found.push_back(
-                {model, axisym::spectrum(subject.c.energy, model, held_in(subject.c, model), shape, settings)});
+            const MotionLaw law = motion_law(model);
+            found.push_back({model, axisym::spectrum(subject.c.energy, law, held_in(subject.c, law), shape, settings)});
         } catch (const std::invalid_argument& error) {
             if (models.size() == 1) throw;
-            refused += fmt::format("\n{}: none: {}\n", name(model.kind), error.what());
+            refused += fmt::format("\n{}: none: {}\n", name(model), error.what());
         }
     switch (options.output()) {
         case Output::csv:

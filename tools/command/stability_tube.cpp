@@ -44,6 +44,7 @@ struct WaveRow {
 // One model's answer.
 struct ModelReport {
     Model model;
+    MotionLaw law;
     UniformTube tube;  // with the tension of this model
     std::string tension_source;
     std::vector<WaveRow> rows;
@@ -130,21 +131,21 @@ std::vector<theory::Wave> case_waves(const TubeSubject& subject) {
 }
 
 void set_tension(const TubeSubject& subject, ModelReport& report) {
-    const bool flows = report.model.kind != ModelKind::gradient_flow, fixed = theory::keeps_volume(report.model);
-    if (flows && !fixed) {
+    const bool inextensible = report.law.inextensible;
+    if (inextensible && !report.law.keeps_volume) {
         if (subject.tension_source == "as asked")
             throw std::invalid_argument(
                 "--tension must be absent: with the volume free, the tube's balance decides it");
         report.tube.tension = theory::tension_of_free_volume(subject.tube.energy, subject.tube.radius);
         report.tension_source = "of a tube whose volume is free";
-    } else if (subject.tension && (flows || subject.tension_source != "minus the mean pressure of the frame")) {
+    } else if (subject.tension && (inextensible || subject.tension_source != "minus the mean pressure of the frame")) {
         report.tube.tension = *subject.tension, report.tension_source = subject.tension_source;
-    } else if (flows && !subject.waves.empty()) {
-        report.tube.tension = theory::tension_of_waves(subject.tube, report.model, subject.length, case_waves(subject));
+    } else if (inextensible && !subject.waves.empty()) {
+        report.tube.tension = theory::tension_of_waves(subject.tube, report.law, subject.length, case_waves(subject));
         report.tension_source = "what keeps area and volume under the waves of the case, at its start";
     } else {
         report.tension_source =
-            flows ? "not known without waves; choose with --tension" : "a gradient flow has none of itself";
+            inextensible ? "not known without waves; choose with --tension" : "a gradient flow has none of itself";
     }
 }
 
@@ -157,17 +158,13 @@ int waves_of_interest(const StabilityOptions& options, const ModelReport& report
     return std::clamp(static_cast<int>(std::ceil(edge * length / (2 * pi))) + 1, 4, 40);
 }
 
-bool drifts(const ModelReport& report) {
-    return report.model.kind == ModelKind::gradient_flow && !theory::keeps_volume(report.model);
-}
-
 // Zero where only rounding is left.
 double rounded(double value, double scale) {
     return std::abs(value) < 1e-12 * scale ? 0 : value;
 }
 double radius_rate_of(const ModelReport& report) {
     const auto& [energy, R, tension] = report.tube;
-    if (!drifts(report)) return 0;
+    if (!report.law.unconstrained()) return 0;
     return rounded(theory::radius_rate(report.tube) - tension / R,
                    std::abs(density(energy, -1 / R, 0.0).HH) / (R * R * R));
 }
@@ -178,14 +175,14 @@ std::optional<double> least_f_KK_of(const UniformTube& tube) {
     return rounded(*least, std::abs(density(tube.energy, -1 / R, 0.0).HH) * R * R);
 }
 
-// By which factors the waves of the table have grown when the case ends, in gradient flow.
+// By which factors the waves of the table have grown when the case ends, of an extensible membrane.
 void add_factors(const TubeSubject& subject, ModelReport& report) {
-    if (report.model.kind != ModelKind::gradient_flow || !(subject.end > 0)) return;
+    if (report.law.inextensible || !(subject.end > 0)) return;
     std::vector<theory::Wave> waves;
     for (const WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) waves.push_back({*row.n, row.m, 1, 0});
     if (waves.empty()) return;
-    const auto end = theory::waves_in_time(report.tube, report.model, subject.length, waves, {subject.end}).front();
+    const auto end = theory::waves_in_time(report.tube, report.law, subject.length, waves, {subject.end}).front();
     std::size_t k = 0;
     for (WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) row.factor = end.amplitudes[k++];
@@ -193,11 +190,12 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
 }
 
 ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Model& model) {
-    ModelReport report{model, subject.tube, "", {}, {}, {}, {}};
+    const MotionLaw law = motion_law(model);
+    ModelReport report{model, law, subject.tube, "", {}, {}, {}, {}};
     set_tension(subject, report);
     const auto add_row = [&](std::optional<int> n, double q, int m) {
-        if (q == 0 && m < 2 && !(m == 0 && drifts(report))) return;  // its radius, or its place
-        report.rows.push_back({m, n, q, theory::growth(report.tube, model, q, m), std::nullopt});
+        if (q == 0 && m < 2 && !(m == 0 && law.unconstrained())) return;  // its radius, or its place
+        report.rows.push_back({m, n, q, theory::growth(report.tube, law, q, m), std::nullopt});
     };
     for (int m = 0; m <= options.modes; ++m) {
         if (!options.q.empty())
@@ -205,9 +203,9 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
         else
             for (int n = 0; n <= waves_of_interest(options, report, subject.length); ++n)
                 add_row(n, 2 * pi * n / subject.length, m);
-        report.fastest.push_back(theory::fastest_wave(report.tube, model, m));
+        report.fastest.push_back(theory::fastest_wave(report.tube, law, m));
     }
-    report.fastest_fitting = theory::fastest_fitting_wave(report.tube, model, subject.length, options.modes);
+    report.fastest_fitting = theory::fastest_fitting_wave(report.tube, law, subject.length, options.modes);
     if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
     return report;
 }
@@ -239,7 +237,7 @@ std::string ill_posed_words(const UniformTube& tube) {
 // ---- words
 
 void add_rows(Text& out, const ModelReport& report, double end) {
-    const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.model.kind == ModelKind::fluid,
+    const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.law.inertia != 0,
                factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; });
     add(out, "    m {}{:>12} {:>14}{} {:>12}{}\n", numbered ? "   n " : "", "q", "rate",
         swings ? "      frequency" : "", "e-fold in", factors ? fmt::format("  factor until t = {:g}", end) : "");
@@ -323,8 +321,8 @@ std::string csv_of(const std::vector<ModelReport>& reports) {
     add(out, "model,tension,m,n,q,rate,frequency,factor\n");
     for (const ModelReport& report : reports)
         for (const WaveRow& row : report.rows)
-            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.model.kind), report.tube.tension,
-                row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
+            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.model), report.tube.tension, row.m,
+                row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
                 row.factor ? fmt::format("{:.17g}", *row.factor) : "");
     return to_string(out);
 }
@@ -369,7 +367,7 @@ std::string json_of(const ModelReport& report) {
         "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, "
         "\"reduced_tension\": {}, \"radius_rate\": {},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": "
         "{},\n\"fastest_fitting\": {}}}",
-        json(name(report.model.kind)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
+        json(name(report.model)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
         json(report.model.Re), json(report.model.gamma), json(report.tube.tension), json(report.tension_source),
         json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least / 2) : "null",
         list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest, fitting);
@@ -430,7 +428,7 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
             for (int i = 0; i <= samples; ++i) {
                 // The limit of long waves: q = 0 itself may stand for a radius that is kept.
                 q.push_back(std::max(i * q_end / samples, 1e-6 * q_end));
-                rate.push_back(theory::growth(report.tube, report.model, q.back(), m).rate());
+                rate.push_back(theory::growth(report.tube, report.law, q.back(), m).rate());
             }
             for (const theory::Band& band : theory::growing_bands(report.tube, m))
                 for (const double edge : {band.from, band.to})
@@ -455,24 +453,24 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
         add(out, "sphere of radius {:.8g}; {}; tension {:.8g}; for any m <= l\n", sphere.radius, moduli(sphere.energy),
             sphere.tension);
     for (const Model& model : models) {
-        const bool swings = model.kind == ModelKind::fluid,
-                   moves = model.kind == ModelKind::gradient_flow && !theory::keeps_volume(model);
+        const MotionLaw law = motion_law(model);
+        const bool swings = law.inertia != 0, moves = law.unconstrained();
         if (!options.csv) add(out, "\n{}\n", words(model));
         if (!options.csv && moves)
             add(out, "  the radius changes at the rate {:.6g}: rates are those of this instant\n", radius_rate(sphere));
         if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
-            const theory::Growth found = growth(sphere, model, l);
+            const theory::Growth found = growth(sphere, law, l);
             const double s = found.rate();
             if (options.csv) {
-                add(out, "{},{},{:.17g},{:.17g}\n", name(model.kind), l, s, found.frequency());
+                add(out, "{},{},{:.17g},{:.17g}\n", name(model), l, s, found.frequency());
             } else {
                 add(out, "{:>5} {:>14.7g}", l, s);
                 if (swings) add(out, " {:>14.7g}", found.frequency());
                 add(out, " {:>12.6g}{}\n", 1 / std::abs(s), s > 0 ? "  grows" : "");
             }
             list += fmt::format("{}\n  {{\"model\": {}, \"l\": {}, \"rate\": {}, \"roots\": {}}}",
-                                list.empty() ? "" : ",", json(name(model.kind)), l, json(s), json_of(found.roots));
+                                list.empty() ? "" : ",", json(name(model)), l, json(s), json_of(found.roots));
         }
     }
     if (options.json)

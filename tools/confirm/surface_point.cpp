@@ -132,7 +132,8 @@ std::vector<theory::FittingWave> fastest_waves(const Case& c) {
     for (int m = 0; m <= 2; ++m) {
         theory::FittingWave best{0, m, 0, -std::numeric_limits<double>::infinity()};
         for (int n = m < 2 ? 1 : 0; n <= most_waves; ++n) {
-            const double q = 2 * pi * n / start->length, rate = theory::growth(start->tube, c.model, q, m).rate();
+            const double q = 2 * pi * n / start->length,
+                         rate = theory::growth(start->tube, motion_law(c.model), q, m).rate();
             if (std::isfinite(rate) && rate > best.rate) best = {n, m, q, rate};
         }
         all.push_back(best);

@@ -27,7 +27,7 @@ int repeats(const Tube& tube) {
 // E = INT k20 (H-H0)^2 alone.
 std::optional<double> delaunay_period(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
-    if (!tube || c.model.kind != ModelKind::gradient_flow || c.model.keeps_volume.value_or(false)) return std::nullopt;
+    if (!tube || !motion_law(c.model).unconstrained()) return std::nullopt;
     bool only_k20 = true;
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only_k20 = only_k20 && (std::string_view(term.key) == "k20" ? c.energy.k[i] > 0 : c.energy.k[i] == 0);
@@ -53,11 +53,12 @@ std::optional<double> shortest_unduloid(const Case& c) {
 std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.equilibrium) return std::nullopt;
-    if (c.model.kind != ModelKind::gradient_flow) {
-        if (theory::keeps_volume(c.model)) return std::nullopt;
+    const MotionLaw law = motion_law(c.model);
+    if (law.inextensible) {
+        if (law.keeps_volume) return std::nullopt;
         return theory::UniformTube{c.energy, tube->radius, theory::tension_of_free_volume(c.energy, tube->radius)};
     }
-    if (theory::keeps_volume(c.model)) return theory::UniformTube{c.energy, tube->radius, 0};
+    if (law.keeps_volume) return theory::UniformTube{c.energy, tube->radius, 0};
     const theory::UniformTube rest{c.energy, 1 / std::abs(c.energy.H0), 0};
     const double k20 = c.energy.k[0], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
     if (c.energy.H0 == 0 || k20 == 0 || std::abs(theory::radius_rate(rest)) > rounding) return std::nullopt;

@@ -1,0 +1,76 @@
+// The models of motion: the table of those that a case can name, and the law of motion of each.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace tubule {
+
+enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
+
+// What a case says about its law of motion.
+struct Model {
+    ModelKind kind = ModelKind::gradient_flow;
+    double Re = 1;                     // of viscous models: 1/Re is the viscosity
+    double gamma = 0;                  // of viscous models: friction
+    std::optional<bool> keeps_volume;  // by default as the model has it
+};
+
+// One model. Names and allowed keys of case files, options and messages are derived from this table.
+struct ModelEntry {
+    ModelKind kind;
+    const char* name;   // as in case files
+    bool inextensible;  // locally, div u = 0; such models keep the volume unless the case frees it
+    bool inertia;       // the velocity has a start of its own
+    bool viscous;       // takes Re and gamma; other models have friction 1 and no viscosity
+};
+inline constexpr std::array models{
+    ModelEntry{ModelKind::gradient_flow, "gradient-flow", false, false, false},
+    ModelEntry{ModelKind::overdamped, "overdamped", true, false, false},
+    ModelEntry{ModelKind::stokes, "stokes", true, false, true},
+    ModelEntry{ModelKind::fluid, "fluid", true, true, true},
+};
+
+constexpr const ModelEntry& model_entry(ModelKind kind) {
+    for (const ModelEntry& m : models)
+        if (m.kind == kind) return m;
+    throw std::logic_error("a model without an entry in the table");
+}
+inline std::string name(const Model& model) {
+    return model_entry(model.kind).name;
+}
+
+// The names of all models with a property, for messages: "stokes" or "fluid", in quotes.
+inline std::string quoted_names(bool ModelEntry::*has) {
+    std::string text;
+    for (const ModelEntry& m : models)
+        if (m.*has) text += (text.empty() ? "\"" : " or \"") + std::string(m.name) + "\"";
+    return text;
+}
+
+// The dimensionless law of motion of a membrane, theory.md (3.1), u its velocity and b the bending force:
+//   inertia (d_t u + grad_w u) = 2 viscosity div D(u) - friction u - grad p - p H nu + b nu - lambda nu
+// An extensible membrane moves along its normal alone: friction u.nu = b - lambda, without p.
+struct MotionLaw {
+    double inertia = 0;        // 0 or 1
+    double viscosity = 0;      // 1/Re
+    double friction = 0;       // gamma
+    bool inextensible = true;  // div u = 0 along the membrane, by the pressure p
+    bool keeps_volume = true;  // by the number lambda
+
+    // The L2 gradient flow of the energy alone: nothing is kept.
+    bool unconstrained() const { return !inextensible && !keeps_volume; }
+};
+
+inline MotionLaw motion_law(const Model& model) {
+    const ModelEntry& has = model_entry(model.kind);
+    return {.inertia = has.inertia ? 1.0 : 0.0,
+            .viscosity = has.viscous ? 1 / model.Re : 0,
+            .friction = has.viscous ? model.gamma : 1,
+            .inextensible = has.inextensible,
+            .keeps_volume = model.keeps_volume.value_or(has.inextensible)};
+}
+
+}  // namespace tubule
