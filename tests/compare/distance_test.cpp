@@ -39,7 +39,7 @@ TriangleSurface surface(const surface3d::TriangleMesh& base, int order, const Sh
     return surface(mapped_mesh(base, order, [&](const Vector3d& p) { return Vector3d(position(shape, p)); }));
 }
 
-CurvedMesh moved(CurvedMesh mesh, const Motion& motion) {
+CurvedMesh moved(CurvedMesh mesh, const RigidMotion& motion) {
     for (Vector3d& x : mesh.nodes) x = motion(x);
     return mesh;
 }
@@ -75,7 +75,7 @@ Revolution spline(double length, const std::vector<double>& values) {
     return out;
 }
 
-Motion some_motion(double angle) {
+RigidMotion some_motion(double angle) {
     return {Eigen::AngleAxisd(angle, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix(), Vector3d(0.1, -0.3, 0.2)};
 }
 
@@ -252,7 +252,7 @@ TEST(Distance, OfAProfileFromItsMeshFalls) {
 // Before and after.
 void expect_left(const Surface& a, const Surface& b, double before, double most) {
     EXPECT_GT(distance(a, b).hausdorff, before);
-    const Motion motion = alignment(a, b);
+    const RigidMotion motion = alignment(a, b);
     const Distance left = distance(a, b, motion);
     EXPECT_LT(left.hausdorff, most);
     EXPECT_LT((motion.rotation * motion.rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
@@ -293,7 +293,7 @@ TEST(Alignment, SlidesAndTurnsTubes) {
 
 TEST(Alignment, OfClosedProfilesKeepsTheAxis) {
     expect_none_left(spheroid(1, 0.6), spheroid(1, 0.6, 0.7), 0.1);
-    const Motion motion = alignment(spheroid(1, 0.6), spheroid(1, 0.6, 0.7));
+    const RigidMotion motion = alignment(spheroid(1, 0.6), spheroid(1, 0.6, 0.7));
     EXPECT_LT((motion(Vector3d(0, 0, 0.7))).norm(), 1e-7);
 }
 

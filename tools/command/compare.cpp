@@ -214,7 +214,7 @@ void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
 }
 
-double turn_of(const compare::Motion& motion) {  // degrees
+double turn_of(const compare::RigidMotion& motion) {  // degrees
     const Eigen::Matrix3d& r = motion.rotation;
     const Eigen::Vector3d axis(r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1));
     return std::atan2(axis.norm(), r.trace() - 1) * 180 / M_PI;

@@ -53,7 +53,7 @@ std::vector<Sample> quadrature_points(const Surface& surface, const Surface& oth
     return samples;
 }
 
-std::vector<Foot> feet(const std::vector<Sample>& samples, const Surface& b, const Motion& motion) {
+std::vector<Foot> feet(const std::vector<Sample>& samples, const Surface& b, const RigidMotion& motion) {
     std::vector<Foot> out(samples.size());
 #pragma omp parallel for schedule(dynamic, 16) if (samples.size() > coarse_samples * 2)
     for (std::size_t i = 0; i < samples.size(); ++i) out[i] = b.foot(motion(samples[i].x));
@@ -67,7 +67,7 @@ double mean_square(const std::vector<Sample>& samples, const std::vector<Foot>& 
     return sum / area;
 }
 
-Motion after(const Motion& first, const Vector6& step, const Vector3d& centre) {
+RigidMotion after(const RigidMotion& first, const Vector6& step, const Vector3d& centre) {
     const Vector3d turn = step.tail<3>();
     const double angle = turn.norm();
     const Matrix3d rotation = angle > 0 ? Eigen::AngleAxisd(angle, Vector3d(turn / angle)).toRotationMatrix()
@@ -76,12 +76,12 @@ Motion after(const Motion& first, const Vector6& step, const Vector3d& centre) {
 }
 
 struct Fit {
-    Motion motion;
+    RigidMotion motion;
     double mean_square;
 };
 
 // Levenberg's and Marquardt's method: the distance of a moving point grows as fast as it moves away from its foot.
-Fit fitted(const std::vector<Sample>& samples, const Surface& b, const Vector6& free, double size, Motion motion,
+Fit fitted(const std::vector<Sample>& samples, const Surface& b, const Vector6& free, double size, RigidMotion motion,
            int most, double gain) {
     std::vector<Foot> foot = feet(samples, b, motion);
     double value = mean_square(samples, foot), damping = 1e-9;
@@ -104,7 +104,7 @@ Fit fitted(const std::vector<Sample>& samples, const Surface& b, const Vector6& 
         normal.diagonal().array() += damping * normal.trace() + 1e-300;
         Vector6 step = normal.ldlt().solve(right).cwiseProduct(free);
         step.tail<3>() /= size;
-        const Motion next = after(motion, step, centre);
+        const RigidMotion next = after(motion, step, centre);
         std::vector<Foot> there = feet(samples, b, next);
         const double changed = mean_square(samples, there);
         if (!(changed < value)) {
@@ -172,10 +172,10 @@ std::vector<Matrix3d> turns(const Vector3d& moments) {
 }
 
 // Where to begin: motions of `a` towards `b`.
-std::vector<Motion> beginnings(const Surface& a, const Surface& b, const std::vector<Sample>& samples) {
+std::vector<RigidMotion> beginnings(const Surface& a, const Surface& b, const std::vector<Sample>& samples) {
     const bool lone_meridian = a.grain() == 0 && b.grain() == 0;
     const Inertia from = inertia(samples, lone_meridian), to = inertia(quadrature_points(b, a), lone_meridian);
-    std::vector<Motion> out{Motion{}, {Matrix3d::Identity(), to.centre - from.centre}};
+    std::vector<RigidMotion> out{RigidMotion{}, {Matrix3d::Identity(), to.centre - from.centre}};
     if (a.period() > 0) {
         Vector3d across = to.centre - from.centre;
         for (int i = 0; i < shifts_tried; ++i)
@@ -201,7 +201,7 @@ std::vector<Motion> beginnings(const Surface& a, const Surface& b, const std::ve
 
 }  // namespace
 
-Motion alignment(const Surface& a, const Surface& b) {
+RigidMotion alignment(const Surface& a, const Surface& b) {
     require_same_kind(a, b);
     const std::vector<Sample> all = quadrature_points(a, b);
     const std::vector<Sample> few = some(all, coarse_samples), many = some(all, fine_samples);
@@ -210,7 +210,7 @@ Motion alignment(const Surface& a, const Surface& b) {
     for (const Sample& s : all) size = std::max(size, s.x.norm());
 
     std::vector<Fit> fits;
-    for (const Motion& begin : beginnings(a, b, all)) fits.push_back({begin, 0});
+    for (const RigidMotion& begin : beginnings(a, b, all)) fits.push_back({begin, 0});
 #pragma omp parallel for schedule(dynamic, 4)
     for (std::size_t i = 0; i < fits.size(); ++i) fits[i].mean_square = mean_square(few, feet(few, b, fits[i].motion));
     const auto better = [](const Fit& l, const Fit& r) { return l.mean_square < r.mean_square; };
@@ -227,7 +227,7 @@ Motion alignment(const Surface& a, const Surface& b) {
         if (fit.mean_square <= enough && (!best || fit.motion.rotation.trace() > best->motion.rotation.trace() + 1e-6))
             best = &fit;
     // Where the surfaces are not the same, where the distance is least depends on the weights: all of them in the end.
-    const Motion near = fitted(many, b, free, size, best->motion, most_steps, fine_gain).motion;
+    const RigidMotion near = fitted(many, b, free, size, best->motion, most_steps, fine_gain).motion;
     return fitted(all, b, free, size, near, last_steps, last_gain).motion.inverse();
 }
 

@@ -23,7 +23,8 @@ struct OneWay {
 };
 
 // A larger distance near a sample, by steps to and fro that are halved when none helps.
-double climb(const Surface& from, const Surface& to, const Motion& motion, Place place, Vector2d reach, double value) {
+double climb(const Surface& from, const Surface& to, const RigidMotion& motion, Place place, Vector2d reach,
+             double value) {
     static const Vector2d ways[] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}};
     for (int i = 0; i < halvings;) {
         bool higher = false;
@@ -39,7 +40,7 @@ double climb(const Surface& from, const Surface& to, const Motion& motion, Place
 }
 
 // From points x of `from`, moved, to `to`.
-OneWay one_way(const Surface& from, const Surface& to, const Motion& motion) {
+OneWay one_way(const Surface& from, const Surface& to, const RigidMotion& motion) {
     const std::vector<Sample> samples = from.samples(to.grain());
     std::vector<double> away(samples.size());
 #pragma omp parallel for schedule(dynamic, 64)
@@ -80,7 +81,7 @@ OneWay one_way(const Surface& from, const Surface& to, const Motion& motion) {
 
 }  // namespace
 
-Distance distance(const Surface& a, const Surface& b, const Motion& motion) {
+Distance distance(const Surface& a, const Surface& b, const RigidMotion& motion) {
     require_same_kind(a, b);
     const OneWay there = one_way(a, b, motion.inverse()), back = one_way(b, a, motion);
     Distance out;

@@ -8,12 +8,12 @@
 namespace tubule::compare {
 
 // x -> rotation x + shift.
-struct Motion {
+struct RigidMotion {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();
 
     Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return rotation * x + shift; }
-    Motion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
+    RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
 };
 
 // Points of one surface have their nearest points on the other one; both ways count.
@@ -28,11 +28,11 @@ struct Distance {
 // element; the largest distance is that of its points and nodes, the 32 triangles that seem farthest being searched for
 // a larger one between. Throws std::invalid_argument if one is closed and the other one a tube, or their periods
 // differ.
-Distance distance(const Surface& a, const Surface& b, const Motion& motion = {});
+Distance distance(const Surface& a, const Surface& b, const RigidMotion& motion = {});
 
 // The motion of `b` for which the mean square of the distances from `a` to it is least, as far as a search from many
 // beginnings finds it: of closed surfaces translations and rotations, of tubes translations and rotations about z, of
 // two surfaces of revolution what keeps the axis. Throws as distance does.
-Motion alignment(const Surface& a, const Surface& b);
+RigidMotion alignment(const Surface& a, const Surface& b);
 
 }  // namespace tubule::compare

@@ -33,7 +33,7 @@ struct ShapeDifference {
     FramePair frames;
     double time = 0;  // of A's
     Distance distance;
-    Motion motion;                                    // of B, with which it was compared,
+    RigidMotion motion;                               // of B, with which it was compared,
     Eigen::Vector3d moved = Eigen::Vector3d::Zero();  // and how far that moves its centre (of a tube: its axis)
     std::optional<double> energy;  // difference, relative to E_ref of A; where the frames know their energies
 };
