@@ -53,7 +53,7 @@ CurveLaw law_of(const Case& c) {
 double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
     const auto squares = [&](double H0) {
         Bending bending{{}, H0};
-        bending.k[0] = 1;
+        bending.k[term_number("k20")] = 1;
         return CurveForms(space, bending).observe(x);
     };
     const CurveObservation o = squares(0);

@@ -279,6 +279,8 @@ void check_together(Keys& k, const Case& c) {
             if (!law.inextensible) return "must not be \"paper\" for a gradient flow";
             if (law.inertia == 0 && law.friction == 0)
                 return "must not be \"paper\" for a Stokes flow without friction: it leaves rigid motions open";
+            if (const auto key = term_beyond_paper(c.energy); !key.empty())
+                return fmt::format("must not be \"paper\" with energy.{}: it has k20, k40 and k42 only", key);
             return {};
         });
         return;

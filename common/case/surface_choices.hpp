@@ -1,6 +1,10 @@
 // Choices of tier surface3d that a case may make.
 #pragma once
 
+#include <string_view>
+
+#include "common/energy/bending.hpp"
+
 namespace tubule {
 
 // How curvature is recovered from the nodes of curved elements (docs/curvature.md compares them).
@@ -28,5 +32,16 @@ enum class Scheme {
     euler,  // the same of first order
     paper   // the paper's: Euler steps with K explicit and smoothed
 };
+
+// The first term in use that the paper's scheme has no force for; "" if there is none.
+inline std::string_view term_beyond_paper(const Bending& energy) {
+    std::string_view beyond;
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        const std::string_view key = term.key;
+        const bool known = key == "k20" || key == "k40" || key == "k42";
+        if (!known && energy.k[i] != 0 && beyond.empty()) beyond = key;
+    });
+    return beyond;
+}
 
 }  // namespace tubule

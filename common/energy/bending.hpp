@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -68,6 +69,15 @@ constexpr void for_each_bending_term(Visit&& visit) {
         (visit(i, std::get<i>(bending_terms)), ...);
     }
     (std::make_index_sequence<n_bending_terms>{});
+}
+
+// The number of the term with this case key; does not compile if there is none.
+consteval std::size_t term_number(std::string_view key) {
+    std::size_t found = n_bending_terms;
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        if (key == term.key) found = i;
+    });
+    return found < n_bending_terms ? found : throw "no term has this key";
 }
 
 // Moduli of the terms in their order, and the spontaneous curvature; dimensionless.

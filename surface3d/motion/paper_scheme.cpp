@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string_view>
 
+#include "common/case/surface_choices.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/motion/motion_fields.hpp"
 
@@ -14,19 +14,12 @@ namespace tubule::surface3d {
 namespace {
 
 PaperModuli paper_moduli(const Bending& bending) {
-    PaperModuli out{.H0 = bending.H0};
-    for_each_bending_term([&](std::size_t i, const auto& term) {
-        const std::string_view key = term.key;
-        if (key == "k20")
-            out.k20 = bending.k[i];
-        else if (key == "k40")
-            out.k40 = bending.k[i];
-        else if (key == "k42")
-            out.k42 = bending.k[i];
-        else if (bending.k[i] != 0)
-            throw std::invalid_argument(fmt::format("the paper's scheme has k20, k40 and k42, no {}", key));
-    });
-    return out;
+    if (const auto key = term_beyond_paper(bending); !key.empty())
+        throw std::invalid_argument(fmt::format("the paper's scheme has k20, k40 and k42, no {}", key));
+    return {.k20 = bending.k[term_number("k20")],
+            .k40 = bending.k[term_number("k40")],
+            .k42 = bending.k[term_number("k42")],
+            .H0 = bending.H0};
 }
 
 using Frame = Eigen::Matrix<double, 3, 2>;

@@ -1,4 +1,5 @@
-# Copies INPUT (common/energy/bending.hpp) to OUTPUT with one more entry at the end of the list of terms.
+# Copies INPUT (common/energy/bending.hpp) to OUTPUT with one more entry in the list of terms, so that PLACE
+# (first, middle or last) is its place.
 file(READ ${INPUT} text)
 string(FIND "${text}" "bending_terms =" begin)
 string(SUBSTRING "${text}" ${begin} -1 rest)
@@ -6,10 +7,24 @@ string(FIND "${rest}" "});" end) # of the list: within it, lambdas end in "; }"
 if(begin EQUAL -1 OR end EQUAL -1)
   message(FATAL_ERROR "${INPUT} has no list `bending_terms = ...});` any more")
 endif()
-math(EXPR cut "${begin} + ${end} + 1")
+set(term "BendingTerm{\"22\", \"k22\", \"k_{22}H^2K\",
+                [](auto H, auto K, double) { return H * H * K; },
+                [](auto H, auto K, double) { return H * H * H * H + K * K; }}")
+if(PLACE STREQUAL last)
+  math(EXPR cut "${begin} + ${end} + 1")
+  set(term ",\n    ${term}")
+else()
+  if(PLACE STREQUAL first)
+    string(FIND "${rest}" "BendingTerm{" at)
+  else()
+    string(FIND "${rest}" "BendingTerm{\"40\"" at)
+  endif()
+  if(at EQUAL -1)
+    message(FATAL_ERROR "${INPUT}: no place for a term")
+  endif()
+  math(EXPR cut "${begin} + ${at}")
+  set(term "${term},\n    ")
+endif()
 string(SUBSTRING "${text}" 0 ${cut} before)
 string(SUBSTRING "${text}" ${cut} -1 after)
-file(WRITE ${OUTPUT} "${before},
-    BendingTerm{\"22\", \"k22\", \"k_{22}H^2K\",
-                [](auto H, auto K, double) { return H * H * K; },
-                [](auto H, auto K, double) { return H * H * H * H + K * K; }}${after}")
+file(WRITE ${OUTPUT} "${before}${term}${after}")

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A fourth energy term, k22 H^2 K, added by one entry in the list of common/energy/bending.hpp, is known everywhere.
+"""A fourth energy term, k22 H^2 K, added first in the list of common/energy/bending.hpp, is known everywhere.
 
 four_terms_test.py TUBULE TUBULE_FOUR_TERMS: the ordinary program and the one built with that entry.
 """

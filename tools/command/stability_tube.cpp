@@ -168,11 +168,15 @@ double radius_rate_of(const ModelReport& report) {
     return rounded(theory::radius_rate(report.tube) - tension / R,
                    std::abs(density(energy, -1 / R, 0.0).HH) / (R * R * R));
 }
-std::optional<double> least_f_KK_of(const UniformTube& tube) {
+// The k42 above which no wave of m = 0 grows: 2 k42 is its part of f_KK.
+std::optional<double> least_k42_of(const UniformTube& tube) {
     const auto least = theory::least_f_KK(tube);
     if (!least) return least;
     const double R = tube.radius;
-    return rounded(*least, std::abs(density(tube.energy, -1 / R, 0.0).HH) * R * R);
+    Bending others = tube.energy;
+    others.k[term_number("k42")] = 0;
+    return rounded(*least - density(others, -1 / R, 0.0).KK, std::abs(density(tube.energy, -1 / R, 0.0).HH) * R * R) /
+           2;
 }
 
 // By which factors the waves of the table have grown when the case ends, of an extensible membrane.
@@ -263,8 +267,8 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
     if (const double rate = radius_rate_of(report); rate != 0)
         add(out, "  the radius changes at the rate {:.6g}{}: rates are those of this instant\n", rate,
             report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end) : "");
-    if (const auto least = least_f_KK_of(report.tube); least && !ill)
-        add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least / 2);
+    if (const auto least = least_k42_of(report.tube); least && !ill)
+        add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least);
     add_rows(out, report, end);
     const auto name_of = [](const WaveRow& row) {
         return row.n ? fmt::format("n = {}, m = {}", *row.n, row.m) : fmt::format("q = {:.6g}, m = {}", row.q, row.m);
@@ -362,14 +366,14 @@ std::string json_of(const ModelReport& report) {
     const std::string fitting = fits ? fmt::format("{{\"n\": {}, \"m\": {}, \"q\": {}, \"rate\": {}}}", fits->n,
                                                    fits->m, json(fits->q), json(fits->rate))
                                      : "null";
-    const auto least = least_f_KK_of(report.tube);
+    const auto least = least_k42_of(report.tube);
     return fmt::format(
         "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, "
         "\"reduced_tension\": {}, \"radius_rate\": {},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": "
         "{},\n\"fastest_fitting\": {}}}",
         json(name(report.model)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
         json(report.model.Re), json(report.model.gamma), json(report.tube.tension), json(report.tension_source),
-        json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least / 2) : "null",
+        json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least) : "null",
         list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest, fitting);
 }
 

@@ -1,5 +1,7 @@
 """Maps of scans: what became of each point, the lines between, closed forms over them."""
 
+import re
+
 import h5py
 import matplotlib.pyplot as plt
 import numpy as np
@@ -47,8 +49,8 @@ class Axis:
 
     @property
     def label(self):
-        word = self.key.removeprefix("energy.")
-        return NAMES.get(self.key, formula(f"{word[0]}_{{{word[1:]}}}") if word in ("k20", "k40", "k42") else self.key)
+        modulus = re.fullmatch(r"energy\.k(\d+)", self.key)
+        return formula(f"k_{{{modulus[1]}}}") if modulus else NAMES.get(self.key, self.key)
 
     def borders(self):
         """Between the values, and as far beyond the first and last."""

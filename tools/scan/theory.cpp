@@ -60,7 +60,7 @@ std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     }
     if (law.keeps_volume) return theory::UniformTube{c.energy, tube->radius, 0};
     const theory::UniformTube rest{c.energy, 1 / std::abs(c.energy.H0), 0};
-    const double k20 = c.energy.k[0], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
+    const double k20 = c.energy.k[term_number("k20")], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
     if (c.energy.H0 == 0 || k20 == 0 || std::abs(theory::radius_rate(rest)) > rounding) return std::nullopt;
     return rest;
 }
