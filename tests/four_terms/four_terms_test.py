@@ -3,6 +3,7 @@
 
 four_terms_test.py TUBULE TUBULE_FOUR_TERMS: the ordinary program and the one built with that entry.
 """
+import json
 import subprocess
 import sys
 import tempfile
@@ -131,6 +132,29 @@ class FourTerms(unittest.TestCase):
             energy = result["series/energy"][:]
         self.assertGreater(energy[0] - energy[-1], 1e-3 * reference)
         self.assertLess(np.max(np.abs(defect)), ACCURACY * reference)
+
+    def test_without_its_modulus_nothing_changes(self):
+        # A sphere of fixed area and volume is rigid: an overdamped run needs to see that H is the same everywhere.
+        # Expected values are those of the ordinary program; the two are compiled differently.
+        case = self.folder / "sphere.toml"
+        text = f'tier = "axisym"\nenergy = {{k20 = {K20}, k42 = 0.1}}\n'
+        case.write_text(text + 'shape = {kind = "sphere", radius = 1}\nmodel.kind = "overdamped"\ntime.end = 0.1\n')
+        energies, growth = [], []
+        for program in (PROGRAM, FOUR_TERMS):
+            result = self.folder / f"{Path(program).name}_{len(energies)}.hdf"
+            done = run(program, "run", case, "-o", result, "--quiet")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with h5py.File(result, "r") as file:
+                energies.append(file["series/energy"][-1])
+            case_of_tube = self.folder / "tube.toml"
+            case_of_tube.write_text(CASE.replace(f"k22 = {K22}", "k42 = 0.1") + REST)
+            done = run(program, "stability", case_of_tube, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            growth.append(json.loads(done.stdout)["models"][0])
+        self.assertAlmostEqual(energies[1] / energies[0], 1, delta=1e-9)
+        self.assertAlmostEqual(growth[1]["least_k42"], growth[0]["least_k42"], delta=1e-9)
+        for one, other in zip(growth[0]["waves"], growth[1]["waves"], strict=True):
+            self.assertAlmostEqual(other["rate"], one["rate"], delta=1e-9 * max(1, abs(one["rate"])))
 
     def test_picture_has_its_label(self):
         self.result_of(self.perturbed).close()
