@@ -18,6 +18,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/python.hpp"
+#include "tools/command/text.hpp"
 #include "tools/compare/results.hpp"
 
 namespace tubule {
@@ -206,13 +207,6 @@ Comparison compared(const CompareOptions& options) {
 }
 
 // ---- how it is told
-
-using Text = fmt::memory_buffer;
-
-template <class... Args>
-void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
 
 double turn_of(const compare::RigidMotion& motion) {  // degrees
     const Eigen::Matrix3d& r = motion.rotation;

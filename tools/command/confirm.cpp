@@ -19,6 +19,7 @@
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/text.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 #include "tools/scan/scan_file.hpp"
@@ -29,11 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using confirm::Verdict;
-
-template <class... Args>
-void add(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
 
 constexpr int disagreement = 1;
 

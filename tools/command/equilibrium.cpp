@@ -45,7 +45,8 @@ int find(const RunOptions& options) {
     for (const std::string& path : options.cases) {
         cases.push_back(read_case(path, options.sets));
         if (!cases.back().equilibrium)
-            throw CaseError(fmt::format("{}: is a time-dependent case: an equilibrium needs a table [equilibrium]", path));
+            throw CaseError(
+                fmt::format("{}: is a time-dependent case: an equilibrium needs a table [equilibrium]", path));
     }
     const int status = run_cases(options);
     if (options.quiet) return status;

@@ -20,6 +20,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/show_scan.hpp"
+#include "tools/command/text.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
@@ -32,13 +33,6 @@ struct ShowOptions {
     std::optional<long> frame;
 };
 
-using Text = fmt::memory_buffer;
-
-template <class... Args>
-void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
-
 // ---- words
 
 std::string title_of(const Result& result, const std::string& file) {
@@ -47,10 +41,6 @@ std::string title_of(const Result& result, const std::string& file) {
     } catch (const CaseError&) {
         return "";  // written by a version with other keys; the rest of the result can be shown all the same
     }
-}
-
-std::string words(const Value& value) {
-    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
 }
 
 // What only a resumed run can make sense of.
@@ -110,7 +100,7 @@ void add_summary(Text& out, const Result& result, const std::string& file) {
     if (!result.case_text.sets.empty()) line("set", fmt::format("{}", fmt::join(result.case_text.sets, "  ")));
     const bool stopped =
         std::any_of(result.about.begin(), result.about.end(), [](const auto& entry) { return entry.first == "stop"; });
-    for (const auto& [name, value] : result.about) line(name, words(value));
+    for (const auto& [name, value] : result.about) line(name, text_of(value));
     if (!stopped) line("stop", "none yet: the run is going on, or was killed");
     const auto& times = result.series.at(result.series_names.front());
     line("rows", std::to_string(times.size()));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tools/command/json.hpp"
+#include "tools/command/text.hpp"
 #include "tools/scan/plan.hpp"
 #include "tools/scan/scan_file.hpp"
 
@@ -17,18 +18,9 @@ namespace tubule {
 
 namespace {
 
-template <class... Args>
-void add(std::string& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
-
 // One letter an outcome, for maps in a terminal.
 constexpr std::string_view letters = " UWSCPOIXF?";
 static_assert(letters.size() == n_outcomes);
-
-std::string words(const Value& value) {
-    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
-}
 
 std::string ends_of(const Axis& axis) {
     return fmt::format("{} to {}, {} values{}", fmt::join(axis.values.front(), ", "),
@@ -85,7 +77,7 @@ std::string scan_summary(const std::filesystem::path& file) {
     if (scan.boundary && scan.boundary->refine > 0) line("refine", fmt::format("{}", scan.boundary->refine));
     bool stopped = false;
     for (const auto& [key, value] : result.about) {
-        line(key, words(value));
+        line(key, text_of(value));
         stopped = stopped || key == "stop";
     }
     if (!stopped) line("stop", "none yet: the scan is going on, or was killed");

@@ -82,8 +82,7 @@ std::string json_of(const std::vector<Found>& found) {
 
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
                             const std::vector<Model>& models) {
-    const Meridian shape =
-        subject.frame ? axisym::frame_meridian(*subject.frame) : axisym::start_meridian(subject.c);
+    const Meridian shape = subject.frame ? axisym::frame_meridian(*subject.frame) : axisym::start_meridian(subject.c);
     axisym::SpectrumSettings settings;
     settings.last = options.modes, settings.count = options.rates;
     settings.sigma = options.tension;

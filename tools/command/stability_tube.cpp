@@ -13,19 +13,13 @@
 #include "common/theory/waves.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
+#include "tools/command/text.hpp"
 
 namespace tubule {
 
 namespace {
 
 using theory::UniformTube;
-using Text = fmt::memory_buffer;
-
-template <class... Args>
-void add(Text& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
-}
-
 struct Threshold {
     std::string name;
     int m = 0;

@@ -1,0 +1,27 @@
+// Text for a terminal or a file, put together piece by piece.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+using Text = fmt::memory_buffer;
+
+// Appends a formatted piece to a Text or a string.
+template <class Out, class... Args>
+void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+inline std::string text_of(const Value& value) {
+    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+}  // namespace tubule
