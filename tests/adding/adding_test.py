@@ -20,11 +20,6 @@ SOURCE, FOLDER, CMAKE = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 COPY, BUILD = FOLDER / "source", FOLDER / "build"
 PARTS = ["common", "axisym", "surface3d", "tools", "tests", "docs", "cases", "CMakeLists.txt", "README.md"]
 
-TERM = """
-    BendingTerm{"22", "k22", "k_{22}H^2K",
-                [](auto H, auto K, double) { return H * H * K; },
-                [](auto H, auto K, double) { return H * H * H * H + K * K; }}"""
-
 # The unit sphere with its parallels scaled by 1 + q z.
 SHAPE = """// Shape "egg".
 #pragma once
@@ -85,7 +80,9 @@ def copied():
             shutil.copy2(SOURCE / part, fresh / part)
     shutil.rmtree(COPY, ignore_errors=True)
     fresh.rename(COPY)
-    edit("common/energy/bending.hpp", r"(?<=; }})(?=\);)", "," + TERM)
+    terms = "common/energy/bending.hpp"
+    run(CMAKE, f"-DINPUT={SOURCE / terms}", f"-DOUTPUT={COPY / terms}", "-DPLACE=first",
+        "-P", Path(__file__).parent / "add_term.cmake")  # fmt: skip
     (COPY / "common/shapes/egg.hpp").write_text(SHAPE)
     edit("common/case/case.hpp", r"(?=#include \"common/shapes/)", '#include "common/shapes/egg.hpp"\n')
     edit("common/case/case.hpp", r"(?<= Dumbbell,)(?= MeshFile)", " Egg,")

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """A fourth energy term, k22 H^2 K, added first in the list of common/energy/bending.hpp, is known everywhere.
 
-four_terms_test.py TUBULE TUBULE_FOUR_TERMS: the ordinary program and the one built with that entry.
+term_test.py TUBULE TUBULE_FOUR_TERMS: the ordinary program and the one built with that entry (adding_test.py).
 """
 import json
 import subprocess
