@@ -170,25 +170,11 @@ template <int P>
 }
 
 bool CurveForms::add_gradient(const Weights& weights, const double* x, double* out) const {
-    switch (space_.splines().degree()) {
-        case 3:
-            return gradient_kernel<3>(weights, x, out);
-        case 5:
-            return gradient_kernel<5>(weights, x, out);
-        default:
-            return gradient_kernel<7>(weights, x, out);
-    }
+    return for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, x, out); });
 }
 
 void CurveForms::add_hessian(const Weights& weights, const double* x, double* values) const {
-    switch (space_.splines().degree()) {
-        case 3:
-            return hessian_kernel<3>(weights, x, values);
-        case 5:
-            return hessian_kernel<5>(weights, x, values);
-        default:
-            return hessian_kernel<7>(weights, x, values);
-    }
+    return for_degree(space_.splines().degree(), [&](auto P) { return hessian_kernel<P()>(weights, x, values); });
 }
 
 Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::VectorXd& x) const {

@@ -163,26 +163,12 @@ template <int P>
 
 bool Forms::residual(const double* x, const double* v, double* F) const {
     std::fill_n(F, space_.size(), 0.0);
-    switch (space_.degree()) {
-        case 3:
-            return residual_kernel<3>(x, v, F);
-        case 5:
-            return residual_kernel<5>(x, v, F);
-        default:
-            return residual_kernel<7>(x, v, F);
-    }
+    return for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, F); });
 }
 
 void Forms::jacobian_of(const Bending& bending, const double* x, const double* v, double cj, double* values) const {
     std::fill_n(values, pattern_.nonZeros(), 0.0);
-    switch (space_.degree()) {
-        case 3:
-            return jacobian_kernel<3>(bending, x, v, cj, values);
-        case 5:
-            return jacobian_kernel<5>(bending, x, v, cj, values);
-        default:
-            return jacobian_kernel<7>(bending, x, v, cj, values);
-    }
+    return for_degree(space_.degree(), [&](auto P) { return jacobian_kernel<P()>(bending, x, v, cj, values); });
 }
 
 void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
@@ -272,17 +258,7 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
         defect->resize(space_.elements());
         stiffness = defect->data();
     }
-    const auto kernel = [&] {
-        switch (space_.degree()) {
-            case 3:
-                return observe_kernel<3>(x, v, stiffness);
-            case 5:
-                return observe_kernel<5>(x, v, stiffness);
-            default:
-                return observe_kernel<7>(x, v, stiffness);
-        }
-    };
-    const Observation o = kernel();
+    const Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
     if (!defect) return o;
     const int n = space_.elements();
     const auto& breaks = space_.breaks();

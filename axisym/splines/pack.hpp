@@ -2,6 +2,7 @@
 #pragma once
 
 #include <experimental/simd>
+#include <type_traits>
 
 #include "axisym/splines/profile_space.hpp"
 
@@ -14,6 +15,19 @@ inline Pack load(const double* p) {
 }
 inline void store(const Pack& v, double* p) {
     v.copy_to(p, std::experimental::vector_aligned);
+}
+
+// kernel(P) with the degree of the splines, 3, 5 or 7, as a constant.
+template <class Kernel>
+decltype(auto) for_degree(int degree, Kernel&& kernel) {
+    switch (degree) {
+        case 3:
+            return kernel(std::integral_constant<int, 3>{});
+        case 5:
+            return kernel(std::integral_constant<int, 5>{});
+        default:
+            return kernel(std::integral_constant<int, 7>{});
+    }
 }
 
 }  // namespace tubule::axisym

@@ -11,7 +11,6 @@ namespace tubule {
 namespace {
 
 constexpr double bar_interval = 0.1, line_interval = 10;  // seconds
-constexpr int bar_width = 24;
 
 }  // namespace
 
@@ -23,6 +22,24 @@ double ProgressStyle::wall() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+double ProgressStyle::interval() const {
+    return terminal ? bar_interval : line_interval;
+}
+
+void ProgressStyle::show(std::size_t marks, const std::string& words) const {
+    if (terminal)
+        fmt::print(out, "\r[{}{}] {}\x1b[K", std::string(marks, '#'), std::string(bar_width - marks, '.'), words);
+    else
+        fmt::print(out, "{}\n", words);
+    std::fflush(out);
+}
+
+void ProgressStyle::wipe() const {
+    if (!terminal) return;
+    std::fputs("\r\x1b[K", out);
+    std::fflush(out);
+}
+
 std::string duration(double seconds) {
     if (!(seconds < 1e9)) return "?";  // also not a number
     const long s = std::lround(seconds);
@@ -32,13 +49,11 @@ std::string duration(double seconds) {
 
 Progress::Progress(double begin, double end, ProgressStyle style)
     : begin_(begin), end_(end), style_(std::move(style)), last_time_(begin), last_wall_(style_.clock()) {
-    next_ = last_wall_ + (style_.terminal ? bar_interval : line_interval);
+    next_ = last_wall_ + style_.interval();
 }
 
 Progress::~Progress() {
-    if (!drawn_ || !style_.terminal) return;
-    std::fputs("\r\x1b[K", style_.out);
-    std::fflush(style_.out);
+    if (drawn_) style_.wipe();
 }
 
 void Progress::operator()(double time, double energy, double step) {
@@ -53,18 +68,12 @@ void Progress::show(double time, double energy, double step, double now) {
     speed_ = speed_ > 0 ? 0.7 * speed_ + 0.3 * recent : recent;
     last_time_ = time;
     last_wall_ = now;
-    next_ = now + (style_.terminal ? bar_interval : line_interval);
+    next_ = now + style_.interval();
 
     const double fraction = std::clamp((time - begin_) / (end_ - begin_), 0.0, 1.0);
     const auto words = fmt::format("{:3.0f}%  time {:.4g} of {:.4g}  energy {:.6g}  step {:.2g}  left {}",
                                    100 * fraction, time, end_, energy, step, duration((end_ - time) / speed_));
-    if (style_.terminal) {
-        const auto full = static_cast<std::size_t>(fraction * bar_width);
-        fmt::print(style_.out, "\r[{}{}] {}\x1b[K", std::string(full, '#'), std::string(bar_width - full, '.'), words);
-    } else {
-        fmt::print(style_.out, "{}\n", words);
-    }
-    std::fflush(style_.out);
+    style_.show(static_cast<std::size_t>(fraction * ProgressStyle::bar_width), words);
     drawn_ = true;
 }
 

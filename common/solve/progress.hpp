@@ -16,6 +16,12 @@ struct ProgressStyle {
 
     static bool is_terminal(std::FILE* file);
     static double wall();
+
+    static constexpr std::size_t bar_width = 24;
+    double interval() const;  // seconds between two times that something is shown
+    // So many of the marks of the bar, where there is one, and words.
+    void show(std::size_t marks, const std::string& words) const;
+    void wipe() const;  // the bar
 };
 
 // One object a run; the bar is wiped when it goes out of scope.

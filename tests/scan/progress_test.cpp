@@ -1,29 +1,13 @@
 // How far a scan has come, in words.
 #include <gtest/gtest.h>
 
-#include <cstdio>
-#include <string>
-
+#include "tests/support/screen.hpp"
 #include "tools/scan/scan_progress.hpp"
 
 namespace tubule {
 namespace {
 
-struct Screen {
-    double now = 100;
-    std::FILE* file = std::tmpfile();
-    ~Screen() { std::fclose(file); }
-    ProgressStyle style(bool terminal) {
-        return {.quiet = false, .out = file, .terminal = terminal, .clock = [this] { return now; }};
-    }
-    std::string text() const {
-        std::fflush(file);
-        std::rewind(file);
-        std::string all(4096, '\0');
-        all.resize(std::fread(all.data(), 1, all.size(), file));
-        return all;
-    }
-};
+using test::Screen;
 
 // 20 points were known before; 30 more take 10 s, so that the other 50 take 16.7 s.
 TEST(ScanProgress, LinesOffATerminal) {

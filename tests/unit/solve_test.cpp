@@ -15,6 +15,7 @@
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/screen.hpp"
 
 namespace tubule {
 namespace {
@@ -323,22 +324,7 @@ TEST(Stop, namesAndExitCodes) {
     EXPECT_EQ(stop_from_name(""), std::nullopt);
 }
 
-// A progress display on a file and on a clock that the test sets.
-struct Screen {
-    double now = 100;
-    std::FILE* file = std::tmpfile();
-    ~Screen() { std::fclose(file); }
-    ProgressStyle style(bool terminal, bool quiet = false) {
-        return {.quiet = quiet, .out = file, .terminal = terminal, .clock = [this] { return now; }};
-    }
-    std::string text() const {
-        std::fflush(file);
-        std::rewind(file);
-        std::string all(4096, '\0');
-        all.resize(std::fread(all.data(), 1, all.size(), file));
-        return all;
-    }
-};
+using test::Screen;
 
 TEST(Progress, linesOffATerminal) {
     Screen screen;
