@@ -72,7 +72,7 @@ class RealRuns(Charts):
         for row, asked in zip(rows[:2], (1e-2, 1e-4)):
             self.assertLess(float(row["error"]), asked)
             self.assertGreater(float(row["error"]), 1e-9)  # two runs are not the same
-        self.assertIn("for 1e-04: as the case says: energy=0.0001", out)
+        self.assertIn("for 1e-04: settings of the case: energy=0.0001", out)
         self.assertIn("for 1e-06: none reaches it", out)
         self.assertTrue((self.folder / "case.svg").read_text().startswith("<?xml"))
         again, err = self.tubule(*command)
@@ -113,7 +113,7 @@ class Refusals(Charts):
         self.write("list.toml", 'case = "case.toml"\n[[series]]\nvary = { accuracy.energy = 1 }')
         self.write("other.csv", "a,b\n1,2\n")
         for arguments, words in (
-            (["case.toml"], "say what to vary"),
+            (["case.toml"], "it needs --vary"),
             (["missing.toml", *vary], "cannot be read"),
             (["c.toml"], "series.0.vari: unknown key; allowed: name, set, vary, study; did you mean 'vary'?"),
             (["none.toml"], "no such file"),
@@ -121,7 +121,7 @@ class Refusals(Charts):
             (["values.toml"], "reference.values: needs times, one for each of its 1 values"),
             (["study.toml"], "every series is a study"),
             (["list.toml"], "series.0.vary.accuracy.energy: must be a list of values, not 1"),
-            (["study.toml", *vary], "says itself what --vary would say"),
+            (["study.toml", *vary], "--vary applies only to a case"),
             (["case.toml", "--vary", "accuracy.energy"], "must be key=value"),
             (["case.toml", "--vary", "accuracy.energy=1e-2,,1"], "a value is empty"),
             (["case.toml", "--vary", "accuracy.enrgy=1e-2"], "did you mean"),

@@ -456,7 +456,7 @@ class Shown(ScanTest):
         self.scan("case.toml", "--over", f"{AMPLITUDE}=0.1,0.2,0.3")
         self.tubule("plot", self.result, "-o", picture)
         self.assertIn("energy where the run stopped", picture.read_text())
-        for words, *arguments in (("drawn by itself", "--times", "0.1"), ("drawn by itself", self.result)):
+        for words, *arguments in (("drawn alone", "--times", "0.1"), ("drawn alone", self.result)):
             self.assertIn(words, self.tubule("plot", self.result, *arguments, "-o", picture, status=2)[1])
         three = ("--over", "energy.k20=0.2,0.3", "--over", "energy.H0=-2.0,-1.9", "--over", f"{AMPLITUDE}=0,0.1")
         self.scan("case.toml", *three)

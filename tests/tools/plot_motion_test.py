@@ -211,7 +211,7 @@ class Pages(InFolder):
     def test_colours_and_kinds(self):
         file = write(self.folder / "a.hdf")
         texts = self.drawn(file, "--kind", "surface", "--colour", "H,K,p", "--times", "0,2")
-        for words in ("mean curvature H", "Gaussian curvature K", "pressure p, white: its mean 5", "t\u2081 = 2"):
+        for words in ("mean curvature H = \u03ba\u2081 + \u03ba\u2082", "Gaussian curvature K", "pressure p, white: its mean 5", "t\u2081 = 2"):
             self.assertIn(words, texts)
         self.assertFalse([text for text in texts if "velocity" in text or "|u" in text])
         texts = self.drawn(file, "--kind", "surface", "--colour", "u_n", "--times", "1")
@@ -229,8 +229,8 @@ class Pages(InFolder):
 
     def test_refusals(self):
         file = write(self.folder / "a.hdf", pressure=False)
-        self.refused("not all of its frames hold p to colour by", file, "--colour", "p")
-        self.refused("'T' is none of u_n, H, K, p", file, "--colour", "H,T")
+        self.refused("not all of its frames have p", file, "--colour", "p")
+        self.refused("'T' is not one of u_n, H, K, p", file, "--colour", "H,T")
         self.refused("--plane: z = 2 meets none of the surfaces", file, "--plane", "z=2")
         for plane in ("w=0", "z=", "z=e", "z=nan", "z"):
             self.refused(f"'{plane}' is not x, y or z = number", file, "--plane", plane)
@@ -238,7 +238,7 @@ class Pages(InFolder):
         shutil.copy(file, half)
         with h5py.File(half, "a") as damaged:
             del damaged["frames/000001/PointData/u"]
-        self.refused("frame 000001: of u and u_n it has only one", half)
+        self.refused("frame 000001: has only one of u and u_n", half)
 
 
 class Balance(InFolder):
@@ -291,7 +291,7 @@ end = 0.01
         texts = self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25", program=TUBULE)
         self.assertIn("cut x = \u22120.25", texts)
         texts = self.drawn(file, "--kind", "surface", "--colour", "p,H", "--times", "0.01", program=TUBULE)
-        self.assertIn("mean curvature H", texts)
+        self.assertIn("mean curvature H = \u03ba\u2081 + \u03ba\u2082", texts)
         self.assertTrue(any(text.startswith("pressure p, white: its mean") for text in texts))
 
     def test_refusals(self):

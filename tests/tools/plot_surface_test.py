@@ -121,7 +121,7 @@ class Surfaces(InFolder):
 
     def test_one_surface_twice_side_by_side(self):
         texts = self.drawn(self.torus)
-        for words in ("A torus", "mean curvature H", "Gaussian curvature K"):
+        for words in ("A torus", "mean curvature H = \u03ba\u2081 + \u03ba\u2082", "Gaussian curvature K"):
             self.assertIn(words, texts)
         self.assertNotIn("bending energy E", texts)  # one row
         picture = matplotlib.image.imread(self.folder / "p.png")[..., :3]
@@ -144,12 +144,12 @@ class Surfaces(InFolder):
         self.assertIn("t\u2081 = 2", texts)
         self.assertNotIn("t\u2082 = 3", texts)
         self.assertNotIn("bending energy E", texts)
-        self.assertNotIn("mean curvature H", self.drawn(self.tube, "--kind", "energy"))
+        self.assertNotIn("mean curvature H = \u03ba\u2081 + \u03ba\u2082", self.drawn(self.tube, "--kind", "energy"))
         self.assertIn("bending energy E", self.drawn(self.torus, "--kind", "energy"))
 
     def test_both_tiers_in_one_picture(self):
         texts = self.drawn(write(self.folder / "a.hdf", times=[0, 1]), self.torus)
-        for words in ("(a)", "(b)", "(c)", "mean curvature H (left halves)", "mean curvature H"):
+        for words in ("(a)", "(b)", "(c)", "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves)", "mean curvature H = \u03ba\u2081 + \u03ba\u2082"):
             self.assertIn(words, texts)
 
     def test_refusals(self):
@@ -174,8 +174,8 @@ class Surfaces(InFolder):
         def lost(file):
             del file["meshes"]
 
-        damaged(nan, "frame 000000 holds numbers that are not finite")
-        damaged(short, "frame 000000: Points, normal, H, K must have one row a point")
+        damaged(nan, "frame 000000 contains numbers that are not finite")
+        damaged(short, "frame 000000: Points, normal, H, K must have one row per point")
         damaged(lost, "damaged or not a result of tubule")
 
 

@@ -406,7 +406,7 @@ class Curves(InFolder):
             for number, frame in enumerate(f["frames"].values()):
                 frame.attrs["parameter"] = 0.9 - 0.1 * number
         texts = self.drawn(file)
-        bar = "mean curvature H (left halves), white: H\u2080 = \u22122"
+        bar = "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves), white: H\u2080 = \u22122"
         for words in (bar, "shape 2", "number of the shape", "= 0.7"):
             self.assertIn(words, "\n".join(texts).split("\n"))
         self.assertFalse([text for text in texts if text.startswith("t\u2081")])
@@ -466,7 +466,7 @@ class Refusals(InFolder):
 
         damaged(short, "frame 000001: z, r, H, K must be lists of one length")
         damaged(short_velocity, "frame 000001: z, r, H, K, u_t must be lists of one length")
-        damaged(nan, "frame 000001 holds numbers that are not finite")
+        damaged(nan, "frame 000001 contains numbers that are not finite")
         damaged(lack, "frame 000001 lacks K")
         damaged(ragged, "series of different lengths")
         damaged(text, "its case is not valid TOML")

@@ -24,7 +24,7 @@ class Truth:
     scale: float  # errors are relative to it
     known_to: float  # relative, too
     source: str
-    key: str = ""  # of the run that it is
+    key: str = ""  # of its run
 
 
 def read_options():
@@ -42,15 +42,15 @@ def read_options():
 
 
 def chart_of(options):
-    """The chart that the file and the options describe, checked. BadChart."""
+    """The chart that the file and the options describe, validated. Raises BadChart."""
     if "series" in toml_of(Path(options.file)):
         for name in ("vary", "also", "map"):
             if getattr(options, name):
-                raise BadChart(f"{options.file}: is a chart, which says itself what --{name} would say")
+                raise BadChart(f"{options.file}: is a chart file; --{name} applies only to a case")
         chart = read_chart(options.file, options.study)
     else:
         if not options.vary:
-            raise BadChart(f"{options.file}: is a case: say what to vary, such as --vary discretisation.elements=20,40")
+            raise BadChart(f"{options.file}: is a case: it needs --vary, such as --vary discretisation.elements=20,40")
         chart = chart_of_case(options.file, options.vary, options.also)
         chart.map = map_option(options.map) if options.map else None
     chart.sets |= {key: plain(value) for key, value in (assignment(text, "--set") for text in options.set)}
@@ -71,7 +71,7 @@ def chart_of(options):
 
 
 def outputs_of(options):
-    """Pictures to write. BadChart for what cannot be written, before any work is done."""
+    """Pictures to write. Raises BadChart, before any run, for a picture that cannot be written."""
     outputs = [Path(text) for text in options.output] or [Path(Path(options.file).stem + ".svg")]
     for path in outputs:
         if path.suffix.lower() not in FORMATS:
@@ -82,7 +82,7 @@ def outputs_of(options):
 
 
 def checked(program, jobs):
-    """All cases are read before any is run; that of the first as TOML. BadChart."""
+    """Validates all cases before any run; returns the first as TOML. Raises BadChart."""
     first = None
     for job in jobs:
         text, error = program.check(job)
@@ -94,7 +94,7 @@ def checked(program, jobs):
 
 def times_of(case):
     if "time" not in case:
-        raise BadChart("the case has no [time]: charts are of runs")
+        raise BadChart("the case has no [time]; a chart needs runs in time")
     output, end = case["time"].get("output", []), case["time"]["end"]
     return sorted({float(t) for t in [*output, end] if t > 0})
 
@@ -103,7 +103,7 @@ def times_of(case):
 
 
 def truth_of(chart, times, runs, own, program):
-    """What errors are measured against. BadChart if there is none."""
+    """The reference for errors. Raises BadChart if there is none."""
     reference = chart.reference
     if reference.values:
         return Truth(dict(zip(times, reference.values)), reference.scale, reference.known_to, reference.source)
@@ -113,14 +113,14 @@ def truth_of(chart, times, runs, own, program):
     if reference.sets is not None:
         whole = [run for run in whole if run.key == own.key]
     if not whole:
-        raise BadChart("no run got to the end of the chart: there is no reference to measure errors against")
+        raise BadChart("no run reached the end of the chart, so errors have no reference")
     best = min(whole, key=lambda run: (run.stated_error or float("inf"), -run.cpu_s))
     scale = best.scale if "energy" in chart.quantity else max(map(abs, best.values.values()))
     return Truth({time: best.values[time] for time in times}, scale or 1.0, best.stated_error, "own finest run", best.key)
 
 
 def truth_of_result(path, quantity, times, program):
-    """BadChart."""
+    """Raises BadChart."""
     from results import BadInput, read_result
 
     try:
@@ -133,7 +133,7 @@ def truth_of_result(path, quantity, times, program):
     missing = [time for time in times if time not in at]
     if missing:
         listed = ", ".join(f"{time:g}" for time in missing)
-        raise BadChart(f"{path}: has no row at t = {listed}: make it with these outputs")
+        raise BadChart(f"{path}: has no row at t = {listed}: compute it with these output times")
     values = {time: float(at[time]) for time in times}
     about = result.about
     scale = float(about.get("E_ref", 0)) if "energy" in quantity else max(map(abs, values.values()))
@@ -141,18 +141,18 @@ def truth_of_result(path, quantity, times, program):
 
 
 def error_of(run, truth):
-    """The largest at the times that it reached; None if there are none."""
+    """The largest error at the times that the run reached; None if it reached none."""
     errors = [abs(run.values[time] - value) / truth.scale for time, value in truth.values.items() if time in run.values]
     return max(errors, default=None)
 
 
 def known_error(run, truth):
-    """Of a finished run: no smaller than the reference is known."""
+    """Error of a finished run: at least the error of the reference."""
     return max(error_of(run, truth), truth.known_to)
 
 
 def front_of(runs, truth):
-    """Those that no other beats in both error and time, cheapest first."""
+    """Runs for which no other is better in both error and time, cheapest first."""
     front = []
     for run in sorted(runs, key=lambda run: (run.cpu_s, known_error(run, truth))):
         if not front or known_error(run, truth) < known_error(front[-1], truth):
@@ -202,7 +202,7 @@ def work_precision(chart, options, outputs, program, say):
     first = checked(program, jobs)
     times = chart.times or times_of(first)
     if chart.reference.result:
-        truth_of(chart, times, [], own, program)  # refused before any run
+        truth_of(chart, times, [], own, program)  # fails before any run
     table = open_table(chart, options, outputs, times)
     if options.draw:
         every = len(jobs)
@@ -230,7 +230,7 @@ def work_precision(chart, options, outputs, program, say):
 
 
 class Bisection:
-    """Of the values of a map: the largest stable one, as if all below it were stable, too."""
+    """The largest stable value of a map, assuming that all values below it are stable."""
 
     def __init__(self, chart, series, against):
         self.chart, self.series, self.against = chart, series, against
@@ -255,7 +255,7 @@ class Bisection:
 
     @property
     def limits(self):
-        """Largest stable and smallest unstable value; None where there is none."""
+        """Largest stable and smallest unstable value, or None."""
         return (
             self.values[self.low] if self.low >= 0 else None,
             self.values[self.high] if self.high < len(self.values) else None,
@@ -303,7 +303,7 @@ def main():
             print(words, file=sys.stderr, flush=True)
 
     missing = [name for name in ("numpy", "matplotlib", "h5py") if importlib.util.find_spec(name) is None]
-    if missing:  # told before anything runs
+    if missing:  # reported before any run
         packages = " ".join(f"python3-{name}" for name in missing)
         print(f"tubule chart: {sys.executable} lacks {', '.join(missing)}; install {packages}", file=sys.stderr)
         return EXIT_UNAVAILABLE
@@ -317,7 +317,7 @@ def main():
         print(error, file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
-        print("tubule chart: interrupted; the same command goes on", file=sys.stderr)
+        print("tubule chart: interrupted; run the same command to continue", file=sys.stderr)
         return EXIT_INTERRUPTED
     if status == 0:
         for path in [*outputs, outputs[0].with_suffix(".csv")]:

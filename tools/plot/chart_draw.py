@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 FLOOR = 1e-16  # an error of zero is drawn here
 SMALL = 6.5
-SIDE = 2.6  # inches beside the axes, for words
+SIDE = 2.6  # inches beside the axes, for text
 CHARACTERS = 60  # of a line there
 FAILED = {"marker": "x", "ls": "", "markersize": 5, "mew": 1.1}
 
@@ -26,7 +26,7 @@ def series_styles(chart):
 def label_axes(axes):
     axes.tick_params(which="both", top=True, right=True)
     low, high = axes.get_xlim()
-    if high < 100 * low:  # powers of ten alone would say too little
+    if high < 100 * low:  # powers of ten alone are too sparse
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
@@ -38,7 +38,7 @@ def words_beside(figure, left, lines, height):
 
 
 def sorted_runs(jobs, runs, truth, names):
-    """Runs of each series that reached all times, by key; and those that did not, with their jobs."""
+    """Runs of each series that reached all times, by key, and the others with their jobs."""
     by_series = {name: {} for name in names}
     failed = {}
     for job in jobs:
@@ -53,7 +53,7 @@ def sorted_runs(jobs, runs, truth, names):
 
 
 def stops_in_words(failed):
-    """A line for each way in which runs of a series stopped early."""
+    """One line per reason for which runs of a series stopped early."""
     stops = {}
     for job, run in failed.values():
         stops.setdefault((job.series, run.outcome), []).append((job, run))
@@ -140,7 +140,7 @@ def stability_map(chart, lines, jobs, runs, outputs):
             if low:
                 border.append((x, (low * high) ** 0.5 if high else low))
         axes.loglog(*columns(sorted(border)), color=styles[name]["color"], zorder=2)
-        shift *= 1.03  # so that marks of several series at one place can be told apart
+        shift *= 1.03  # so that coinciding marks of several series are distinguishable
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("mesh width h (edge of a triangle of the mean area)" if by_width else chart.against)

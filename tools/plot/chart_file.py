@@ -1,4 +1,4 @@
-"""What a chart is to run: read from a chart file (TOML, docs/charts.md) or from options. Standard library only."""
+"""The description of a chart, from a chart file (TOML, docs/charts.md) or from options. Standard library only."""
 
 import difflib
 import itertools
@@ -55,7 +55,7 @@ class Map:
 
     @property
     def values(self):
-        """Rounded to three digits, as one would give them."""
+        """The values, rounded to three digits."""
         count = math.ceil(self.per_decade * math.log10(self.high / self.low) - 1e-9) + 1
         return [float(f"{self.low * 10 ** (i / self.per_decade):.3g}") for i in range(count)]
 
@@ -76,7 +76,7 @@ class Chart:
 
     @property
     def against(self):
-        """Of a map: the key that it is drawn over."""
+        """The key on the horizontal axis of a map."""
         return list(self.series[0].vary)[-1]
 
     def job(self, series, varied, more=()):
@@ -92,7 +92,7 @@ class Chart:
         return Job(series.name, self.case, tuple(f"{key}={value_text(value)}" for key, value in sets.items()), told)
 
     def jobs(self):
-        """Of error against time; maps choose theirs as they go."""
+        """Jobs of a chart of error against time; maps choose theirs as they proceed."""
         return [
             self.job(series, list(zip(series.vary, values)))
             for series in self.series
@@ -110,7 +110,7 @@ class Chart:
 
 
 class Reader:
-    """A table of the file, and where it is, for messages."""
+    """A table of the file, with its place for messages."""
 
     def __init__(self, path, table, where, keys):
         self.path, self.table, self.where = path, table, where
@@ -165,7 +165,7 @@ class Reader:
 
 
 def toml_of(path):
-    """BadChart."""
+    """Raises BadChart."""
     try:
         return tomllib.loads(path.read_text())
     except OSError as error:
@@ -175,7 +175,7 @@ def toml_of(path):
 
 
 def read_chart(path, study):
-    """The chart of a file, without the series marked as a study unless asked for. BadChart."""
+    """The chart of a file, without the series marked as a study unless requested. Raises BadChart."""
     path = Path(path)
     root = Reader(path, toml_of(path), "", CHART_KEYS)
     if "case" not in root.table:
@@ -200,7 +200,7 @@ def read_series(path, table, index, study):
     if table.get("study") not in (None, True, False):
         reader.fail("study", "true or false")
     sets, vary = reader.sets("set"), reader.vary("vary")
-    name = reader.text("name") or words(sets) or "as the case says"
+    name = reader.text("name") or words(sets) or "settings of the case"
     return None if table.get("study") and not study else Series(name, sets, vary)
 
 
@@ -241,7 +241,7 @@ def read_map(path, table):
 
 
 def split(text):
-    """At commas that are not within brackets."""
+    """Splits at commas outside brackets."""
     parts, depth = [""], 0
     for letter in text:
         depth += (letter in "[{") - (letter in "]}")
@@ -253,7 +253,7 @@ def split(text):
 
 
 def plain(text):
-    """A value as TOML has it; a bare word is text."""
+    """A TOML value; a bare word is a string."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -272,7 +272,7 @@ def words(sets):
 
 
 def chart_of_case(path, varied, also):
-    """Lines: every combination of all keys varied but the last, and those of --also. BadChart."""
+    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadChart."""
     keys = {}
     for text in varied:
         key, values = assignment(text, "--vary")
@@ -283,7 +283,7 @@ def chart_of_case(path, varied, also):
     vary = {last: keys[last]}
     lines = [dict(zip(outer, values)) for values in itertools.product(*(keys[key] for key in outer))]
     lines += [{k: plain(v) for k, v in (assignment(one, "--also") for one in split(text))} for text in also]
-    series = [Series(words(sets) or "as the case says", sets, dict(vary)) for sets in lines]
+    series = [Series(words(sets) or "settings of the case", sets, dict(vary)) for sets in lines]
     return Chart(Path(path), Path(path), series=series)
 
 
@@ -291,17 +291,17 @@ def map_option(text):
     key, values = assignment(text, "--map")
     numbers = [plain(value) for value in values.split(":")]
     if len(numbers) not in (2, 3) or not all(type(n) in (int, float) and n > 0 for n in numbers):
-        raise BadChart(f"--map {text}: must be key=from:to or key=from:to:n, n values a decade, all above 0")
+        raise BadChart(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
     return Map(key, float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else 6, 60)
 
 
 def check(chart):
-    """What no key can tell alone. BadChart."""
+    """Checks that involve several keys. Raises BadChart."""
     path = chart.path
     if not chart.case.is_file():
         raise BadChart(f"{path}: case: {chart.case}: no such file")
     if not chart.series:
-        raise BadChart(f"{path}: every series is a study: choose --study")
+        raise BadChart(f"{path}: every series is a study; add --study")
     times = chart.times
     if times and (times[0] <= 0 or any(a >= b for a, b in zip(times, times[1:]))):
         raise BadChart(f"{path}: times: must be growing numbers above 0, not {times}")

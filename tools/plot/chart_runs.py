@@ -1,4 +1,4 @@
-"""What a chart runs, each run a process of its own, and the table that remembers them (CSV). Standard library only.
+"""The runs of a chart, each in its own process, and the table that stores them (CSV). Standard library only.
 
 A run that crashes or hangs is an outcome like others. The table is written anew after every run, so a chart that was
 stopped goes on where it was.
@@ -18,14 +18,14 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-LARGEST_GROWTH = 1.1  # of the total energy over that of the start: more is called unstable
+LARGEST_GROWTH = 1.1  # of the total energy over that of the start; more counts as unstable
 STATUS = {2: "refused", 130: "interrupted"}
 PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True)
 class Job:
-    """What to run. `sets` are all overrides, in order; `told` those that tell it from others of its series."""
+    """What to run. `sets` are all overrides, in order; `told` those that distinguish it within its series."""
 
     series: str
     case: Path
@@ -34,14 +34,14 @@ class Job:
 
     @property
     def key(self):
-        """The same for the same computation: the text of the case and what is set."""
+        """Identifies a computation: from the text of the case and the overrides."""
         text = self.case.read_text() + "\n".join(self.sets)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 @dataclass
 class Run:
-    """What came of it. `values` at the times of the chart, as far as it got."""
+    """The outcome of a job. `values` at the times of the chart that it reached."""
 
     key: str
     outcome: str  # a stop reason; crashed, too slow, refused
@@ -66,7 +66,7 @@ class Run:
 
 
 def value_text(value):
-    """As --set and a case file want it."""
+    """A value in the syntax of --set and case files."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list):
@@ -79,11 +79,11 @@ class Program:
 
     def __init__(self, path, folder, limit, quantity):
         self.path, self.folder, self.limit, self.quantity = path, folder, limit, quantity
-        # One thread: then CPU time is what a run needs, not what idle threads spend waiting.
+        # One thread: CPU time then excludes the waiting of idle threads.
         self.environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
 
     def check(self, job):
-        """The case with all overrides as text of TOML, or what is wrong with it."""
+        """The case with all overrides as TOML text, or its error."""
         done = subprocess.run([self.path, "check", job.case, *set_options(job)], capture_output=True, text=True)
         return (done.stdout, None) if done.returncode == 0 else (None, done.stderr.strip())
 
@@ -102,7 +102,7 @@ class Program:
         return Going(job, process, result, time.monotonic() + self.limit)
 
     def look(self, going):
-        """The Run if it has ended, else None. Kills what is over its limit."""
+        """The Run if it has ended, else None. Kills a run that exceeds its limit."""
         pid, status, usage = os.wait4(going.process.pid, os.WNOHANG)
         if pid == 0 and time.monotonic() < going.deadline:
             return None
@@ -127,7 +127,7 @@ class Program:
         return run
 
     def read(self, going, run):
-        """What the result says, journal included; nothing if there is none."""
+        """Content of the result, journal included; empty if there is none."""
         shown = [
             subprocess.run([self.path, "show", going.result, form], capture_output=True, text=True)
             for form in ("--json", "--csv")
@@ -150,7 +150,7 @@ class Program:
 
 
 def rounded(value):
-    """As the table keeps it, so that a chart drawn from the table is the same."""
+    """The run as the table stores it, so that a chart drawn from the table is the same."""
     return float(f"{value:.5g}")
 
 
@@ -171,7 +171,7 @@ def set_options(job):
 
 
 class Table:
-    """Runs that are done, by key, in a file."""
+    """Finished runs, by key, in a file."""
 
     COLUMNS = ("series", "settings", "outcome", "stop_time", "error", "front", "chosen_for", "cpu_s", "stated_error",
                "elements", "steps", "width", "growth", "E_ref")  # fmt: skip
@@ -248,14 +248,14 @@ class Table:
 
 
 class Runner:
-    """Runs jobs, some at a time, and keeps the table."""
+    """Runs jobs, several at a time, and maintains the table."""
 
     def __init__(self, program, table, jobs, at_once, repeats=1, say=print):
         self.program, self.table, self.jobs = program, table, jobs
         self.at_once, self.repeats, self.say, self.number = at_once, repeats, say, 0
 
     def run(self, jobs):
-        """Those that are not in the table yet."""
+        """Jobs that are not in the table yet."""
         done = self.table.runs
         left = list({job.key: job for job in jobs if job.key not in done}.values())
         if len(jobs) > len(left) and left:

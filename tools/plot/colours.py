@@ -10,9 +10,9 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from labels import number
 
-COVERED = 0.98  # part of all membrane area whose curvature lies inside the colour scale
-MARGIN = 1.25  # the colour scale reaches further than that by this factor
-ROUNDING = 1e-9  # a uniform tube has K = 0 but for this, which must not be blown up to full colour
+COVERED = 0.98  # part of the membrane area whose curvature is inside the colour scale
+MARGIN = 1.25  # the colour scale extends beyond that by this factor
+ROUNDING = 1e-9  # a uniform tube has K = 0 up to this; the colour scale must not magnify it
 
 
 @dataclass
@@ -27,7 +27,7 @@ class Colours:
 
 
 def colour_scale(values, areas, centre):
-    """A symmetric scale around `centre` that covers nearly all area: a pinching neck does not bleach the rest."""
+    """A symmetric scale around `centre` that covers nearly all area, so that a pinching neck does not bleach the rest."""
     distance = np.abs(np.concatenate(values) - centre)
     area = np.concatenate(areas)
     order = np.argsort(distance)
@@ -42,10 +42,10 @@ def colour_scale(values, areas, centre):
 
 
 def curvature_colours(results, frames, areas):
-    """Of H and K on these frames; `areas` has the parts of area that belong to their values, one list a frame."""
+    """Colours of H and K on these frames; `areas` has the area of each of their values, one list per frame."""
     common_H0 = {result.H0 for result in results}
     centre = common_H0.pop() if len(common_H0) == 1 else 0.0
-    label = "mean curvature H{}" + (f", white: H\u2080 = {number(centre)}" if centre else "")
+    label = "mean curvature H = \u03ba\u2081 + \u03ba\u2082{}" + (f", white: H\u2080 = {number(centre)}" if centre else "")
     H = Colours("PuOr", *colour_scale([frame.H.ravel() for frame in frames], areas, centre), label)
     K = Colours("RdBu_r", *colour_scale([frame.K.ravel() for frame in frames], areas, 0.0), "Gaussian curvature K{}")
     return H, K

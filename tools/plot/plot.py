@@ -26,7 +26,7 @@ def arguments():
     parser.add_argument("-o", "--output", action="append", default=[])
     parser.add_argument("--times", default="")
     parser.add_argument("--colour", default="", help="quantities to colour surfaces by: u_n,H,K,p")
-    parser.add_argument("--plane", default="z=0", help="of the cuts")
+    parser.add_argument("--plane", default="z=0", help="plane of the cuts")
     parser.add_argument("--kind", choices=NOTHING, default="all")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
@@ -139,7 +139,7 @@ def read_arguments(options):
     options.colour = [name for name in options.colour.split(",") if name]
     for name in options.colour:
         if name not in COLOURS:
-            raise ValueError(f"--colour: '{name}' is none of {', '.join(COLOURS)}")
+            raise ValueError(f"--colour: '{name}' is not one of {', '.join(COLOURS)}")
     plane = re.fullmatch(r"([xyz])=([-+.\deE]+)", options.plane)
     try:
         options.plane = plane[1], float(plane[2])
@@ -171,7 +171,7 @@ def main():
     try:
         if any(scan.is_scan(path) for path in options.results):
             if len(options.results) > 1 or options.times or options.colour or options.kind != "all":
-                raise BadInput(f"{options.results[0]}: a scan is drawn by itself, without --times, --colour and --kind")
+                raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour and --kind")
             scan.draw(options.results[0], outputs)
         else:
             draw(options.results, outputs, options)

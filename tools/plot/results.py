@@ -11,7 +11,7 @@ from labels import BadCase, effective_case, flatten
 
 
 class BadInput(Exception):
-    """One line for the user: what is wrong with which file or argument."""
+    """One line for the user: which file or argument is wrong, and why."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Frame:
         return min(self.r[0], self.r[-1]) > 1e-9 * self.r.max() and bool((np.diff(self.z) >= 0).all())
 
     def largest(self, name):
-        """Of |u_n|, |u_t| or |u_theta|; 0 where there is none."""
+        """Largest |u_n|, |u_t| or |u_theta|; 0 if there is none."""
         values = getattr(self, name)
         return 0.0 if values is None else float(np.abs(values).max())
 
@@ -80,7 +80,7 @@ class Result:
     series: dict  # name -> 1-D array, times strictly increasing
     frames: list  # of Frame, times strictly increasing
     surfaces: list  # of Surface, likewise
-    meanings: dict = field(default_factory=dict)  # name -> what the series is; older files do not say
+    meanings: dict = field(default_factory=dict)  # name -> what the series is; missing in older files
 
     @property
     def title(self):
@@ -97,7 +97,7 @@ class Result:
 
     @property
     def is_equilibrium(self):
-        """Stationary shapes, numbered in place of times."""
+        """Stationary shapes, with indices as times."""
         return "equilibrium" in self.case
 
     @property
@@ -117,7 +117,7 @@ class Result:
 
     @property
     def stopped_early(self):
-        """The reason ("pinch-off", ...) when the run did not get to its end, else None."""
+        """The stop reason ("pinch-off", ...) if the run ended early, else None."""
         reason = self.about.get("stop", "unfinished")
         return None if reason in ("finished", "stationary") else str(reason)
 
@@ -202,7 +202,7 @@ def _arrays(path, name, group, keys):
         raise BadInput(f"{path}: frame {name} lacks {', '.join(missing)}")
     arrays = [np.asarray(group[key], float) for key in keys]
     if not all(np.isfinite(array).all() for array in arrays):
-        raise BadInput(f"{path}: frame {name} holds numbers that are not finite")
+        raise BadInput(f"{path}: frame {name} contains numbers that are not finite")
     return arrays
 
 
@@ -226,8 +226,8 @@ def _surface(path, name, record, mesh):
     numbers = [array for key, array in arrays.items() if key not in ("normal", "u")]
     if any(a.shape != points.shape for a in vectors) or any(a.shape != points.shape[:1] for a in numbers):
         names = ", ".join(["Points", "normal", "H", "K", *keys[3:]])
-        raise BadInput(f"{path}: frame {name}: {names} must have one row a point")
+        raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
     if ("u" in arrays) != ("u_n" in arrays):
-        raise BadInput(f"{path}: frame {name}: of u and u_n it has only one")
+        raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
     of_cells = {key: array[cells] for key, array in arrays.items()}
     return Surface(float(record.attrs["time"]), order, mesh.attrs["period"] == 0, points[cells], **of_cells)

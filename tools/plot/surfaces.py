@@ -40,7 +40,7 @@ def choose_colours(results, wanted):
     for name in wanted:
         for result in results:
             if any(getattr(surface, name) is None for surface in result.surfaces):
-                raise BadInput(f"{result.path}: not all of its frames hold {name} to colour by")
+                raise BadInput(f"{result.path}: not all of its frames have {name}")
     return list(dict.fromkeys(wanted))
 
 
