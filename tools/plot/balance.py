@@ -1,5 +1,5 @@
-"""Panel of what flows and what errs, over the logarithm of time: dissipation, kinetic energy, and by how much energy and
-what was dissipated fail to add up."""
+"""Panel of dissipation, kinetic energy, the defect of the energy identity and the estimated error, against the logarithm
+of time."""
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -7,24 +7,24 @@ from matplotlib.lines import Line2D
 from style import DASHES, line_colours
 
 HEIGHT = 1.7  # inches of the axes
-DECADES = 9  # shown at most, downwards from the largest value
+DECADES = 9  # the most that are shown below the largest value
 LINES = ("dissipation", "kinetic_energy", "identity_defect", "energy_error")  # series
 
 
 def has_balance(result):
-    """Anything to draw: two times after the start, and dissipation."""
+    """Whether there is anything to draw: two times after the start, and dissipation."""
     return "dissipation" in result.series and (result.series["time"] > 0).sum() > 1
 
 
 def line(series, name):
-    """Positive times and the size of that series there; NaN, a gap, where it is zero."""
+    """Positive times and the magnitude of the series there; NaN, a gap, where it is zero."""
     later = series["time"] > 0
     values = np.abs(series[name][later])
     return series["time"][later], np.where(values > 0, values, np.nan)
 
 
 class BalancePanel:
-    """Lines of `results` (all have a balance); `labels` one a result; `times` marked."""
+    """Lines of `results` (all have a balance); one label per result; `times` marked."""
 
     def __init__(self, results, labels, times):
         self.results, self.labels, self.times = results, labels, times
@@ -37,7 +37,7 @@ class BalancePanel:
         return name in result.series and bool(np.isfinite(line(result.series, name)[1]).any())
 
     def draw(self, figure, bottom):
-        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         width, height = figure.get_size_inches()
         axes = figure.add_axes([0.5 / width, (bottom + 0.38) / height, (width - 2.45) / width, HEIGHT / height])
         axes.set(xscale="log", yscale="log", xlabel="time t")

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws what `tubule compare --json` tells (standard input): energies over time, and differences of energy, rate, area,
+"""Draws the output of `tubule compare --json` (standard input): energies over time, and differences of energy, rate, area,
 volume and shapes. See `tubule compare --help`."""
 
 import json
@@ -9,17 +9,17 @@ EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 HEIGHT = 2.3  # inches of the axes
 SERIES = {"energy": "energy E", "rate": "rate dE/dt", "area": "area", "volume": "volume"}
 SHAPES = {"hausdorff": ("shape", "shape, Hausdorff"), "l2": ("shape_l2", "shape, L2")}
-DEPTH = 1e-7  # of the largest difference: what is smaller lies on the lower edge
-EARLIEST = 1e-4  # of the end: where a logarithmic time axis begins
+DEPTH = 1e-7  # of the largest difference: smaller ones are on the lower edge
+EARLIEST = 1e-4  # of the end time: start of a logarithmic time axis
 
 
 def time_is_logarithmic(times):
-    """Most of what happens, going by the rows, happens at the very beginning."""
+    """Whether most rows are at the very beginning."""
     return len(times) > 4 and times[len(times) // 2] < 0.1 * times[-1]
 
 
 def relative(series):
-    """Times, relative differences, and which of them need no interpolation."""
+    """Times, relative differences, and the indices of those without interpolation."""
     pairs = zip(series["a"], series["b"])
     values = [abs(a - b) / series["scale"] for a, b in pairs]
     return series["times"], values, [unsure == 0 for unsure in series["unsure"]]

@@ -1,4 +1,4 @@
-"""Panel of profiles that are no graphs r(z), or flow: sections through the axis, coloured by the normal velocity, with
+"""Panel of profiles that are not graphs r(z), or that flow: sections through the axis, coloured by the normal velocity, with
 arrows for the velocity along the profile. Shapes at rest that have no velocity are coloured by H and K."""
 
 import matplotlib.pyplot as plt
@@ -14,13 +14,13 @@ from flow import LONGEST_ARROW, ROUNDING, SHORTEST_ARROW, STILL, SYMBOLS, VELOCI
 from labels import power, symbol
 from tubes import ProfilePanel, caption
 
-BAND, OUTLINE = 2.8, 3.8  # points: the coloured line and what shows around it
+BAND, OUTLINE = 2.8, 3.8  # points: the coloured line, and its outline
 POINTS_PER_INCH, MIN_POINTS = 150, 200  # along a profile
 ARROW_SPACING, ARROW_DISTANCE = 0.19, 0.075  # inches along a profile, and outside of it
 
 
 class Section:
-    """One profile in inches, points even along it: x from the axis, y along it, unit normal, and how far along."""
+    """One profile in inches, evenly spaced points: x from the axis, y along it, unit normal, arc length."""
 
     def __init__(self, frame, scale):
         r, z = scale * frame.r, scale * (frame.z - (frame.z.min() + frame.z.max()) / 2)
@@ -28,7 +28,7 @@ class Section:
         self.length = self.along[-1]
         self.places = np.linspace(0, self.length, max(MIN_POINTS, int(POINTS_PER_INCH * self.length)))
         self.x, self.y = self.at(r), self.at(z)
-        # The profile has the inside to its left when z grows: outward is to the right.
+        # The inside is to the left of the profile, outward is to the right.
         step = np.gradient(self.x), np.gradient(self.y)
         size = np.hypot(*step) + 1e-300
         self.normal = step[1] / size, -step[0] / size
@@ -37,13 +37,13 @@ class Section:
         return np.interp(self.places, self.along, values)
 
     def beside(self, places, distance):
-        """Points that far outside."""
+        """Points displaced outward by a distance."""
         x, y = self.x + distance * self.normal[0], self.y + distance * self.normal[1]
         return np.interp(places, self.places, x), np.interp(places, self.places, y)
 
 
 def arrows(section, u_t):
-    """Places along the profile from tail to head, of each arrow that is long enough to see."""
+    """Positions along the profile from tail to head of each visible arrow."""
     count = max(3, round(section.length / ARROW_SPACING))
     middles = (np.arange(count) + 0.5) * section.length / count
     lengths = LONGEST_ARROW * np.interp(middles, section.places, u_t) / np.abs(u_t).max()
@@ -65,7 +65,7 @@ class CurvePanel(ProfilePanel):
             super()._choose_colours()
 
     def _fastest(self, row):
-        """The largest speed of a run, of all its frames."""
+        """The largest speed over all frames of a run."""
         return max((frame.speed for frame in self.results[row].frames), default=0.0)
 
     def _still(self, frame, row):

@@ -1,4 +1,4 @@
-"""Panel of plane cuts: the curves in which a plane x, y or z = constant meets the surfaces, over each other in time."""
+"""Panel of plane cuts: the curves in which a plane x, y or z = constant intersects the surfaces, superposed for all times."""
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -9,14 +9,14 @@ from labels import MINUS, number
 from results import BadInput
 from style import WIDTH, line_colours, time_name, time_text
 
-PIECES, FEWEST = 300, 2  # along the side of all cells together, were they a square; of one cell
+PIECES, FEWEST = 300, 2  # along the side of a square of all cells; minimum per cell
 HALVINGS = 48  # of the side of a piece
 HEIGHT, LEGEND, LEFT, GAP = 2.3, 1.1, 0.5, 0.3  # inches of the axes, of the legend beside them, left of and between them
 
 
 def _meeting(order, heights, start, end):
-    """Barycentric places, on the lines from `start` to `end`, where the polynomials of `heights` (a row each) vanish.
-    By halving: they are < 0 at one end and not at the other."""
+    """Barycentric positions, on the lines from `start` to `end`, where the polynomials of `heights` (a row each) vanish.
+    By bisection: they are < 0 at exactly one end."""
     low, high = start, end
     below = (raster.lagrange(order, start) * heights).sum(axis=1) < 0
     for _ in range(HALVINGS):
@@ -38,7 +38,7 @@ def cut(surface, axis, level):
     crossed = below[cell, piece][:, sides[:, 0]] != below[cell, piece][:, sides[:, 1]]  # two sides of each piece
     which, side = np.nonzero(crossed)
     ends = corners[piece[which, None], sides[side]]
-    ends = np.sort(ends, axis=1)  # so that neighbours in a cell find the same place
+    ends = np.sort(ends, axis=1)  # so that neighbours in a cell find the same point
     owner = cell[which]
     at = _meeting(surface.order, heights[owner], places[ends[:, 0]], places[ends[:, 1]])
     points = np.einsum("pn,pni->pi", raster.lagrange(surface.order, at), surface.points[owner])
@@ -46,7 +46,7 @@ def cut(surface, axis, level):
 
 
 class CutPanel:
-    """One drawing a result, all with one scale; one colour a time."""
+    """One drawing per result, with a common scale; one colour per time."""
 
     def __init__(self, results, labels, columns, plane):
         self.labels = [""] if len(results) == 1 else [", ".join(label) for label in labels]
@@ -70,7 +70,7 @@ class CutPanel:
         self.height = self.tall + 0.62
 
     def draw(self, figure, bottom):
-        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         width, height = figure.get_size_inches()
         colours = line_colours(len(self.columns))
         whole = len(self.labels) * (self.wide + GAP) + LEGEND

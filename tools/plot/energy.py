@@ -1,5 +1,5 @@
 """Panel (b): bending energy over time, in total and by term, with the times of the profiles marked. Where the membrane
-has inertia, its kinetic energy is a band on top. Stationary shapes have their number in place of a time."""
+has inertia, its kinetic energy is a band on top. Stationary shapes have an index instead of a time."""
 
 import numpy as np
 from matplotlib.colors import to_rgba
@@ -13,7 +13,7 @@ from style import DASHES, MARKERS, WIDTH, line_colours, time_name, time_text
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
 HEIGHT = 2.15  # inches of the axes
 KINETIC, BAND_ALPHA = "kinetic E\u2096, up to E + E\u2096", 0.25
-VISIBLE = 2e-3  # part of the total below which a term would lie on the zero line
+VISIBLE = 2e-3  # part of the total below which a term would coincide with the zero line
 SETTLED = 0.3  # the initial phase ends when this part of the change is left
 
 
@@ -40,7 +40,7 @@ def monotone_cubic(x, y, points):
 
 
 def _end_slope(step, secant):
-    """Of the parabola through the first three points, limited so that nothing overshoots."""
+    """Slope of the parabola through the first three points, limited to prevent overshoot."""
     if step.size < 2:
         return secant[0]
     slope = ((2 * step[0] + step[1]) * secant[0] - step[0] * secant[1]) / (step[0] + step[1])
@@ -48,10 +48,10 @@ def _end_slope(step, secant):
 
 
 def settling_time(result):
-    """Time after which at most SETTLED of the energy's change is left; infinite where nothing changes."""
+    """Time after which at most SETTLED of the energy's change is left; infinite if it is constant."""
     time, energy = result.series["time"], result.series["energy"]
     if result.has_inertia:
-        energy = energy + result.series["kinetic_energy"]  # bending energy comes and goes
+        energy = energy + result.series["kinetic_energy"]  # bending energy oscillates
     left = np.abs(energy - energy[-1])
     if left.max() <= 1e-9 * np.abs(energy).max():
         return np.inf
@@ -60,7 +60,7 @@ def settling_time(result):
 
 
 def visible_terms(results, known):
-    """Terms worth a line: more than VISIBLE of the total in some result."""
+    """Terms to draw: above VISIBLE of the total in some result."""
     names = list(dict.fromkeys(name for result in results for name in result.terms(known)))
     return [name for name in names if any(_matters(result, name) for result in results)]
 
@@ -71,14 +71,14 @@ def _matters(result, name):
 
 
 def _lines_of(words):
-    """In one line where it is short."""
+    """The text in one line if it is short."""
     line = ", ".join(words)
     return line if len(line) <= 32 else ",\n".join(words)
 
 
 def relative_ticks(axis, name):
-    """Where an axis shows small changes of a large number, its ticks count from that number; the axis' label, which
-    says so. (Matplotlib would write the number above the axis, where the times are.)"""
+    """On an axis with small changes of a large number, ticks are relative to that number; returns the label of the axis,
+    which says so. (Matplotlib would write the number above the axis, where the times are.)"""
     low, high = sorted(axis.get_view_interval())
     if high - low > 1e-3 * max(abs(low), abs(high)):
         return name
@@ -89,7 +89,7 @@ def relative_ticks(axis, name):
 
 
 class EnergyPanel:
-    """Lines of `results` (all with an energy series); `labels` one a result; `times` marked on them."""
+    """Lines of `results` (all with an energy series); one label per result; `times` marked on them."""
 
     def __init__(self, results, labels, times, term_labels):
         self.results, self.times, self.term_labels = results, times, term_labels
@@ -97,14 +97,14 @@ class EnergyPanel:
         self.numbered = all(result.is_equilibrium for result in results)
         self.kinetic = any(result.has_inertia for result in results)
         self.labels = ["bending E" if self.kinetic else "total"] if lone else [_lines_of(label) for label in labels]
-        self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run that only has its start
+        self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
         self.terms = visible_terms(results, term_labels)
         self.height = HEIGHT + 0.62
 
     def draw(self, figure, bottom):
-        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         width, height = figure.get_size_inches()
         y, tall = (bottom + 0.38) / height, HEIGHT / height
         handles = self._legend_entries()
@@ -174,7 +174,7 @@ class EnergyPanel:
         self._mark_times(axes, start, end)
 
     def _mark_times(self, axes, start, end):
-        """t0, t1, ... above the axes; of labels that would overlap the first is kept."""
+        """t0, t1, ... above the axes; of overlapping labels only the first is kept."""
         inches = axes.get_position().width * WIDTH
         before = -1.0
         for index, time in enumerate(self.times):

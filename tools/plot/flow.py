@@ -1,27 +1,27 @@
-"""Velocities on shapes: what their symbols, colours and arrows look like, and where arrows stand on a curved surface."""
+"""Velocities on shapes: their symbols, colours and arrows, and the positions of arrows on a curved surface."""
 
 import numpy as np
 from matplotlib.patches import FancyArrowPatch
 
 LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
 STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
-ROUNDING = 1e-6  # of lengths per unit of time: the speed of a start at rest
-NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is none, but rounding of normals
+ROUNDING = 1e-6  # lengths per unit of time: speeds of a start at rest
+NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is only rounding of normals
 VELOCITY = "RdBu_r"
 SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
 SPACING = 0.15  # inches between arrows on a surface
-STEEPEST = 0.3  # cosine between the normal and the eye where the last arrows stand
+STEEPEST = 0.3  # smallest cosine between the normal and the eye that has arrows
 
 
 def arrow_style(length):
-    """Of an arrow that long in inches: short ones have small heads."""
+    """Head size for an arrow of this length in inches: short arrows have small heads."""
     head = 2.6 * min(1.0, 0.25 + length / LONGEST_ARROW)
     style = f"-|>,head_length={head},head_width={head / 2}"
     return dict(arrowstyle=style, mutation_scale=1, color="0.1", linewidth=0.8, shrinkA=0, shrinkB=0)
 
 
 def draw_arrow_key(figure, left, bottom, words):
-    """What the longest arrow means; `left` is a part of the page, `bottom` inches below its 0.5 inches."""
+    """Legend of the longest arrow; `left` is a part of the page, `bottom` inches below its 0.5 inches."""
     wide, tall = figure.get_size_inches()
     x, y = left * wide, bottom + 0.42
     ends = (x / wide, y / tall), ((x + LONGEST_ARROW) / wide, y / tall)
@@ -36,7 +36,7 @@ def tangential(velocity, normal):
 
 
 def surface_arrows(samples, velocity, spacing):
-    """Samples, even over the picture, where the outside is seen and not too steep, and the tangential velocity there.
+    """Samples, evenly spaced in the picture, where the outside is seen and not too steep, and the tangential velocity there.
 
     `velocity` [samples, 3] and what comes back are in the coordinates of the view: right, up, towards the eye.
     """
@@ -53,7 +53,7 @@ def surface_arrows(samples, velocity, spacing):
 
 
 def draw_surface_arrows(axes, samples, velocity, largest, left, top, per_inch):
-    """Arrows relative to the `largest` tangential speed; `left` and `top` in inches are where the picture begins."""
+    """Arrows relative to the `largest` tangential speed; `left` and `top` in inches are the corner of the picture."""
     places, along = surface_arrows(samples, velocity, SPACING * per_inch)
     arrows = LONGEST_ARROW * along[:, :2] / largest  # foreshortened, as the surface is
     row, column = np.divmod(places, samples.shape[1])

@@ -1,4 +1,4 @@
-"""What tells several cases apart, in words short enough for a picture. Standard library only."""
+"""The differences between cases, in words short enough for a picture. Standard library only."""
 
 import textwrap
 import tomllib
@@ -7,9 +7,9 @@ SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
 SUPERSCRIPT = dict(zip("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b"))
 MINUS = "\u2212"
 NOT_SET = object()
-MAX_DIFFERENCES = 4  # cases that differ in more are called by their names
+MAX_DIFFERENCES = 4  # cases with more differences are labelled by their names
 
-# Never a label: what a case says about itself, what tests expect of it, and times, which one sees.
+# Never a label: descriptions and expectations of a case, and times, which are visible.
 IGNORED = ("about.", "expect.", "time.")
 NAMES = {
     "tier": "tier",
@@ -49,7 +49,7 @@ def effective_case(text, sets):
 
 
 def _entry(node, step, fresh):
-    """node[step], made from `fresh` where a dict lacks it or a list is one short."""
+    """node[step], made from `fresh` if a dict lacks it or the index is the next of a list."""
     if isinstance(node, list):
         index = int(step)
         if index == len(node):
@@ -80,7 +80,7 @@ def flatten(node, prefix=""):
 
 
 def differences(cases):
-    """Keys, in order of first appearance, whose values are not the same in all cases."""
+    """Keys, in order of first appearance, whose values differ between the cases."""
     flats = [flatten(case) for case in cases]
     keys = dict.fromkeys(key for flat in flats for key in flat)
     return [
@@ -91,7 +91,7 @@ def differences(cases):
 
 
 def row_labels(cases, fallbacks):
-    """One list of words ("k42 = 0.06", ...) a case: what differs, else its fallback."""
+    """One list of words ("k42 = 0.06", ...) per case: the differences, else its fallback."""
     if len(cases) == 1:
         return [[fallbacks[0]]]
     keys = differences(cases)
@@ -132,7 +132,7 @@ def _names(keys, flats):
 
 
 def symbol(key):
-    """k42 and H0 with their digits set below the line; other words as they are."""
+    """k42 and H0 with subscript digits; other words unchanged."""
     letter, digits = key[:1], key[1:]
     return letter + "".join(SUBSCRIPT[d] for d in digits) if letter in "kH" and digits.isdigit() else key
 
@@ -162,12 +162,12 @@ def power(value, digits):
 
 
 def wrapped(words, width):
-    """Words one a line, long ones broken."""
+    """One word group per line, long ones broken."""
     return "\n".join("\n".join(textwrap.wrap(word, width)) for word in words)
 
 
 def formula(mathtext):
-    """k_{20}(H-H_0)^2 with real sub- and superscripts, so that an SVG holds it as plain text."""
+    """k_{20}(H-H_0)^2 with real sub- and superscripts, so that it is plain text in an SVG."""
     out, table, braced = [], None, False
     for char in mathtext:
         if char in "_^":

@@ -33,7 +33,7 @@ def arguments():
 
 
 class Page:
-    """What there is to draw, in panels: of shapes first, then of series with the times of the shapes marked."""
+    """The panels to draw: first shapes, then series with the times of the shapes marked."""
 
     def __init__(self, results, labels, options):
         self.results, self.labels, self.options = results, labels, options
@@ -77,7 +77,7 @@ class Page:
 
         everything = self.options.kind == "all"
         if self.wants("energy"):
-            # A surface that was only looked at has one row, which is no curve; so has a single stationary shape.
+            # A surface at rest and a single stationary shape have one row, which makes no curve.
             least = [2 if everything and (r.surfaces or r.is_equilibrium) else 1 for r in self.results]
             shown = [i for i, r in enumerate(self.results) if r.has_energy(least[i])]
             if shown:
@@ -95,7 +95,7 @@ class Page:
 
 
 def draw(paths, outputs, options):
-    """Reads all, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
+    """Reads all results, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
     from matplotlib.figure import Figure
 
     import style
@@ -131,7 +131,7 @@ def draw(paths, outputs, options):
 
 
 def read_arguments(options):
-    """Puts values in place of texts; ValueError says what is wrong."""
+    """Converts the texts to values; raises ValueError with the reason."""
     try:
         options.times = [float(time) for time in options.times.split(",") if time]
     except ValueError:
@@ -163,7 +163,7 @@ def main():
         except ImportError:
             print(f"tubule plot: {sys.executable} has no {module}; install the package {package}", file=sys.stderr)
             return EXIT_UNAVAILABLE
-    # A result file never changes in place, so there is nothing to lock against; on some disks locks fail.
+    # A result file never changes in place, so it needs no lock; on some disks locks fail.
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
     import scan
     from results import BadInput

@@ -7,7 +7,7 @@ OVERSAMPLING = 2  # per pixel and direction
 PIECE = 6.0  # longest side of a piece, in samples
 MAX_PIECES = 128  # along the side of a cell
 CHUNK = 400_000  # pieces at a time, to bound memory
-SLACK = 0.02  # pieces overlap by that part of their size, so that rounding leaves no holes between them
+SLACK = 0.02  # overlap of pieces relative to their size, so that rounding leaves no holes
 LIGHT = np.array([-0.42, 0.5, 0.757])  # from the upper left, in front; unit, as right, up, towards the eye
 OUTLINE = 0.12  # grey level
 JUMPS = 0.01, 0.03  # depth between neighbours, relative to the picture, where an outline begins and where it is black
@@ -35,7 +35,7 @@ def lagrange(order, places):
 
 
 def division(n):
-    """Barycentric corners of the n^2 pieces of a triangle, and their numbers, three each, turning as the triangle."""
+    """Barycentric corners of the n^2 pieces of a triangle, and three indices each, with the orientation of the triangle."""
     index = {(i, j): number for number, (i, j) in enumerate((i, j) for i in range(n + 1) for j in range(n + 1 - i))}
     places = np.array([((n - i - j) / n, i / n, j / n) for i, j in index])
     up = [(index[i, j], index[i + 1, j], index[i, j + 1]) for i in range(n) for j in range(n - i)]
@@ -62,10 +62,10 @@ class View:
 
 
 class Samples:
-    """What is in front at each sample: whether anything is, from which side, normal and values there."""
+    """The frontmost surface at each sample: whether there is one, its side, normal and values."""
 
     def __init__(self, width, height, values, closed):
-        self.shape, self.closed = (height, width), closed  # of a closed surface nobody sees the inside
+        self.shape, self.closed = (height, width), closed  # the inside of a closed surface is invisible
         self.depth = np.full(height * width, -np.inf)
         self.outside = np.zeros(height * width, bool)
         self.normal = np.zeros((height * width, 3))
@@ -76,7 +76,7 @@ class Samples:
         a, b, c = corners[:, 0, :2], corners[:, 1, :2], corners[:, 2, :2]
         ab, ac = b - a, c - a
         double_area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-        low = np.ceil(corners[..., :2].min(axis=1) - 0.5).astype(int)  # first sample whose middle is not left of it
+        low = np.ceil(corners[..., :2].min(axis=1) - 0.5).astype(int)  # first sample whose centre is not left of it
         high = np.floor(corners[..., :2].max(axis=1) - 0.5).astype(int)
         solid = np.abs(double_area) > 1e-12
         if self.closed:
@@ -100,7 +100,7 @@ class Samples:
         depth = np.einsum("pi,pi->p", weights, corners[piece, :, 2])
         front = depth > self.depth[place]
         place, piece, weights, depth = place[front], piece[front], weights[front], depth[front]
-        order = np.argsort(depth, kind="stable")  # of several in one place the last assigned stays
+        order = np.argsort(depth, kind="stable")  # of several at one sample the last assigned remains
         place, piece, weights = place[order], piece[order], weights[order]
         self.depth[place] = depth[order]
         self.outside[place] = double_area[piece] < 0
@@ -116,7 +116,7 @@ def sample(nodes, normals, values, order, closed, view, origin, scale, width, he
     out = Samples(width, height, values.shape[-1], closed)
     seen = scale * (nodes @ view.axes - (*origin, 0)) * (1, -1, 1)
     turned = normals @ view.axes
-    # A side is no longer than the way along its nodes.
+    # A side is at most as long as the path through its nodes.
     k = order
     rim = [0, *range(3, 2 + k), 1, *range(2 + k, 1 + 2 * k), 2, *range(1 + 2 * k, 3 * k), 0]
     steps = np.linalg.norm(np.diff(seen[:, rim, :2], axis=1), axis=2).max(axis=1) * k
@@ -138,7 +138,7 @@ def shaded(samples, colours):
     outside = samples.outside[hit]
     normal = samples.normal[hit]
     normal /= np.where(outside, 1, -1)[:, None] * np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    shade = 0.56 + 0.46 * ((1 + normal @ LIGHT) / 2) ** 1.5  # no edge where the light ends
+    shade = 0.56 + 0.46 * ((1 + normal @ LIGHT) / 2) ** 1.5  # no edge at the terminator
     middle = LIGHT + [0, 0, 1]
     gloss = 0.3 * np.clip(normal @ (middle / np.linalg.norm(middle)), 0, 1) ** 40
     rgb = np.where(outside[:, None], colours, 0.35 * colours + 0.32)  # paler inside, and darker
@@ -151,12 +151,12 @@ def shaded(samples, colours):
     h, w = samples.shape
     s = OVERSAMPLING
     mean = rgba.reshape(h // s, s, w // s, s, 4).mean(axis=(1, 3))
-    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-9)  # was weighted by what is covered
+    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-9)  # was weighted by coverage
     return (255 * np.clip(mean, 0, 1)).round().astype(np.uint8)
 
 
 def _edges(samples, hit):
-    """How much each sample belongs to the rim of the surface, or of a part of it that hides another: 0 to 1."""
+    """Weight of the outline at each sample, 0 to 1: the rim of the surface, or of a part that hides another."""
     h, w = samples.shape
     begin, full = (jump * max(h, w) for jump in JUMPS)
     depth = np.where(hit, samples.depth, -1e300).reshape(h, w)

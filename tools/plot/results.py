@@ -32,7 +32,7 @@ class Frame:
 
     @property
     def is_graph(self):
-        """r(z), a tube: no poles, and z never goes back."""
+        """Whether it is a tube r(z): no poles, and z never decreases."""
         return min(self.r[0], self.r[-1]) > 1e-9 * self.r.max() and bool((np.diff(self.z) >= 0).all())
 
     def largest(self, name):
@@ -63,12 +63,12 @@ class Surface:
 
     @property
     def size(self):
-        """Diagonal of the box around it."""
+        """Diagonal of the bounding box."""
         return float(np.linalg.norm(np.ptp(self.points.reshape(-1, 3), axis=0)))
 
     @property
     def speed(self):
-        """The largest there is; 0 at rest."""
+        """The largest value; 0 at rest."""
         return 0.0 if self.u is None else float(np.linalg.norm(self.u, axis=-1).max())
 
 
@@ -92,12 +92,12 @@ class Result:
 
     @property
     def moves(self):
-        """A moving surface."""
+        """Whether it is a moving surface."""
         return any(surface.u is not None for surface in self.surfaces)
 
     @property
     def is_equilibrium(self):
-        """Stationary shapes, with indices as times."""
+        """Whether it has stationary shapes, with indices as times."""
         return "equilibrium" in self.case
 
     @property
@@ -131,7 +131,7 @@ class Result:
 
 
 def read_result(path):
-    """Raises BadInput naming the file when it is no result or a record in it is damaged."""
+    """Raises BadInput naming the file if it is not a result or a record is damaged."""
     if not os.path.exists(path):
         raise BadInput(f"{path}: no such file")
     try:
@@ -174,7 +174,7 @@ def _series(group):
 
 
 def _increasing(times):
-    """Indices of a strictly increasing subsequence: of rows at the same time the first is kept."""
+    """Indices of a strictly increasing subsequence: of rows at equal times the first is kept."""
     before = np.maximum.accumulate(np.concatenate([[-np.inf], times[:-1]]))
     return np.flatnonzero(times > before)
 
