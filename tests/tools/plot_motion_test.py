@@ -321,7 +321,7 @@ class Render(InFolder):
     def test_says_that_there_is_none(self):
         done = self.render(write(self.folder / "a.hdf", times=(0, 1)))
         self.assertEqual(done.returncode, 2)
-        self.assertIn("no pvpython on the PATH", done.stderr)
+        self.assertIn("pvpython is not on the PATH", done.stderr)
         self.assertIn("no such file", self.render(self.folder / "b.hdf").stderr)
 
     def test_gives_the_series_to_paraview_where_there_is_one(self):
@@ -331,7 +331,7 @@ class Render(InFolder):
         self.fake("pvpython", f'echo "$@" > {self.folder}/said; : > {self.folder}/out/000000.png')
         done = self.render(file, "-o", self.folder / "out", "--colour", "H")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("no ffmpeg", done.stderr)
+        self.assertIn("ffmpeg is not on the PATH", done.stderr)
         said = (self.folder / "said").read_text().split()
         self.assertEqual(said[-3:], [str((self.folder / path).resolve()) for path in ("view/a.hdf.series", "out")] + ["H"])
 
