@@ -251,7 +251,7 @@ private:
         system_->set_problem(problem);
         Equilibrium& e = out.shape;
         e.space = system_->space_handle(), e.x = curve(place.w), e.gauge = system_->gauge();
-        e.sigma = place.w[n], e.P = place.w[n + 1];
+        e.sigma = place.w[n], e.lambda = place.w[n + 1];
         std::vector<double> defect;
         e.observed = system_->forms().observe(e.x, &defect);
         e.reference_energy = system_->forms().reference_energy(e.x);

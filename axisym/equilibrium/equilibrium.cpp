@@ -52,7 +52,7 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
 }
 
 Weights StationarySystem::lagrangian(const Eigen::VectorXd& u) const {
-    return {.energy = 1, .area = u[sigma()], .volume = u[P()], .gauge = gauge_};
+    return {.energy = 1, .area = u[sigma()], .volume = u[lambda()], .gauge = gauge_};
 }
 
 Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
@@ -121,8 +121,8 @@ double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(u.head(space_->size()));
     double value = o.energy + gauge_ * o.gauge;
     if (c.area) value += u[sigma()] * (o.area - *c.area);
-    if (c.volume) value += u[P()] * (o.volume - *c.volume);
-    if (c.reduced_volume) value += u[P()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
+    if (c.volume) value += u[lambda()] * (o.volume - *c.volume);
+    if (c.reduced_volume) value += u[lambda()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
     return value;
 }
 
@@ -142,7 +142,7 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
     if (c.reduced_volume) {
         const double A = forms_.observe(x).area, factor = *c.reduced_volume / sphere_factor;
         fix(volume - factor * 1.5 * std::sqrt(A) * area);
-        hessian -= u[P()] * factor * 0.75 / std::sqrt(A) * area * area.transpose();
+        hessian -= u[lambda()] * factor * 0.75 / std::sqrt(A) * area * area.transpose();
     }
     if (space_->topology() == Topology::cell) fix(place_);
     const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
@@ -235,7 +235,8 @@ private:
     double constraint_error(const Eigen::VectorXd& F) const {
         const Constraints& c = system_.problem().constraints;
         const double area = c.area ? std::abs(F[system_.sigma()]) / (size_ * size_) : 0;
-        const double volume = c.volume || c.reduced_volume ? std::abs(F[system_.P()]) / (size_ * size_ * size_) : 0;
+        const double volume =
+            c.volume || c.reduced_volume ? std::abs(F[system_.lambda()]) / (size_ * size_ * size_) : 0;
         return std::max(area, volume);
     }
     // The merit of a curve with the multipliers of u.
@@ -421,7 +422,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const Eigen::VectorXd x = u.head(n);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
         std::vector<double> defect;
-        out.x = x, out.sigma = u[n], out.P = u[n + 1];
+        out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
         out.observed = system.forms().observe(x, &defect);
         if (!found) compare.restart();
         const double error =
@@ -455,7 +456,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
 
 Eigen::VectorXd unknowns(const Equilibrium& shape) {
     Eigen::VectorXd u(shape.x.size() + 3);
-    u << shape.x, shape.sigma, shape.P, 0;
+    u << shape.x, shape.sigma, shape.lambda, 0;
     return u;
 }
 
@@ -486,7 +487,7 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     const auto coarser =
         make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements), settings.degree);
     Eigen::VectorXd u(coarser->size() + 3);
-    u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.P, 0;
+    u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.lambda, 0;
     const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);
     if (found.stop != Stop::solver_failed) return found;
     return solve(problem, nearby.space, unknowns(nearby), nearby.gauge, settings);

@@ -1,4 +1,4 @@
-// Stationary shapes of the bending energy, free or at given area and volume: E + sigma A + P V stationary.
+// Stationary shapes of the bending energy, free or at given area and volume: E + sigma A + lambda V stationary.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,8 +32,8 @@ struct Variation {
     Eigen::VectorXd eigenvalues, lowest;
 };
 
-// The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve, then sigma, P and
-// the force that holds a whole cell in place along the axis (zero in the end). `gauge` is the weight of the gauge
+// The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve, then sigma, lambda
+// and the force that holds a whole cell in place along the axis (zero in the end). `gauge` is the weight of the gauge
 // energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
@@ -47,7 +47,7 @@ public:
     double gauge() const { return gauge_; }
     int size() const { return space_->size() + 3; }
     int sigma() const { return space_->size(); }  // places in u
-    int P() const { return space_->size() + 1; }
+    int lambda() const { return space_->size() + 1; }
 
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     // dF/du, with `damping` times the mass matrix added to the Hessian; compressed, of one pattern.
@@ -80,7 +80,7 @@ struct EquilibriumSettings {
 struct Equilibrium {
     std::shared_ptr<const CurveSpace> space;
     Eigen::VectorXd x;
-    double sigma = 0, P = 0;
+    double sigma = 0, lambda = 0;
     double gauge = 0;
     CurveObservation observed;
     double reference_energy = 0, estimated_error = 0;  // the latter relative to the former

@@ -150,7 +150,7 @@ SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
                {"volume", [](const ShapeRow& r) { return r.o.volume; }},
                {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
                {"sigma", [](const ShapeRow& r) { return r.point.shape.sigma; }},
-               {"P", [](const ShapeRow& r) { return r.point.shape.P; }},
+               {"lambda", [](const ShapeRow& r) { return r.point.shape.lambda; }},
                {"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
                {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
                {"height", [](const ShapeRow& r) { return r.measures.height; }},
@@ -209,7 +209,8 @@ private:
             *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
-        out.numbers = {{"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"P", e.P}};
+        out.numbers = {
+            {"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"lambda", e.lambda}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
         const auto add = [&](const char* name, double Sample::*member) {
             Array a{name, {samples.size()}, {}};

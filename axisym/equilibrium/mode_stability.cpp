@@ -54,9 +54,9 @@ Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], c
     return d;
 }
 
-// E + sigma A + P V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of d_theta^2
-// twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
-J functional_density(const Bending& bending, double sigma, double P, const Disturbed& d) {
+// E + sigma A + lambda V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of
+// d_theta^2 twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
+J functional_density(const Bending& bending, double sigma, double lambda, const Disturbed& d) {
     // Normal d_theta X x d_s X, not of unit length.
     const J n_r = d.r * d.s_z, n_t = d.t_z * d.s_r - d.t_r * d.s_z, n_z = -(d.r * d.s_r);
     const J square = n_r * n_r + n_t * n_t + n_z * n_z;
@@ -70,7 +70,7 @@ J functional_density(const Bending& bending, double sigma, double P, const Distu
     const auto f = density(bending, H.v, K.v);
     J sum = chain(H, K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
     sum.v += sigma;
-    return square * inverse_area * sum + (P / 2) * (d.r * n_r);
+    return square * inverse_area * sum + (lambda / 2) * (d.r * n_r);
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
             }
-            const J density = functional_density(problem.bending, shape.sigma, shape.P, disturb(r, z, nr, nz));
+            const J density = functional_density(problem.bending, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
@@ -186,7 +186,7 @@ void append(Matrix& columns, const Vector& column) {
     columns.col(columns.cols() - 1) = column;
 }
 
-// Smallest eigenvalues of A v = lambda M v, with the vectors. By way of the inverse, which finds them to the accuracy
+// Smallest eigenvalues of A v = mu M v, with the vectors. By way of the inverse, which finds them to the accuracy
 // of small numbers, however large the others are.
 struct Spectrum {
     Vector values;
@@ -371,7 +371,7 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
             const double whole = 2 * pi * space.images();
             append(fixed, (forms.volume - slope * forms.area).normalized());
             forms.second_variation -=
-                whole * shape_.P * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
+                whole * shape_.lambda * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
         }
     }
     const Eigen::LDLT<Matrix> projection(forms.mass);

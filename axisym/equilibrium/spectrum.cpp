@@ -47,14 +47,15 @@ Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> si
         solver.compute(columns);
         const Eigen::VectorXd multipliers = solver.solve(-force);
         if (area && !sigma) e.sigma = multipliers[0];
-        if (volume) e.P = multipliers[multipliers.size() - 1];
+        if (volume) e.lambda = multipliers[multipliers.size() - 1];
     }
     const double size = e.observed.length / (2 * pi), gauge = 0.01 * e.reference_energy;
     // A little resistance, for what is neutral: places, and sizes of an energy that knows none.
     const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
-    const Eigen::MatrixXd hessian = Eigen::MatrixXd(forms.hessian({1, e.sigma, e.P, gauge}, e.x)) + resistance * mass;
+    const Eigen::MatrixXd hessian =
+        Eigen::MatrixXd(forms.hessian({1, e.sigma, e.lambda, gauge}, e.x)) + resistance * mass;
     const Eigen::VectorXd step =
-        Eigen::PartialPivLU<Eigen::MatrixXd>(hessian).solve(forms.gradient({1, e.sigma, e.P, 0}, e.x));
+        Eigen::PartialPivLU<Eigen::MatrixXd>(hessian).solve(forms.gradient({1, e.sigma, e.lambda, 0}, e.x));
     unbalanced = std::sqrt(step.dot(mass * step) / e.observed.area) / size;
     e.stop = Stop::finished;
     return e;
@@ -111,7 +112,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
         const bool first = out.modes.empty();
         out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
         out.modes = std::move(modes);
-        out.sigma = e.sigma, out.P = e.P;
+        out.sigma = e.sigma, out.lambda = e.lambda;
         out.elements = e.space->splines().elements();
         if (out.estimated_error <= settings.accuracy) break;
     }

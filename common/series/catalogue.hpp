@@ -60,7 +60,6 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"parameter", "that of the key", "value of the key that varies along a branch"},
     {"special", "1", "1 at a fold, 2 at a bifurcation, else 0"},
     {"sigma", "energy/length^2", "multiplier of the area"},
-    {"P", "energy/length^3", "multiplier of the volume of a stationary shape"},
     {"negative_directions", "1", "number of directions in which the energy falls"},
     {"growth_<m>", "1/time", "growth rate of waves with m = <m> around the axis"},
     {"meridian_length", "length", "length of the profile"},

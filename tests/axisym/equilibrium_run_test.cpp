@@ -170,8 +170,9 @@ TEST(EquilibriumCase, whatIsHeld) {
     EXPECT_NEAR(given.at("area", 0), 9.42477796076938, 1e-10);  // that of the start: 2 pi r l + 4 pi r^2
     const Outcome size = outcome(single, {"equilibrium.held=reduced-volume"});
     EXPECT_NEAR(size.at("reduced_volume", 0), 0.7698003589195009, 1e-10);  // of the start
-    EXPECT_NEAR(2 * size.at("sigma", 0) * size.at("area", 0) + 3 * size.at("P", 0) * size.at("volume", 0), 0, 1e-7);
-    EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("P", 0), 0);
+    EXPECT_NEAR(2 * size.at("sigma", 0) * size.at("area", 0) + 3 * size.at("lambda", 0) * size.at("volume", 0), 0,
+                1e-7);
+    EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("lambda", 0), 0);
     EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("sigma", 0), 0, 0);
 }
 

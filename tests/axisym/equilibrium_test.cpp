@@ -75,7 +75,7 @@ TEST(StationarySystem, refusals) {
 }
 
 struct Reference {
-    double l, k42, E, length, hausdorff, sigma, P, pole_to_pole, r_equator, r_max, pole_curvature;
+    double l, k42, E, length, hausdorff, sigma, lambda, pole_to_pole, r_equator, r_max, pole_curvature;
 };
 const Reference capsules[] = {
     {2, 0, 1.2568365089070843, 3.5433480871761205, 0.055235900332553545, -0.1669072479639459, 1.0059282447719327,
@@ -103,7 +103,7 @@ TEST(Equilibrium, tubularCellsOfThePaper) {
         EXPECT_NEAR(e.observed.volume, volume(capsule), 1e-10);
         EXPECT_NEAR(e.observed.length, r.length, 1e-8);
         EXPECT_NEAR(e.sigma, r.sigma, 1e-7);
-        EXPECT_NEAR(e.P, r.P, 1e-7);
+        EXPECT_NEAR(e.lambda, r.lambda, 1e-7);
         const ShapeMeasures m = measures(*e.space, e.x);
         EXPECT_NEAR(m.height, r.pole_to_pole, 1e-7);
         EXPECT_NEAR(m.r_middle, r.r_equator, 1e-7);
@@ -127,17 +127,17 @@ TEST(Equilibrium, vesicles) {
         const auto e = find_equilibrium(vesicle(v), spheroid(v, prolate), accurate(1e-11));
         ASSERT_EQ(e.stop, Stop::finished) << e.message;
         EXPECT_NEAR(e.observed.energy, E * 16 * pi, 1e-9) << v;
-        // Theorem: E does not change with size, so 2 sigma A + 3 P V = 0.
-        EXPECT_NEAR(2 * e.sigma * e.observed.area + 3 * e.P * e.observed.volume, 0, 1e-6);
+        // Theorem: E does not change with size, so 2 sigma A + 3 lambda V = 0.
+        EXPECT_NEAR(2 * e.sigma * e.observed.area + 3 * e.lambda * e.observed.volume, 0, 1e-6);
     }
 }
 
 TEST(Equilibrium, areaAndVolumeOfThePerturbedSphere) {
     struct Expected {
         bool prolate;
-        double k42, E, sigma, P;
+        double k42, E, sigma, lambda;
     };
-    for (const auto& [prolate, k42, E, sigma, P] :
+    for (const auto& [prolate, k42, E, sigma, lambda] :
          {Expected{true, 0.12, 10.920204909349906, -1.7041021596541024, 4.211393084196866},
           Expected{false, 0.06, 9.542378276692318, -1.3698602749909783, 3.2033557233836722}}) {
         const auto problem = at_area_and_volume(bending(0.125, 0, 0, k42), 14.401304433293804, 4.3137902047863905);
@@ -145,7 +145,7 @@ TEST(Equilibrium, areaAndVolumeOfThePerturbedSphere) {
         ASSERT_EQ(e.stop, Stop::finished) << e.message;
         EXPECT_NEAR(e.observed.energy, E, 1e-9);
         EXPECT_NEAR(e.sigma, sigma, 1e-7);
-        EXPECT_NEAR(e.P, P, 1e-7);
+        EXPECT_NEAR(e.lambda, lambda, 1e-7);
         EXPECT_EQ(negative_directions(problem, e), 0);
     }
 }
@@ -191,15 +191,15 @@ TEST(Equilibrium, fewerConstraints) {
     ASSERT_EQ(sphere.stop, Stop::finished) << sphere.message;
     EXPECT_NEAR(sphere.observed.energy, 16 * pi, 1e-8);
     EXPECT_NEAR(sphere.sigma, 0, 1e-7);
-    EXPECT_EQ(sphere.P, 0);
+    EXPECT_EQ(sphere.lambda, 0);
     EXPECT_NEAR(sphere.observed.volume, 4 * pi / 3, 1e-6);  // a double zero of the energy: half the digits
     // Theorem: the reduced volume alone, without a length in the energy, gives the shapes at given area and volume;
-    // with one, the best size, at which 2 sigma A + 3 P V = 0.
+    // with one, the best size, at which 2 sigma A + 3 lambda V = 0.
     const StationaryProblem free_size{bending(0.125, -2, 0, 0.06), {{}, {}, 0.77}};
     const auto best = find_equilibrium(free_size, meridian(Capsule{0.5, 2}), accurate(1e-9));
     ASSERT_EQ(best.stop, Stop::finished) << best.message;
     EXPECT_NEAR(reduced_volume(best.observed.area, best.observed.volume), 0.77, 1e-11);
-    EXPECT_NEAR(2 * best.sigma * best.observed.area + 3 * best.P * best.observed.volume, 0, 1e-9);
+    EXPECT_NEAR(2 * best.sigma * best.observed.area + 3 * best.lambda * best.observed.volume, 0, 1e-9);
     for (double factor : {0.98, 1.02}) {
         const auto other = find_equilibrium(at_area_and_volume(free_size.bending, best.observed.area * factor,
                                                                best.observed.volume * std::pow(factor, 1.5)),

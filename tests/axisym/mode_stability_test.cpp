@@ -18,11 +18,11 @@ namespace {
 const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false}, overdamped{.friction = 1};
 
 // A shape made stationary by its multipliers.
-Equilibrium held(const Meridian& m, const Bending& law, int elements, int degree, double sigma, double P) {
+Equilibrium held(const Meridian& m, const Bending& law, int elements, int degree, double sigma, double lambda) {
     Equilibrium e;
     e.space = std::make_shared<CurveSpace>(m.topology, equal_breaks(elements), degree, degree - 1, m.length);
     e.x = fit(*e.space, m);
-    e.sigma = sigma, e.P = P;
+    e.sigma = sigma, e.lambda = lambda;
     e.observed = CurveForms(*e.space, law).observe(e.x);
     e.stop = Stop::finished;
     return e;
@@ -45,7 +45,7 @@ TEST(ModeStability, sphere) {
     // theory.md (6.3) with the tension sigma, for every m <= l; l = 1 is rigid, l = 0 excluded by the constraints.
     const Law law;
     const double R = 1.2, h = -2 / R - law.H0;
-    const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4)), P = b0 - 2 * law.sigma / R;
+    const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4)), lambda = b0 - 2 * law.sigma / R;
     const auto rate = [&](int l) {
         const double Lam = l * (l + 1), L = Lam - 2;
         return -(L / (R * R)) *
@@ -53,7 +53,8 @@ TEST(ModeStability, sphere) {
     };
     for (const Meridian& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))})
         for (int degree : {5, 7}) {
-            const Equilibrium e = held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, degree, law.sigma, P);
+            const Equilibrium e =
+                held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, degree, law.sigma, lambda);
             const ModeStability stability(fixed(law.bending(), e), e);
             for (int mode = 0; mode <= 5; ++mode)
                 for (const MotionLaw& model : {gradient_flow, overdamped}) {
@@ -71,7 +72,8 @@ TEST(ModeStability, sphere) {
 
 TEST(ModeStability, convergesWithTheOrderOfTheEnergy) {
     // Theorem: eigenvalues converge with the order 2 (p - 1) of the energy.
-    // Sphere with k20 = 1, R = 1, sigma = -8 and so P = 16: s_l = -L (2 L - 4), of which l = 4 is the second for m = 3.
+    // Sphere with k20 = 1, R = 1, sigma = -8 and so lambda = 16: s_l = -L (2 L - 4), of which l = 4 is the second
+    // for m = 3.
     double error[2];
     for (int i = 0; i < 2; ++i) {
         const Equilibrium e = held(meridian(Sphere{}), bending(1), 8 << i, 5, -8, 16);
@@ -87,9 +89,9 @@ TEST(ModeStability, tube) {
     // 1) of that, theory.md (5.8), (5.9); twice for each q > 0.
     const Law law;
     const double R = 0.8, length = 3, h = -1 / R - law.H0;
-    const double b0 = -(law.f(h) + law.F1(h) / R) / R, P = b0 - law.sigma / R;
+    const double b0 = -(law.f(h) + law.F1(h) / R) / R, lambda = b0 - law.sigma / R;
     for (const Meridian& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
-        const Equilibrium e = held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, P);
+        const Equilibrium e = held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, lambda);
         const ModeStability stability(fixed(law.bending(), e), e);
         for (int mode = 0; mode <= 3; ++mode)
             for (const MotionLaw& model : {gradient_flow, overdamped}) {

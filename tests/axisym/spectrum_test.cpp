@@ -66,10 +66,10 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
         settings.accuracy = 1e-8;
         const Spectrum found = spectrum(energy, law, held_by(law), tube, settings);
         const bool flows = law.inextensible;
-        // Least multipliers that hold a tube: sigma/R + P = b0. Any of these give its rates for their tension.
+        // Least multipliers that hold a tube: sigma/R + lambda = b0. Any of these give its rates for their tension.
         const double b0 = radius_rate(UniformTube{energy, R});
         if (flows) {
-            EXPECT_NEAR(found.sigma / R + found.P, b0, 1e-8);
+            EXPECT_NEAR(found.sigma / R + found.lambda, b0, 1e-8);
         }
         const UniformTube exact{energy, R, found.sigma};
         ASSERT_EQ(found.modes.size(), 3u);

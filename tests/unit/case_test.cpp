@@ -134,7 +134,7 @@ TEST(CaseRefusal, UnknownSeries) {
         "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, reduced_volume, r_min, "
         "r_max, mode_<n>, kinetic_energy, speed, momentum_x, momentum_y, momentum_z, angular_momentum_x, "
         "angular_momentum_y, angular_momentum_z, lambda, stretching, correction_energy, integral_H2, integral_K, "
-        "gauss_bonnet_defect, quality, turn, parameter, special, sigma, P, negative_directions, growth_<m>, "
+        "gauss_bonnet_defect, quality, turn, parameter, special, sigma, negative_directions, growth_<m>, "
         "meridian_length, height, r_middle, pole_curvature, distance_to_start, energy_error, elements, tier";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({

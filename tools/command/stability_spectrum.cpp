@@ -29,7 +29,7 @@ std::string words_of(const std::vector<Found>& found) {
     for (const auto& [model, spectrum] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words(model));
         if (spectrum.at_rest())
-            out += fmt::format("  at rest with sigma = {:.8g}, P = {:.8g}\n", spectrum.sigma, spectrum.P);
+            out += fmt::format("  at rest with sigma = {:.8g}, lambda = {:.8g}\n", spectrum.sigma, spectrum.lambda);
         else
             out += "  in motion: rates are those of this instant\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
@@ -70,10 +70,10 @@ std::string json_of(const std::vector<Found>& found) {
             modes += fmt::format("{}\n  {{\"m\": {}, \"rates\": {}, \"shape\": {}}}", modes.empty() ? "" : ",", mode.m,
                                  json(mode.rates), json(mode.shape));
         models += fmt::format(
-            "{}\n{{\"model\": {}, \"at_rest\": {}, \"sigma\": {}, \"P\": {}, \"estimated_error\": {}, \"elements\": "
-            "{}, \"modes\": [{}]}}",
+            "{}\n{{\"model\": {}, \"at_rest\": {}, \"sigma\": {}, \"lambda\": {}, \"estimated_error\": {}, "
+            "\"elements\": {}, \"modes\": [{}]}}",
             models.empty() ? "" : ",", json(name(model)), spectrum.at_rest() ? "true" : "false", json(spectrum.sigma),
-            json(spectrum.P), json(spectrum.estimated_error), spectrum.elements, modes);
+            json(spectrum.lambda), json(spectrum.estimated_error), spectrum.elements, modes);
     }
     return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
 }
