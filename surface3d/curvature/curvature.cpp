@@ -168,14 +168,16 @@ CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recove
         case Recovery::patch_nodal:
             return PatchRecovery(mesh).nodal(mesh);
         case Recovery::exact:
-            throw std::invalid_argument("exact curvatures belong to a surface, not to the nodes of a mesh");
+            throw std::invalid_argument("exact curvatures need an analytic surface, not only the nodes of a mesh");
         default:
             return PatchRecovery(mesh).projected(space, mesh);
     }
 }
 
 CurvatureGradients smooth(const SurfaceSpace& space, const CurvedMesh& mesh, double eps, CurvatureField& field) {
-    if (!(eps >= 0)) throw std::invalid_argument(fmt::format("curvatures are smoothed by eps >= 0, not {:g}", eps));
+    if (!(eps >= 0))
+        throw std::invalid_argument(
+            fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", eps));
     const Tabulation& table = space.tabulation();
     const auto rough = load<6>(space, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<6>& out) {
         const SurfacePoint<double> p = tangent_point(X, table, q);

@@ -31,7 +31,7 @@ CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells) {
     const auto points = std::find_if(frame.arrays.begin(), frame.arrays.end(),
                                      [](const Array& array) { return array.name == "points"; });
     if (points == frame.arrays.end() || points->data.size() < 3 * cells.nodes)
-        throw std::invalid_argument("the frame has no points on its mesh");
+        throw std::invalid_argument("the frame has no points for its mesh");
     CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
     for (std::size_t i = 0; i < cells.nodes; ++i)
         mesh.nodes.emplace_back(Eigen::Map<const Eigen::Vector3d>(&points->data[3 * i]));
@@ -59,7 +59,8 @@ double tube_mode_amplitude(const CurvedMesh& tube, int n, int m) {
 double sphere_mode_amplitude(const CurvedMesh& surface, int l, int m) {
     if (surface.period > 0) throw std::invalid_argument("a tube has no spherical harmonics");
     if (l == 1 || l < 0 || m < 0 || m > l)
-        throw std::invalid_argument("a wave of a closed surface has l >= 2 and 0 <= m <= l; l = 1 is its place");
+        throw std::invalid_argument(
+            "a wave of a closed surface must have l >= 2 and 0 <= m <= l; l = 1 is a translation");
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     double area = 0;
     for_each_point(surface, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {

@@ -39,21 +39,23 @@ Vector3d area_vector(const TriangleMesh& mesh, std::size_t t) {
 void check_triangles(const ImportedMesh& in) {
     const TriangleMesh& mesh = in.mesh;
     if (mesh.period != 0) fail(in, "a periodic mesh is not closed");
-    if (mesh.triangles.empty()) fail(in, "there are no triangles in it");
+    if (mesh.triangles.empty()) fail(in, "the mesh has no triangles");
     const int points = int(mesh.points.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const auto& corner = mesh.triangles[t];
         double longest = 0;
         for (int i = 0; i < 3; ++i) {
             const int a = corner[i], b = corner[(i + 1) % 3];
-            if (a < 0 || a >= points) fail(in, fmt::format("{} needs point {} of {}", triangle(in, t), a, points));
+            if (a < 0 || a >= points)
+                fail(in, fmt::format("{} uses point {}, but there are {}", triangle(in, t), a, points));
             if (!mesh.points[a].allFinite()) fail(in, vertex(in, a) + " is not finite");
-            if (a == b) fail(in, fmt::format("{} is degenerate: it has {} twice", triangle(in, t), vertex(in, a)));
+            if (a == b)
+                fail(in, fmt::format("{} is degenerate: {} occurs twice in it", triangle(in, t), vertex(in, a)));
             if (b >= 0 && b < points) longest = std::max(longest, (mesh.points[b] - mesh.points[a]).norm());
         }
         // In float coordinates (STL), heights below 1e-6 of a side are rounding.
         if (2 * area_vector(mesh, t).norm() <= 1e-6 * longest * longest) {
-            fail(in, fmt::format("{} is degenerate: {}, {} and {} are on one line", triangle(in, t),
+            fail(in, fmt::format("{} is degenerate: {}, {} and {} are collinear", triangle(in, t),
                                  vertex(in, corner[0]), vertex(in, corner[1]), vertex(in, corner[2])));
         }
     }
@@ -71,8 +73,8 @@ void check_duplicates(const ImportedMesh& in) {
         if (sorted[i].first == sorted[i - 1].first) first = std::min(first, {sorted[i - 1].second, sorted[i].second});
     }
     if (first.first == sorted.size()) return;
-    fail(in,
-         fmt::format("{} and {} are the same: duplicate faces", triangle(in, first.first), triangle(in, first.second)));
+    fail(in, fmt::format("duplicate faces: {} and {} have the same vertices", triangle(in, first.first),
+                         triangle(in, first.second)));
 }
 
 struct HalfEdge {
@@ -117,7 +119,7 @@ void check_edges(const ImportedMesh& in, const std::vector<HalfEdge>& edges) {
                              edge, triangle(in, e.triangle), open));
     }
     if (count == 2) {
-        fail(in, fmt::format("inconsistently oriented: {} and {} run the same way along the {}",
+        fail(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}",
                              triangle(in, e.triangle), triangle(in, edges[first + 1].triangle), edge));
     }
     fail(in, fmt::format("non-manifold edge: the {} belongs to {} triangles, among them {}, {} and {}", edge, count,
@@ -155,9 +157,10 @@ void check_fans(const ImportedMesh& in, const std::vector<std::array<std::size_t
             if (int(fan.size()) == std::exchange(size[v], 0)) continue;
             std::size_t other = t;
             while (fan.contains(other) || corner_of(mesh, other, v) == 3) ++other;
-            fail(in, fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it joins "
-                                 "them",
-                                 triangle(in, t), triangle(in, other), vertex(in, v)));
+            fail(in,
+                 fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
+                             "them",
+                             triangle(in, t), triangle(in, other), vertex(in, v)));
         }
     }
 }
@@ -181,8 +184,8 @@ void check_connected(const ImportedMesh& in, const std::vector<std::array<std::s
         ++count;
     }
     if (count > 1) {
-        fail(in, fmt::format("{} separate surfaces in one mesh: {} is not connected to {}", count, triangle(in, second),
-                             triangle(in, 0)));
+        fail(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}", count,
+                             triangle(in, second), triangle(in, 0)));
     }
 }
 
@@ -265,18 +268,18 @@ MeshReport close_mesh(ImportedMesh& in) {
     check_fans(in, across);
     check_connected(in, across);
     if (const auto pair = first_intersection(in.mesh)) {
-        fail(in, fmt::format("the surface intersects itself: {} meets {}", triangle(in, pair->first),
+        fail(in, fmt::format("the surface intersects itself: {} intersects {}", triangle(in, pair->first),
                              triangle(in, pair->second)));
     }
     MeshReport report = measure(in.mesh, edges);
     if (report.volume < 0) {
         for (auto& corner : in.mesh.triangles) std::swap(corner[1], corner[2]);
         report.volume = -report.volume;
-        in.notes.push_back("All triangles faced inward and were turned.");
+        in.notes.push_back("All triangles faced inward; their orientation was reversed.");
     }
     if (report.kink_max > 60) {
         in.notes.push_back(
-            fmt::format("{} and {} meet at a kink of {:.0f} degrees, the largest: a smooth surface "
+            fmt::format("The largest kink is {2:.0f} degrees, between {0} and {1}: a smooth surface "
                         "through such edges is a guess.",
                         triangle(in, report.kink_first), triangle(in, report.kink_second), report.kink_max));
     }

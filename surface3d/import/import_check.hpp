@@ -1,4 +1,4 @@
-// Is a triangle mesh the boundary of one body? Everything that is built on it takes that for granted.
+// Checks that a triangle mesh is the boundary of one body, as everything built on it assumes.
 #pragma once
 
 #include "surface3d/import/import_mesh.hpp"
@@ -15,13 +15,13 @@ struct MeshReport {
     std::size_t kink_first = 0, kink_second = 0;  // these neighbours
 };
 
-// Makes sure that the triangles are one closed, oriented surface without self-contact, of triangles with area.
+// Checks that the triangles form one closed, oriented surface without self-contact, and that each has an area.
 // Throws MeshError that names the first triangle, edge or vertex where that fails: a vertex out of range or twice in a
 // triangle, no area, the same triangle twice, an open edge, an edge of three or more triangles, an edge along which
 // two triangles run the same way, a vertex where two sheets touch, a second component, two triangles that meet where
 // they should not.
-// Drops vertices that no triangle uses and turns a surface that faces inward; both are told in `notes`, and so is a
-// kink of more than 60 degrees, which no smooth surface resolved by the mesh has.
+// Drops vertices that no triangle uses and reverses a surface that faces inward; `notes` reports both, and also a
+// kink of more than 60 degrees, which a smooth surface resolved by the mesh cannot have.
 MeshReport close_mesh(ImportedMesh& imported);
 
 }  // namespace tubule::surface3d

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::MatrixXd, Eigen::Vector2d, Eigen::Vector3d, Eigen::VectorXd;
 
-// Neighbours whose normal is turned further than this (72 degrees) are no part of a graph over the tangent plane.
+// Neighbours whose normal is turned further than this (72 degrees) do not belong to a graph over the tangent plane.
 constexpr double cos_turn = 0.3;
 
 // Number of monomials x^i y^j, 1 <= i + j <= degree.
@@ -34,21 +34,21 @@ void fill_monomials(int degree, const Vector2d& x, Eigen::Ref<VectorXd> out) {
     }
 }
 
-// How a patch is found from its neighbourhood.
+// How a patch is fitted to its neighbourhood.
 struct Locality {
     int degree;
-    std::size_t wanted;  // at least so many neighbours, if there are
-    double decay;        // residuals are weighed with exp(-decay r^2), r = 1 for the farthest neighbour
+    std::size_t wanted;  // at least this many neighbours, if they exist
+    double decay;        // residuals are weighted by exp(-decay r^2), r = 1 for the farthest neighbour
     bool free;           // need not pass through the vertex
 };
 
-// A fast decay gives up averaging for nearness: on irregular samples of an ellipsoid and a bumpy sphere errors of
+// A fast decay trades averaging for locality: on irregular samples of an ellipsoid and a bumpy sphere errors of
 // position, normal and curvature are half to a quarter of those of decay 1; from 12 on systems become ill-conditioned.
 Locality interpolating(int degree) {
     return {degree, std::size_t(1.5 * monomials(degree)), 6, false};
 }
 
-// The opposite, to average noise out.
+// The opposite: averages noise out.
 constexpr Locality smoothing{3, 30, 2, true};
 
 // z = p(x, y) in the frame about a vertex; lengths there are in units of `scale`.
@@ -257,7 +257,7 @@ CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, c
             const Vector3d barycentric = Vector3d(indices[a][0], indices[a][1], indices[a][2]) / k;
             out.nodes.push_back(curved_point(mesh, patches, corner, barycentric));
             if (!out.nodes.back().allFinite())
-                fail(imported, t, "the polynomials of its vertices do not meet above it");
+                fail(imported, t, "the polynomials fitted at its vertices do not reach a common point above it");
         }
     }
     return out;
@@ -283,7 +283,7 @@ TriangleMesh node_triangles(const CurvedMesh& surface) {
     return out;
 }
 
-// No part of an element may face away from its flat triangle, and none may meet another.
+// No part of an element may face away from its flat triangle, and no two may intersect.
 void check_surface(const ImportedMesh& imported, const TriangleMesh& mesh, const CurvedMesh& surface) {
     const TriangleMesh parts = node_triangles(surface);
     const std::size_t each = std::size_t(surface.order * surface.order);
@@ -296,7 +296,7 @@ void check_surface(const ImportedMesh& imported, const TriangleMesh& mesh, const
     }
     if (const auto pair = first_intersection(parts)) {
         fail(imported, pair->first / each,
-             "the fitted element meets that of " + triangle_name(imported.names, pair->second / each));
+             "the fitted element intersects that of " + triangle_name(imported.names, pair->second / each));
     }
 }
 
@@ -315,7 +315,7 @@ double root_mean_square(const std::vector<Vector3d>& vectors) {
     return std::sqrt(sum / double(vectors.size()));
 }
 
-// Smooths as often as asked, and reports what that did.
+// Smooths `times` times and reports how far the vertices moved.
 TriangleMesh smoothed(const TriangleMesh& original, int times, FitReport& report) {
     TriangleMesh mesh = original;
     std::vector<Vector3d> change = to_smooth(mesh);
@@ -323,7 +323,7 @@ TriangleMesh smoothed(const TriangleMesh& original, int times, FitReport& report
     if (times == 0 && report.roughness > 0.01) {
         report.notes.push_back(
             fmt::format("The vertices are {:.2g} of an edge (root mean square) off the smooth surface "
-                        "through their neighbours: the mesh is coarse, or noisy and wants smoothing.",
+                        "through their neighbours: the mesh is coarse, or it is noisy and needs smoothing.",
                         report.roughness));
     }
     for (int i = 0; i < times; ++i) {
@@ -342,7 +342,7 @@ void count_reduced(const std::vector<Patch>& patches, int degree, FitReport& rep
     for (const Patch& patch : patches) report.reduced += patch.degree < degree;
     if (report.reduced == 0) return;
     report.notes.push_back(
-        fmt::format("At {} of {} vertices the neighbourhood bears no polynomial of degree {}; a lower "
+        fmt::format("At {} of {} vertices the neighbourhood does not determine a polynomial of degree {}; a lower "
                     "one was used.",
                     report.reduced, patches.size(), degree));
 }

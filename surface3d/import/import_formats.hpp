@@ -1,4 +1,4 @@
-// The inside of read_mesh: what each format's reader yields, before vertices are merged and polygons cut.
+// Internal to read_mesh: what the reader of each format returns, before vertices are merged and polygons triangulated.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 namespace tubule::surface3d {
 
 struct FileCorner {
-    std::int64_t vertex = 0;  // from 0, whatever the file counts from; may be out of range still
+    std::int64_t vertex = 0;  // counted from 0, whatever the file counts from; not yet checked
     Place place;
 };
 
@@ -26,8 +26,8 @@ FileMesh read_off(const std::string& name, std::string_view text);
 FileMesh read_ply(const std::string& name, std::string_view data);
 FileMesh read_stl(const std::string& name, std::string_view data);
 
-// A simple polygon in space, nearly plane, cut into triangles (positions in `corners`) by clipping the best-shaped ear
-// again and again. Empty when it crosses itself or has no area.
+// Triangulates a simple, nearly planar polygon in space (indices into `corners`) by clipping the best-shaped ear
+// repeatedly. Empty when it crosses itself or has no area.
 std::vector<std::array<int, 3>> cut_polygon(const std::vector<Eigen::Vector3d>& corners);
 
 }  // namespace tubule::surface3d

@@ -17,14 +17,14 @@ namespace tubule::surface3d {
 
 namespace {
 
-constexpr std::size_t corners_max = 1000;  // of a polygon: cutting costs the cube of it
+constexpr std::size_t corners_max = 1000;  // of a polygon: the cost of triangulation is cubic
 
 std::string contents(const std::filesystem::path& path) {
     std::ifstream file(path, std::ios::binary);
     if (!file) throw MeshError(fmt::format("{}: {}", path.string(), std::strerror(errno)));
     if (std::filesystem::is_directory(path)) throw MeshError(path.string() + ": is a directory");
     std::string data{std::istreambuf_iterator<char>(file), {}};
-    if (file.bad()) throw MeshError(path.string() + ": cannot be read to its end");
+    if (file.bad()) throw MeshError(path.string() + ": reading failed before the end of the file");
     if (data.empty()) throw MeshError(path.string() + ": is empty");
     return data;
 }
@@ -40,27 +40,27 @@ FileMesh read_file(const std::filesystem::path& path) {
     return reader(name, contents(path));
 }
 
-// Checks each face's vertices and cuts what has more than three.
+// Checks the vertices of each face and triangulates those with more than three.
 void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& out) {
     const std::int64_t vertices = std::int64_t(file.points.size());
     for (const std::vector<FileCorner>& face : file.faces) {
         if (face.size() > corners_max) {
-            throw MeshError(
-                at(name, face[0].place) +
-                fmt::format("a face of {} vertices; at most {} can be cut into triangles", face.size(), corners_max));
+            throw MeshError(at(name, face[0].place) +
+                            fmt::format("a face has {} vertices; polygons of at most {} can be triangulated",
+                                        face.size(), corners_max));
         }
         std::vector<Eigen::Vector3d> corners;
         for (std::size_t i = 0; i < face.size(); ++i) {
             const auto [vertex, place] = face[i];
             if (vertex < 0 || vertex >= vertices) {
-                throw MeshError(at(name, place) + fmt::format("the face needs vertex {}, but vertices are {} to {}",
-                                                              vertex + file.first, file.first,
-                                                              vertices - 1 + file.first));
+                throw MeshError(at(name, place) +
+                                fmt::format("the face uses vertex {}, but vertices are numbered {} to {}",
+                                            vertex + file.first, file.first, vertices - 1 + file.first));
             }
             for (std::size_t j = 0; j < i; ++j) {
                 if (face[j].vertex == vertex) {
-                    throw MeshError(at(name, place) + fmt::format("vertex {} is twice in one face, a degenerate one",
-                                                                  vertex + file.first));
+                    throw MeshError(at(name, place) +
+                                    fmt::format("degenerate face: vertex {} occurs twice", vertex + file.first));
                 }
             }
             corners.push_back(file.points[vertex]);
@@ -68,7 +68,7 @@ void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& 
         auto cut = face.size() == 3 ? std::vector<std::array<int, 3>>{{0, 1, 2}} : cut_polygon(corners);
         if (cut.empty()) {
             throw MeshError(at(name, face[0].place) +
-                            fmt::format("a face of {} vertices that crosses itself or has no area", face.size()));
+                            fmt::format("a face of {} vertices crosses itself or has no area", face.size()));
         }
         for (const auto& [a, b, c] : cut) {
             out.mesh.triangles.push_back({int(face[a].vertex), int(face[b].vertex), int(face[c].vertex)});
@@ -132,14 +132,14 @@ void merge_vertices(ImportedMesh& out, double weld) {
     };
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const std::array<int, 3>& old = mesh.triangles[t];
-        // One that had no area before stays, to be named and refused.
+        // A triangle without area before welding is kept, so that the checks name and reject it.
         if (collapsed(merged, old) && !collapsed(exact, old)) continue;
         triangles.push_back({number[merged[old[0]]], number[merged[old[1]]], number[merged[old[2]]]});
         places.push_back(out.names.triangle_place[t]);
     }
     const std::size_t lost = mesh.triangles.size() - triangles.size();
     if (lost > 0)
-        out.notes.push_back(fmt::format("{} triangles collapsed by welding vertices and were dropped.", lost));
+        out.notes.push_back(fmt::format("{} triangles collapsed when vertices were welded, and were dropped.", lost));
     mesh.points = std::move(points);
     mesh.triangles = std::move(triangles);
     out.names.triangle_place = std::move(places);
@@ -165,12 +165,12 @@ ImportedMesh read_mesh(const std::filesystem::path& path, double weld) {
     if (!(weld >= 0) || !std::isfinite(weld))
         throw MeshError(fmt::format("{}: weld must be a number >= 0, not {}", path.string(), weld));
     const FileMesh file = read_file(path);
-    if (file.faces.empty()) throw MeshError(path.string() + ": there are no faces in it");
+    if (file.faces.empty()) throw MeshError(path.string() + ": the file contains no faces");
     double size = 0;
     for (const Eigen::Vector3d& x : file.points) size = std::max(size, x.lpNorm<Eigen::Infinity>());
     if (weld > 0 && weld < 1e-15 * size) {
-        throw MeshError(
-            fmt::format("{}: weld = {:g} is below the rounding of coordinates up to {:g}", path.string(), weld, size));
+        throw MeshError(fmt::format("{}: weld = {:g} is below the rounding error of coordinates as large as {:g}",
+                                    path.string(), weld, size));
     }
     ImportedMesh out;
     out.names.file = path.string();

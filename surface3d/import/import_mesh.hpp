@@ -1,5 +1,5 @@
 // Closed surfaces from files: OBJ, OFF, PLY (ascii, binary of both byte orders) and STL (ascii, binary).
-// The way of a mesh: read_mesh -> close_mesh (import_check.hpp) -> fit_surface (import_fit.hpp).
+// In this order: read_mesh -> close_mesh (import_check.hpp) -> fit_surface (import_fit.hpp).
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ struct MeshError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Where in its file something stands: line and column from 1 in text, line = 0 and a byte from 0 in binary.
+// A position in a file: line and column from 1 in text, line = 0 and a byte from 0 in binary.
 struct Place {
     std::size_t line = 0, column = 0, byte = 0;
 };
 
-// What the elements of a mesh are called in messages. Triangles are named by number and place, vertices by number
+// Names of the elements of a mesh in messages. Triangles are named by number and place, vertices by number
 // and coordinates, both counted as the file does (OBJ from 1, the others from 0).
 struct MeshNames {
     std::string file = "mesh";
@@ -37,12 +37,12 @@ std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::s
 struct ImportedMesh {
     TriangleMesh mesh;
     MeshNames names;
-    std::vector<std::string> notes;  // what was changed on the way, in whole sentences
+    std::vector<std::string> notes;  // what was changed, in full sentences
 };
 
-// The triangles of a file, its format told by the extension (.obj .off .ply .stl, in either case). Polygons become
+// The triangles of a file; the extension gives the format (.obj .off .ply .stl, in either case). Polygons become
 // triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and
-// triangles that collapse by that are dropped, with a note. Throws MeshError, never returning half a file.
+// triangles that collapse are dropped, with a note. Throws MeshError; never returns part of a file.
 ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0);
 
 }  // namespace tubule::surface3d

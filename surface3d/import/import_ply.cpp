@@ -61,9 +61,9 @@ Property read_property(const TextReader& reader) {
         return *known;
     };
     const bool list = words.size() > 1 && words[1].text == "list";
-    if (words.size() != (list ? 5 : 3)) reader.fail_line("a property has a type and a name");
+    if (words.size() != (list ? 5 : 3)) reader.fail_line("a property needs a type and a name");
     if (!list) return {std::string(words[2].text), type(1), {}};
-    if (is_real(type(2))) reader.fail(words[2], "the length of a list must be of a whole type");
+    if (is_real(type(2))) reader.fail(words[2], "the length of a list must have an integer type");
     return {std::string(words[4].text), type(3), type(2)};
 }
 
@@ -81,16 +81,16 @@ Header read_header(TextReader& reader) {
             header.format = words[1].text;
         } else if (key == "element" && words.size() == 3) {
             header.elements.push_back({std::string(words[1].text), reader.integer(words[2]), {}});
-            if (header.elements.back().count < 0) reader.fail(words[2], "there cannot be less than none");
+            if (header.elements.back().count < 0) reader.fail(words[2], "the count must not be negative");
         } else if (key == "property" && !header.elements.empty()) {
             header.elements.back().properties.push_back(read_property(reader));
         } else {
-            reader.fail_line("this has no place in the header of a PLY file");
+            reader.fail_line("not a line of a PLY header");
         }
     }
     const std::array formats = {"ascii", "binary_little_endian", "binary_big_endian"};
     if (std::find(formats.begin(), formats.end(), header.format) == formats.end()) {
-        reader.fail_line("the header gives no format (ascii, binary_little_endian or binary_big_endian)");
+        reader.fail_line("the header must name a format (ascii, binary_little_endian or binary_big_endian)");
     }
     return header;
 }
@@ -100,7 +100,7 @@ struct Value {
     Place place;
 };
 
-// The values after the header, one after the other, from words or from bytes.
+// The values after the header, read in sequence from words or bytes.
 class Body {
 public:
     Body(const std::string& name, std::string_view data, TextReader& text, const std::string& format)
@@ -137,12 +137,12 @@ public:
         throw std::logic_error("PLY type");
     }
 
-    // Throws MeshError when anything but white space follows.
+    // Throws MeshError if anything except white space follows.
     void expect_end() {
         if (ascii_) {
-            if (text_.next_line()) text_.fail_line("more follows after the elements announced");
+            if (text_.next_line()) text_.fail_line("the file continues after the elements that its header declares");
         } else if (data_.find_first_not_of(" \t\r\n", position_) != data_.npos) {
-            fail({0, 0, position_}, "more follows after the elements announced");
+            fail({0, 0, position_}, "the file continues after the elements that its header declares");
         }
     }
 
@@ -154,7 +154,7 @@ private:
     template <class T>
     Value bytes(const std::string& what) {
         if (data_.size() - position_ < sizeof(T)) {
-            fail({0, 0, data_.size()}, "the file ends where " + what + " should be");
+            fail({0, 0, data_.size()}, "the file ends; expected " + what);
         }
         std::array<char, sizeof(T)> raw;
         std::memcpy(raw.data(), data_.data() + position_, sizeof(T));
@@ -202,18 +202,18 @@ void read_face(Body& body, const Element& element, const std::string& what, File
     }
 }
 
-// Refuses what has no points or faces in it, before anything of the body is read.
+// Rejects files without points or faces before the body is read.
 void check_header(const TextReader& reader, const Header& header) {
     int vertex_elements = 0, coordinates = 0, face_elements = 0, corner_lists = 0;
     for (const Element& element : header.elements) {
         if (element.properties.empty()) reader.fail_line(fmt::format("element {} has no properties", element.name));
-        if (element.name == "tristrips") reader.fail_line("triangle strips cannot be read; write faces instead");
+        if (element.name == "tristrips") reader.fail_line("triangle strips are not supported; write faces instead");
         vertex_elements += element.name == "vertex";
         face_elements += element.name == "face";
         for (const Property& p : element.properties) {
             if (element.name == "vertex" && !p.count) coordinates += p.name == "x" || p.name == "y" || p.name == "z";
             if (element.name == "face" && is_corner_list(p)) {
-                if (is_real(p.type)) reader.fail_line("the vertices of faces must be of a whole type");
+                if (is_real(p.type)) reader.fail_line("the vertex indices of faces must have an integer type");
                 ++corner_lists;
             }
         }

@@ -30,7 +30,7 @@ FileMesh read_binary(const std::string& name, std::string_view data) {
     for (std::size_t f = 0; f < facets; ++f) {
         const std::size_t begin = stl_header + stl_facet * f;
         mesh.faces.emplace_back();
-        for (std::size_t corner = 1; corner <= 3; ++corner) {  // the normal comes first and is not looked at
+        for (std::size_t corner = 1; corner <= 3; ++corner) {  // the normal comes first and is ignored
             Eigen::Vector3d point;
             for (std::size_t d = 0; d < 3; ++d) {
                 const std::size_t byte = begin + 12 * corner + 4 * d;
@@ -51,7 +51,7 @@ void expect(TextReader& reader, std::string_view first, std::string_view second 
     const std::vector<Word>& words = reader.words();
     if (!is_keyword(words[0].text, first) ||
         (!second.empty() && (words.size() < 2 || !is_keyword(words[1].text, second)))) {
-        reader.fail_line(fmt::format("'{}' should be here", phrase));
+        reader.fail_line(fmt::format("expected '{}'", phrase));
     }
 }
 
@@ -72,11 +72,11 @@ FileMesh read_ascii(const std::string& name, std::string_view data) {
     TextReader reader(name, data, 0);
     FileMesh mesh;
     while (reader.next_line()) {  // a file may hold several solids, each a part of the surface
-        if (!is_keyword(reader.words()[0].text, "solid")) reader.fail_line("'solid' should be here");
+        if (!is_keyword(reader.words()[0].text, "solid")) reader.fail_line("expected 'solid'");
         while (true) {
             if (!reader.next_line()) reader.fail_end("'facet' or 'endsolid'");
             if (is_keyword(reader.words()[0].text, "endsolid")) break;
-            if (!is_keyword(reader.words()[0].text, "facet")) reader.fail_line("'facet' or 'endsolid' should be here");
+            if (!is_keyword(reader.words()[0].text, "facet")) reader.fail_line("expected 'facet' or 'endsolid'");
             read_facet(reader, mesh);
         }
     }
@@ -95,10 +95,10 @@ FileMesh read_stl(const std::string& name, std::string_view data) {
     if (text) return read_ascii(name, data);
     if (!has_header) {
         throw MeshError(at(name, {0, 0, data.size()}) +
-                        "neither text that begins with 'solid' nor the 84 bytes that a binary STL file begins with");
+                        "not an STL file: it neither begins with 'solid' nor has the 84-byte header of binary STL");
     }
     throw MeshError(at(name, {0, 0, 80}) +
-                    fmt::format("{} facets are announced, which makes {} bytes, but the file has {}", facets,
+                    fmt::format("the header declares {} facets, which need {} bytes, but the file has {}", facets,
                                 stl_header + stl_facet * facets, data.size()));
 }
 

@@ -10,7 +10,7 @@ namespace tubule::surface3d {
 
 namespace {
 
-// Words as messages show them: no endless ones.
+// Words as messages show them, shortened if they are long.
 std::string shown(std::string_view text) {
     return std::string(text.substr(0, 40)) + (text.size() > 40 ? "..." : "");
 }
@@ -74,7 +74,7 @@ double TextReader::number(const Word& word) const {
 
 std::int64_t TextReader::integer(const Word& word) const {
     std::int64_t value = 0;
-    if (!parse(word.text, value)) fail(word, fmt::format("'{}' is not a whole number", shown(word.text)));
+    if (!parse(word.text, value)) fail(word, fmt::format("'{}' is not an integer", shown(word.text)));
     return value;
 }
 
@@ -96,7 +96,7 @@ void TextReader::fail_line(const std::string& message) const {
 }
 
 void TextReader::fail_end(const std::string& what) const {
-    throw MeshError(at(name_, {line_ + 1, 1, text_.size()}) + "the file ends where " + what + " should be");
+    throw MeshError(at(name_, {line_ + 1, 1, text_.size()}) + "the file ends; expected " + what);
 }
 
 bool is_keyword(std::string_view word, std::string_view lower) {

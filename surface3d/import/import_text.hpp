@@ -17,7 +17,7 @@ struct Word {
 // "name:line:column: " in text, "name: byte n: " in binary.
 std::string at(const std::string& name, const Place& place);
 
-// Goes through a text line by line; lines may end in LF, CRLF or CR. A `comment` character (0: none) ends a line.
+// Reads a text line by line; lines may end in LF, CRLF or CR. A `comment` character (0: none) ends a line.
 class TextReader {
 public:
     TextReader(std::string name, std::string_view text, char comment);
@@ -26,19 +26,19 @@ public:
     bool next_line();
     const std::vector<Word>& words() const { return words_; }
 
-    // The next word, on whatever line. Throws MeshError at the end of the file: it ends where `what` should be.
+    // The next word, on this line or a later one. Throws MeshError, with `what` as expected, at the end of the file.
     Word next_word(const std::string& what);
 
     std::size_t position() const { return position_; }  // byte after the line last read
 
-    // Throw MeshError, with the word, when it is not what it should be.
+    // Throw MeshError, naming the word, when it does not have the right form.
     double number(const Word& word) const;  // finite
     std::int64_t integer(const Word& word) const;
     Eigen::Vector3d point(std::size_t first_word) const;  // three words of this line
 
     [[noreturn]] void fail(const Word& word, const std::string& message) const;
     [[noreturn]] void fail_line(const std::string& message) const;  // at the line's first word
-    [[noreturn]] void fail_end(const std::string& what) const;      // "the file ends where `what` should be"
+    [[noreturn]] void fail_end(const std::string& what) const;      // "the file ends; expected `what`"
 
 private:
     std::string name_;
@@ -49,7 +49,7 @@ private:
     std::size_t next_ = 0;  // of words_
 };
 
-// Equal, letter case aside; `lower` is in lower case.
+// Equal up to letter case; `lower` is in lower case.
 bool is_keyword(std::string_view word, std::string_view lower);
 
 }  // namespace tubule::surface3d

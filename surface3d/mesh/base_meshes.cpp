@@ -85,7 +85,7 @@ void make_delaunay(TriangleMesh& mesh) {
 }  // namespace
 
 TriangleMesh icosphere(int n) {
-    if (n < 1) throw std::invalid_argument("an icosphere divides its edges in 1 or more");
+    if (n < 1) throw std::invalid_argument("an icosphere needs 1 or more divisions of each edge");
     const double g = (1 + std::sqrt(5.0)) / 2;
     const std::vector<Eigen::Vector3d> corners{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0},
                                                {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g},
@@ -144,7 +144,7 @@ TriangleMesh torus_grid(const Torus& torus, int n_axis, int n_tube) {
 TriangleMesh ring_mesh(const std::vector<Ring>& rings, double period) {
     const int n = static_cast<int>(rings.size());
     if (n < 2 || (period == 0 && (n < 3 || rings.front().count != 1 || rings.back().count != 1)))
-        throw std::invalid_argument("rings must end in poles or repeat");
+        throw std::invalid_argument("rings must end in poles or be periodic");
     TriangleMesh mesh{.points = {}, .triangles = {}, .period = period, .shifts = {}};
     std::vector<int> first;
     for (const Ring& ring : rings) {
@@ -182,7 +182,7 @@ TriangleMesh ring_mesh(const std::vector<Ring>& rings, double period) {
 
 TriangleMesh tube_rings(double radius, double length, int n_z, int n_theta) {
     if (n_z < 2 || n_z % 2 || n_theta < 3)
-        throw std::invalid_argument("a tube needs an even number of rings, 3 points");
+        throw std::invalid_argument("a tube needs an even number of rings and at least 3 points in each");
     std::vector<Ring> rings;
     for (int k = 0; k < n_z; ++k) rings.push_back({radius, length * k / n_z, n_theta, k % 2 ? 0.5 : 0.0});
     return ring_mesh(rings, length);

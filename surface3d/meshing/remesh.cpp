@@ -263,7 +263,8 @@ StopReport lost(Stop reason, const std::string& what, const Vector3d& x, const s
 std::optional<StopReport> find_turned(const Work& w) {
     for (int h = 0; h < w.edges.size(); h += 3)
         if (w.edges.exists(h) && !(w.score_of(h) > 0))
-            return lost(Stop::mesh_lost, "remeshing leaves a triangle that turns away from the surface",
+            return lost(Stop::mesh_lost,
+                        "remeshing leaves a triangle whose normal points away from that of the surface",
                         w.edges.position(h), "use more triangles, or remesh earlier");
     return std::nullopt;
 }
@@ -294,7 +295,8 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
     }
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         if (!(nodes[i].foot.distance < near_foot * nodes[i].width))
-            return lost(Stop::mesh_lost, "the new triangles leave the surface", nodes[i].flat, "use more triangles");
+            return lost(Stop::mesh_lost, "the new triangles are too far from the surface", nodes[i].flat,
+                        "use more triangles");
         if (!(moved[i] < near_graph))
             return lost(Stop::resolution_lost, "the nodes do not determine a smooth surface", nodes[i].foot.x,
                         "use more triangles, or remesh earlier");
@@ -303,7 +305,7 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
     out.quality = mesh_quality(out.mesh);
     if (!(out.quality.worst >= options.quality))
         return lost(Stop::mesh_lost,
-                    fmt::format("remeshing reaches a quality of {:.2g}, not the {:.2g} asked for, in the triangle",
+                    fmt::format("remeshing reaches a quality of {:.2g} instead of the required {:.2g} in the triangle",
                                 out.quality.worst, options.quality),
                     out.quality.where, "use more triangles, or remesh earlier");
     return out;
@@ -324,7 +326,7 @@ void check(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, const RemeshOp
             fmt::format("fields have {} columns, but the mesh has {} nodes", fields.cols(), mesh.size()));
     if (!(o.triangles >= 0 && o.angle > 0 && o.growth > 0 && o.quality > 0 && o.quality < 1))
         throw std::invalid_argument(
-            fmt::format("remeshing takes triangles >= 0, angle > 0, growth > 0 and 0 < quality < 1, not {}, {}, {}, {}",
+            fmt::format("remeshing needs triangles >= 0, angle > 0, growth > 0 and 0 < quality < 1, not {}, {}, {}, {}",
                         o.triangles, o.angle, o.growth, o.quality));
 }
 
@@ -338,7 +340,7 @@ std::variant<Remeshed, StopReport> remesh(const CurvedMesh& mesh, const Eigen::M
         return lost(Stop::mesh_lost, fmt::format("triangle {} folds", before.worst_cell), before.where,
                     "remesh earlier");
     if (joins_twice(corner_triangles(mesh)))
-        return StopReport{Stop::mesh_lost, 0, "a tube of fewer than three rings of triangles cannot be meshed anew",
+        return StopReport{Stop::mesh_lost, 0, "a tube with fewer than three rings of triangles cannot be remeshed",
                           "use more elements"};
     const PatchRecovery recovery(mesh);
     const CurvatureField curvature = recovery.nodal(mesh);

@@ -89,7 +89,7 @@ MeshSizes mesh_sizes(const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eig
         const Eigen::Vector3d x = mesh.nodes[narrowest];
         sizes.lost = StopReport{
             Stop::resolution_lost, 0,
-            fmt::format("a curvature of {:.3g} at ({:.6g}, {:.6g}, {:.6g}) asks for {:.3g} triangles instead of {}",
+            fmt::format("a curvature of {:.3g} at ({:.6g}, {:.6g}, {:.6g}) needs {:.3g} triangles, but {} are allowed",
                         options.angle / smallest, x[0], x[1], x[2], needed, wanted),
             "allow more triangles"};
         return sizes;

@@ -193,7 +193,8 @@ PaperStepper::PaperStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const 
     if (law.inertia == 0 && law.friction == 0)
         throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: nothing decides rigid motions");
     if (!(smoothing >= 0))
-        throw std::invalid_argument(fmt::format("curvatures are smoothed by eps >= 0, not {:g}", smoothing));
+        throw std::invalid_argument(
+            fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", smoothing));
 }
 
 MotionState PaperStepper::start(const CurvedMesh& mesh) const {

@@ -57,7 +57,7 @@ TEST(CloseMesh, MeasuresATetrahedron) {
     EXPECT_NEAR(report.kink_max, std::acos(-1 / std::sqrt(3)) * 180 / std::numbers::pi, 1e-12);
     ASSERT_EQ(mesh.notes.size(), 1u);
     EXPECT_EQ(mesh.notes[0],
-              "triangle 0 and triangle 2 meet at a kink of 125 degrees, the largest: a smooth surface through such "
+              "The largest kink is 125 degrees, between triangle 0 and triangle 2: a smooth surface through such "
               "edges is a guess.");
 }
 
@@ -95,7 +95,7 @@ TEST(CloseMesh, TurnsASurfaceThatFacesInward) {
         EXPECT_GT((x[b] - x[a]).cross(x[c] - x[a]).dot(x[a]), 0);
     }
     ASSERT_EQ(mesh.notes.size(), 1u);
-    EXPECT_EQ(mesh.notes[0], "All triangles faced inward and were turned.");
+    EXPECT_EQ(mesh.notes[0], "All triangles faced inward; their orientation was reversed.");
 }
 
 TEST(CloseMesh, DropsVerticesOfNoTriangleAndKeepsTheNamesOfTheOthers) {
@@ -129,41 +129,43 @@ TEST(CloseMesh, RefusesAVertexWhereTwoSheetsTouch) {
     EXPECT_EQ(
         refusal_of_obj(corners + faces + "v -1 0 0\nv 0 -1 0\nv 0 0 -1\nf 1 5 6\nf 1 7 5\nf 5 7 6\nf 6 7 1\n"),
         "a.obj: non-manifold vertex: triangle 1 (line 5) and triangle 5 (line 12) meet at vertex 1 (0, 0, 0), but "
-        "no fan of triangles around it joins them");
+        "no fan of triangles around it connects them");
 }
 
 TEST(CloseMesh, RefusesMixedOrientation) {
     EXPECT_EQ(refusal_of_obj(corners + "f 1 3 2\nf 1 2 4\nf 2 4 3\nf 3 1 4\n"),
-              "a.obj: inconsistently oriented: triangle 1 (line 5) and triangle 3 (line 7) run the same way along the "
+              "a.obj: inconsistently oriented: triangle 1 (line 5) and triangle 3 (line 7) traverse the same direction "
+              "along the "
               "edge from vertex 3 (0, 1, 0) to vertex 2 (1, 0, 0)");
 }
 
 TEST(CloseMesh, RefusesDegenerateTriangles) {
     EXPECT_EQ(refusal_of_obj("v 0 0 0\nv 1 0 0\nv 0.5 1e-7 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"),
               "a.obj: triangle 1 (line 5) is degenerate: vertex 1 (0, 0, 0), vertex 3 (0.5, 1e-07, 0) and vertex 2 "
-              "(1, 0, 0) are on one line");
+              "(1, 0, 0) are collinear");
     // Two vertices at one place become one, and their triangle an edge.
     EXPECT_EQ(refusal_of_obj("v 0 0 0\nv 1 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"),
-              "a.obj: triangle 1 (line 5) is degenerate: it has vertex 2 (1, 0, 0) twice");
+              "a.obj: triangle 1 (line 5) is degenerate: vertex 2 (1, 0, 0) occurs twice in it");
 }
 
 TEST(CloseMesh, RefusesDuplicateFaces) {
     EXPECT_EQ(refusal_of_obj(corners + faces + "f 2 4 1\n"),
-              "a.obj: triangle 2 (line 6) and triangle 5 (line 9) are the same: duplicate faces");
+              "a.obj: duplicate faces: triangle 2 (line 6) and triangle 5 (line 9) have the same vertices");
     EXPECT_EQ(refusal_of_obj(corners + faces + "f 4 2 1\n"),
-              "a.obj: triangle 2 (line 6) and triangle 5 (line 9) are the same: duplicate faces");
+              "a.obj: duplicate faces: triangle 2 (line 6) and triangle 5 (line 9) have the same vertices");
 }
 
 TEST(CloseMesh, RefusesSeveralComponents) {
     EXPECT_EQ(refusal_of_obj(corners + faces + second_corners + second_faces),
-              "a.obj: 2 separate surfaces in one mesh: triangle 5 (line 13) is not connected to triangle 1 (line 5)");
+              "a.obj: the mesh consists of 2 separate surfaces: triangle 5 (line 13) is not connected to triangle 1 "
+              "(line 5)");
 }
 
 TEST(CloseMesh, RefusesBrokenMeshesInMemory) {
     TriangleMesh mesh = geodesic_sphere(2);
-    EXPECT_EQ(refusal(imported({})), "mesh: there are no triangles in it");
+    EXPECT_EQ(refusal(imported({})), "mesh: the mesh has no triangles");
     mesh.triangles[3][1] = 99;
-    EXPECT_EQ(refusal(imported(mesh)), "mesh: triangle 3 needs point 99 of 42");
+    EXPECT_EQ(refusal(imported(mesh)), "mesh: triangle 3 uses point 99, but there are 42");
     mesh = geodesic_sphere(2);
     mesh.points[mesh.triangles[0][0]] = Vector3d(0, NAN, 0);
     EXPECT_EQ(refusal(imported(mesh)), "mesh: vertex 0 (0, nan, 0) is not finite");
@@ -181,8 +183,8 @@ TEST(CloseMesh, RefusesSelfIntersectionOnTenThousandTriangles) {
     *lowest = Vector3d(0.01, 0.02, 1.5);
     const std::string message = refusal(imported(mesh));
     int first = -1, second = -1;
-    ASSERT_EQ(std::sscanf(message.c_str(), "mesh: the surface intersects itself: triangle %d meets triangle %d", &first,
-                          &second),
+    ASSERT_EQ(std::sscanf(message.c_str(), "mesh: the surface intersects itself: triangle %d intersects triangle %d",
+                          &first, &second),
               2)
         << message;
     const auto has_spike = [&](int t) { return std::ranges::count(mesh.triangles[t], spike) == 1; };

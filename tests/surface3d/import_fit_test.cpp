@@ -143,7 +143,7 @@ TEST_P(EveryOrder, SmoothingTakesNoiseOut) {
     ASSERT_EQ(report[0].notes.size(), 1u);
     EXPECT_EQ(report[0].notes[0],
               fmt::format("The vertices are {:.2g} of an edge (root mean square) off the smooth surface through their "
-                          "neighbours: the mesh is coarse, or noisy and wants smoothing.",
+                          "neighbours: the mesh is coarse, or it is noisy and needs smoothing.",
                           report[0].roughness));
     EXPECT_TRUE(report[1].notes.empty());
     EXPECT_GT(report[1].moved_rms, 0);
@@ -185,8 +185,9 @@ TEST(Fit, SmallMeshesGetLowerDegreesWithANote) {
     const Fit fit = fit_surface(closed(geodesic_sphere(1)), {.order = 2});
     EXPECT_EQ(fit.report.reduced, 12u);
     ASSERT_EQ(fit.report.notes.size(), 1u);
-    EXPECT_EQ(fit.report.notes[0],
-              "At 12 of 12 vertices the neighbourhood bears no polynomial of degree 3; a lower one was used.");
+    EXPECT_EQ(
+        fit.report.notes[0],
+        "At 12 of 12 vertices the neighbourhood does not determine a polynomial of degree 3; a lower one was used.");
 }
 
 std::string refusal(const TriangleMesh& mesh, int order) {
@@ -200,8 +201,10 @@ TEST(Fit, RefusesARimThatTheMeshDoesNotResolve) {
     const std::string message = refusal(irregular({.axes = {1, 1, 0.1}}, 8), 3);
     int triangle = -1;
     ASSERT_EQ(std::sscanf(message.c_str(), "mesh: triangle %d: ", &triangle), 1) << message;
-    EXPECT_EQ(message, fmt::format("mesh: triangle {}: the polynomials of its vertices do not meet above it{}",
-                                   triangle, advice));
+    EXPECT_EQ(
+        message,
+        fmt::format("mesh: triangle {}: the polynomials fitted at its vertices do not reach a common point above it{}",
+                    triangle, advice));
 }
 
 TEST(Fit, RefusesElementsThatFold) {
@@ -215,7 +218,7 @@ TEST(Fit, RefusesElementsThatFold) {
 TEST(Fit, RefusesElementsThatMeetWhereFlatTrianglesDoNot) {
     EXPECT_EQ(refusal(bent_body(0.01), 3), "accepted");
     EXPECT_EQ(refusal(bent_body(-0.003), 3),
-              "mesh: triangle 43: the fitted element meets that of triangle 1358" + advice);
+              "mesh: triangle 43: the fitted element intersects that of triangle 1358" + advice);
 }
 
 TEST(Fit, RefusesOptionsOutOfRange) {

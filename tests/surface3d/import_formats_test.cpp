@@ -122,33 +122,33 @@ TEST(Obj, Refusals) {
          {"v 1 2\n", ":1:1: a point needs three coordinates"},
          {three + "f 1 2\n", ":4:1: a face needs three vertices"},
          {three + "f 1 0 2\n", ":4:5: OBJ counts vertices from 1, or back from -1; there is no vertex 0"},
-         {three + "f 1 2 -4\n", ":4:7: vertex -4 counts back beyond the first of the 3 vertices read so far"},
-         {three + "f 1/1 2/1 9/1\n", ":4:11: the face needs vertex 9, but vertices are 1 to 3"},
-         {three + "f 1 2 1\n", ":4:7: vertex 1 is twice in one face, a degenerate one"},
-         {three + "f 1 2 3.5\n", ":4:7: '3.5' is not a whole number"},
-         {three + "f 1 2 3/x\n", ":4:7: 'x' is not a whole number"},
-         {three + "  curv 0 1 2\n", ":4:3: cannot read 'curv': only vertices and plane faces (v, f) make a mesh here"},
-         {three + "v 1 1 0\nf 1 4 2 3\n", ":5:3: a face of 4 vertices that crosses itself or has no area"},
-         {three, ": there are no faces in it"}});
+         {three + "f 1 2 -4\n", ":4:7: vertex -4 counts back from the end, but only 3 vertices have been read so far"},
+         {three + "f 1/1 2/1 9/1\n", ":4:11: the face uses vertex 9, but vertices are numbered 1 to 3"},
+         {three + "f 1 2 1\n", ":4:7: degenerate face: vertex 1 occurs twice"},
+         {three + "f 1 2 3.5\n", ":4:7: '3.5' is not an integer"},
+         {three + "f 1 2 3/x\n", ":4:7: 'x' is not an integer"},
+         {three + "  curv 0 1 2\n", ":4:3: cannot read 'curv': only vertices and flat faces (v, f) are supported"},
+         {three + "v 1 1 0\nf 1 4 2 3\n", ":5:3: a face of 4 vertices crosses itself or has no area"},
+         {three, ": the file contains no faces"}});
 }
 
 TEST(Off, Refusals) {
     const std::string head = "OFF\n# a comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
     expect_refusals("a.off", {{"3 1 0\n", ":1:1: an OFF file begins with the word OFF"},
-                              {"\n# nothing\n", ":3:1: the file ends where the word OFF should be"},
-                              {"4OFF\n3 1 0\n", ":1:1: only OFF in three dimensions can be read"},
-                              {"OFF BINARY\n", ":1:1: binary OFF cannot be read"},
-                              {"OFF\n", ":2:1: the file ends where the numbers of vertices and faces should be"},
-                              {"OFF 3\n", ":1:5: the numbers of vertices, faces (and edges) are needed"},
-                              {"OFF\n-3 1 0\n", ":2:1: there cannot be less than no vertices"},
-                              {"OFF\n3 -1 0\n", ":2:3: there cannot be less than no faces"},
-                              {"OFF 3 1 0\n0 0 0\n1 0 0", ":4:1: the file ends where vertex 2 of 3 should be"},
+                              {"\n# nothing\n", ":3:1: the file ends; expected the word OFF"},
+                              {"4OFF\n3 1 0\n", ":1:1: only three-dimensional OFF is supported"},
+                              {"OFF BINARY\n", ":1:1: binary OFF is not supported"},
+                              {"OFF\n", ":2:1: the file ends; expected the numbers of vertices and faces"},
+                              {"OFF 3\n", ":1:5: expected the numbers of vertices, faces (and edges)"},
+                              {"OFF\n-3 1 0\n", ":2:1: the number of vertices must not be negative"},
+                              {"OFF\n3 -1 0\n", ":2:3: the number of faces must not be negative"},
+                              {"OFF 3 1 0\n0 0 0\n1 0 0", ":4:1: the file ends; expected vertex 2 of 3"},
                               {"OFF 3 1 0\n0 0\n", ":2:1: a point needs three coordinates"},
-                              {head, ":7:1: the file ends where face 0 of 1 should be"},
+                              {head, ":7:1: the file ends; expected face 0 of 1"},
                               {head + "2 0 1\n", ":7:1: a face needs three vertices, this one has 2"},
-                              {head + "4 0 1 2\n", ":7:1: not all 4 vertices follow"},
-                              {head + "3 0 1 3\n", ":7:7: the face needs vertex 3, but vertices are 0 to 2"},
-                              {head + "3 0 1 2\n3 0 2 1\n", ":8:1: more follows after the 1 faces announced"}});
+                              {head + "4 0 1 2\n", ":7:1: the line has fewer than the 4 vertices of this face"},
+                              {head + "3 0 1 3\n", ":7:7: the face uses vertex 3, but vertices are numbered 0 to 2"},
+                              {head + "3 0 1 2\n3 0 2 1\n", ":8:1: the file continues after its 1 faces"}});
 }
 
 // A PLY header of three vertices (float x y z) and one face, with one line exchanged.
@@ -164,27 +164,28 @@ TEST(Ply, Refusals) {
     expect_refusals(
         "a.ply",
         {{"solid\n", ":1:1: a PLY file begins with the word ply"},
-         {"ply\nformat ascii 1.0\n", ":3:1: the file ends where end_header should be"},
+         {"ply\nformat ascii 1.0\n", ":3:1: the file ends; expected end_header"},
          {ply_head("ascii", "utf8"),
-          ":9:1: the header gives no format (ascii, binary_little_endian or binary_big_endian)"},
+          ":9:1: the header must name a format (ascii, binary_little_endian or binary_big_endian)"},
          {ply_head("float y", "real y"), ":5:10: unknown type 'real'"},
-         {ply_head("uchar int", "float int"), ":8:15: the length of a list must be of a whole type"},
-         {ply_head("float y", "float"), ":5:1: a property has a type and a name"},
-         {ply_head("element vertex 3", "element vertex many"), ":3:16: 'many' is not a whole number"},
-         {ply_head("element vertex 3", "element vertex -3"), ":3:16: there cannot be less than none"},
-         {ply_head("element vertex 3", "elements vertex 3"), ":3:1: this has no place in the header of a PLY file"},
+         {ply_head("uchar int", "float int"), ":8:15: the length of a list must have an integer type"},
+         {ply_head("float y", "float"), ":5:1: a property needs a type and a name"},
+         {ply_head("element vertex 3", "element vertex many"), ":3:16: 'many' is not an integer"},
+         {ply_head("element vertex 3", "element vertex -3"), ":3:16: the count must not be negative"},
+         {ply_head("element vertex 3", "elements vertex 3"), ":3:1: not a line of a PLY header"},
          {ply_head("property list uchar int vertex_index\n", ""), ":8:1: element face has no properties"},
-         {ply_head("face", "tristrips"), ":9:1: triangle strips cannot be read; write faces instead"},
+         {ply_head("face", "tristrips"), ":9:1: triangle strips are not supported; write faces instead"},
          {ply_head("float y", "float b"), ":9:1: the header needs one element 'vertex' with properties x, y and z"},
          {ply_head("vertex_index", "corners"),
           ":9:1: the header needs one element 'face' with one list vertex_indices (or vertex_index)"},
-         {ply_head("uchar int", "uchar float"), ":9:1: the vertices of faces must be of a whole type"},
+         {ply_head("uchar int", "uchar float"), ":9:1: the vertex indices of faces must have an integer type"},
          {ply_head() + "0 0 0\n1 0 inf\n", ":11:5: 'inf' is not a finite number"},
-         {ply_head() + "0 0 0\n1 0 0\n", ":12:1: the file ends where vertex 2 of 3 should be"},
-         {ply_head() + points + "3 0 1\n", ":14:1: the file ends where face 0 of 1 should be"},
+         {ply_head() + "0 0 0\n1 0 0\n", ":12:1: the file ends; expected vertex 2 of 3"},
+         {ply_head() + points + "3 0 1\n", ":14:1: the file ends; expected face 0 of 1"},
          {ply_head() + points + "2 0 1\n", ":13:1: a face needs three vertices, this one has 2"},
-         {ply_head() + points + "3 0 1 7\n", ":13:7: the face needs vertex 7, but vertices are 0 to 2"},
-         {ply_head() + points + "3 0 1 2\n3 0 2 1\n", ":14:1: more follows after the elements announced"}});
+         {ply_head() + points + "3 0 1 7\n", ":13:7: the face uses vertex 7, but vertices are numbered 0 to 2"},
+         {ply_head() + points + "3 0 1 2\n3 0 2 1\n",
+          ":14:1: the file continues after the elements that its header declares"}});
 }
 
 TEST(Ply, BinaryRefusalsNameTheByte) {
@@ -198,12 +199,13 @@ TEST(Ply, BinaryRefusalsNameTheByte) {
     const auto byte = [&](std::size_t n) { return fmt::format(": byte {}: ", begin + n); };
     const std::string good = head + body(0, 3, 2);
     EXPECT_EQ(read("a.ply", good + "\n").mesh.triangles, (Triangles{{0, 1, 2}}));
-    expect_refusals("a.ply", {{good.substr(0, begin + 30), byte(30) + "the file ends where vertex 2 of 3 should be"},
-                              {good.substr(0, begin + 45), byte(45) + "the file ends where face 0 of 1 should be"},
-                              {head + body(NAN, 3, 2), byte(32) + "a coordinate is not a finite number"},
-                              {head + body(0, 2, 2), byte(36) + "a face needs three vertices, this one has 2"},
-                              {head + body(0, 3, -1), byte(45) + "the face needs vertex -1, but vertices are 0 to 2"},
-                              {good + "x", byte(49) + "more follows after the elements announced"}});
+    expect_refusals("a.ply",
+                    {{good.substr(0, begin + 30), byte(30) + "the file ends; expected vertex 2 of 3"},
+                     {good.substr(0, begin + 45), byte(45) + "the file ends; expected face 0 of 1"},
+                     {head + body(NAN, 3, 2), byte(32) + "a coordinate is not a finite number"},
+                     {head + body(0, 2, 2), byte(36) + "a face needs three vertices, this one has 2"},
+                     {head + body(0, 3, -1), byte(45) + "the face uses vertex -1, but vertices are numbered 0 to 2"},
+                     {good + "x", byte(49) + "the file continues after the elements that its header declares"}});
 }
 
 TEST(Stl, SeveralSolidsAndAnyCase) {
@@ -216,19 +218,19 @@ TEST(Stl, SeveralSolidsAndAnyCase) {
 
 TEST(Stl, Refusals) {
     const std::string begin = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n";
-    expect_refusals("a.stl",
-                    {{"solid\n", ":2:1: the file ends where 'facet' or 'endsolid' should be"},
-                     {begin, ":6:1: the file ends where 'vertex' should be"},
-                     {begin + "vertex 0 1 0 1\n", ":6:14: a point has three coordinates"},
-                     {begin + "vertex 0 1\n", ":6:1: a point needs three coordinates"},
-                     {begin + "vertex 0 1 0\nvertex 1 1 0\n", ":7:1: 'endloop' should be here"},
-                     {"solid\nfacet normal 0 0 1\nouter ring\n", ":3:1: 'outer loop' should be here"},
-                     {"solid\nface\n", ":2:1: 'facet' or 'endsolid' should be here"},
-                     {"solid\nendsolid\nfacet\n", ":3:1: 'solid' should be here"},
-                     {"solid\nendsolid\n", ": there are no faces in it"},
-                     {"stl",
-                      ": byte 3: neither text that begins with 'solid' nor the 84 bytes that a binary STL file "
-                      "begins with"}});
+    expect_refusals(
+        "a.stl",
+        {{"solid\n", ":2:1: the file ends; expected 'facet' or 'endsolid'"},
+         {begin, ":6:1: the file ends; expected 'vertex'"},
+         {begin + "vertex 0 1 0 1\n", ":6:14: a point has three coordinates"},
+         {begin + "vertex 0 1\n", ":6:1: a point needs three coordinates"},
+         {begin + "vertex 0 1 0\nvertex 1 1 0\n", ":7:1: expected 'endloop'"},
+         {"solid\nfacet normal 0 0 1\nouter ring\n", ":3:1: expected 'outer loop'"},
+         {"solid\nface\n", ":2:1: expected 'facet' or 'endsolid'"},
+         {"solid\nendsolid\nfacet\n", ":3:1: expected 'solid'"},
+         {"solid\nendsolid\n", ": the file contains no faces"},
+         {"stl",
+          ": byte 3: not an STL file: it neither begins with 'solid' nor has the 84-byte header of binary STL"}});
     TriangleMesh mesh;
     mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 1}};
@@ -236,7 +238,7 @@ TEST(Stl, Refusals) {
     mesh.points[2][1] = NAN;
     expect_refusals("a.stl",
                     {{good.substr(0, 150),
-                      ": byte 80: 2 facets are announced, which makes 184 bytes, but the file has "
+                      ": byte 80: the header declares 2 facets, which need 184 bytes, but the file has "
                       "150"},
                      {stl_binary(mesh), ": byte 124: a coordinate is not a finite number"}});  // 84 + 12 + 2 * 12 + 4
 }
@@ -260,7 +262,7 @@ TEST(ReadMesh, RefusesWhatIsNoMeshFile) {
     directory.write("a.obj", three + "f 1 2 3\n");
     EXPECT_EQ(message("a.obj", -1), "a.obj: weld must be a number >= 0, not -1");
     EXPECT_EQ(message("a.obj", NAN), "a.obj: weld must be a number >= 0, not nan");
-    EXPECT_EQ(message("a.obj", 1e-16), "a.obj: weld = 1e-16 is below the rounding of coordinates up to 1");
+    EXPECT_EQ(message("a.obj", 1e-16), "a.obj: weld = 1e-16 is below the rounding error of coordinates as large as 1");
 }
 
 TEST(ReadMesh, RefusesFacesOfTooManyVertices) {
@@ -269,8 +271,8 @@ TEST(ReadMesh, RefusesFacesOfTooManyVertices) {
         points += fmt::format("v {} {} 0\n", std::cos(i * 0.006), std::sin(i * 0.006));
         face += fmt::format(" {}", i);
     }
-    expect_refusals(
-        "a.obj", {{points + face + "\n", ":1002:3: a face of 1001 vertices; at most 1000 can be cut into triangles"}});
+    expect_refusals("a.obj", {{points + face + "\n",
+                               ":1002:3: a face has 1001 vertices; polygons of at most 1000 can be triangulated"}});
 }
 
 // OBJ announces no counts, so a cut one is found only when the surface is checked: it is open.
@@ -333,7 +335,7 @@ TEST(Weld, CollapsedTrianglesAreDroppedWithANote) {
     EXPECT_EQ(mesh.mesh.triangles, (Triangles{{0, 1, 2}}));
     EXPECT_EQ(mesh.names.triangle_place[0].line, 6u);
     ASSERT_EQ(mesh.notes.size(), 1u);
-    EXPECT_EQ(mesh.notes[0], "2 triangles collapsed by welding vertices and were dropped.");
+    EXPECT_EQ(mesh.notes[0], "2 triangles collapsed when vertices were welded, and were dropped.");
 }
 
 }  // namespace

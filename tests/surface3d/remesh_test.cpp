@@ -370,7 +370,7 @@ TEST(Remesh, SaysWhereItCannot) {
 
     const StopReport coarse = refusal(mapped_mesh(icosphere(3), 3, map_of(perturbed_sphere())));
     EXPECT_EQ(coarse.reason, Stop::resolution_lost);
-    EXPECT_NE(coarse.message.find("asks for"), std::string::npos) << coarse.message;
+    EXPECT_NE(coarse.message.find("needs"), std::string::npos) << coarse.message;
 
     const StopReport best = refusal(sheared_ellipsoid(5, 3, 0), {.quality = 0.99});
     EXPECT_EQ(best.reason, Stop::mesh_lost);
