@@ -1,4 +1,4 @@
-"""Maps of scans: what became of each point, the lines between, closed forms over them."""
+"""Maps of scans: the outcome of each point, the boundaries between outcomes, and closed forms."""
 
 import re
 
@@ -16,7 +16,7 @@ from labels import formula
 from results import BadInput
 
 HEIGHT = 4.2  # inches
-# By name of the outcome; those at rest are light, those that end badly dark.
+# By name of the outcome: light for shapes at rest, dark for early stops.
 COLOURS = {
     "uniform-tube": "#d6e4f0",
     "unduloid": "#f6c667",
@@ -53,7 +53,7 @@ class Axis:
         return formula(f"k_{{{modulus[1]}}}") if modulus else NAMES.get(self.key, self.key)
 
     def borders(self):
-        """Between the values, and as far beyond the first and last."""
+        """Midpoints between the values, and as far beyond the first and last."""
         v = np.log(self.values) if self.logarithmic else self.values
         if v.size == 1:
             borders = np.array([v[0] - 0.5, v[0] + 0.5])
@@ -72,7 +72,7 @@ def is_scan(path):
         with h5py.File(path) as file:
             return "scan" in file and "points" in file
     except OSError:
-        return False  # said where it is read
+        return False  # reported where it is read
 
 
 def read(path):

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws dispersion relations of a tube, with their thresholds, from the JSON that `tubule stability` hands over."""
+"""Draws dispersion relations of a tube, with their thresholds, from the JSON of `tubule stability`."""
 
 import argparse
 import json
@@ -13,12 +13,12 @@ def curve_label(m):
 
 
 def rate_limits(models):
-    """What is worth seeing of each model: all that grows, and about as much below zero."""
+    """The range to show for each model: all growing waves, and about as much below zero."""
     limits = []
     for model in models:
         rates = [rate for curve in model["curves"] for rate in curve["rate"] if rate is not None]
         top = max([rate for rate in rates if rate > 0], default=0.0)
-        # Rings may be infinitely fast without friction, so m = 0 tells the scale.
+        # Rings may be infinitely fast without friction, so m = 0 sets the scale.
         lowest = min([rate for rate in model["curves"][0]["rate"] if rate is not None], default=-1.0)
         bottom = max(lowest, -2.0 * top) if top > 0 else lowest / 4
         limits.append((1.06 * bottom, 1.25 * top if top > 0 else -0.12 * bottom))
@@ -47,7 +47,7 @@ def draw_model(axes, model, length, limits, colours):
 
 
 def draw_tensions(axes, data, colours):
-    """The axis of tensions: where each m begins to grow, what is stable in between, where the models are."""
+    """The axis of tensions: the onset of growth for each m, the stable range, and the tensions of the models."""
     from matplotlib.transforms import blended_transform_factory
 
     marks = [limit["tension"] for limit in data["thresholds"]] + [m["report"]["tension"] for m in data["models"]]
@@ -79,7 +79,7 @@ def draw_tensions(axes, data, colours):
 
 
 def draw(data, outputs):
-    """A panel for each model, below them the tensions at which waves begin to grow."""
+    """A panel for each model, below them the tensions at the onset of growth."""
     import style
     from matplotlib.figure import Figure
 

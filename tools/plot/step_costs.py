@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws what a step in three dimensions takes with each measure of its linear system, from the table of step_costs."""
+"""Draws the cost of a step in three dimensions with each measure for its linear system, from the table of step_costs."""
 
 import csv
 import sys
@@ -11,7 +11,7 @@ NUMBERS = ("order", "triangles", "threads", "whole", "analysis", "factors", "ite
 PARTS = ("solvers", "lagged")  # "threads" needs a quiet machine and may be missing
 STEP, SYSTEM = "a step", "its system, with border"
 CHOSEN = "LDL^T single, METIS on nodes"
-DENSE = "the same, H and K first"  # twenty times as long as the others: in the table alone
+DENSE = "the same, H and K first"  # twenty times as long as the others: only in the table
 
 
 @dataclass
@@ -51,7 +51,7 @@ def read_table(path):
 
 
 def draw_solvers(axes, rows, colours):
-    """A bar a measure: its system (the number), and what else a step takes. Bold: what the program does."""
+    """One bar per measure: its linear solve (the number) and the rest of a step. Bold: the method of the program."""
     by_name = {row.measure: row for row in rows}
     rest = by_name[STEP].whole - by_name[SYSTEM].whole
     names = [name for name in by_name if name not in (STEP, SYSTEM, DENSE)]
@@ -70,7 +70,7 @@ def draw_solvers(axes, rows, colours):
 
 
 def draw_lagged(axes, rows, sizes):
-    """What the system takes with kept factors over what it takes with its own; numbers are iterations."""
+    """Time of the linear solve with kept factors over that with new ones; numbers are iterations."""
     import style
 
     for index, (size, colour) in enumerate(zip(sizes, style.line_colours(len(sizes)))):

@@ -1,4 +1,4 @@
-"""How pictures look in print, and how they are written."""
+"""Style and output of pictures."""
 
 import os
 
@@ -43,7 +43,7 @@ plt.rcParams.update(
 
 
 def line_colours(n):
-    """n colours that differ in lightness, so that they also do in grey and to colour-blind eyes."""
+    """n colours that differ in lightness, so that they remain distinct in grey and for colour-blind readers."""
     shades = [0.1] if n == 1 else [0.78 * i / (n - 1) for i in range(n)]
     return [plt.get_cmap("viridis")(shade) for shade in shades]
 
@@ -57,7 +57,7 @@ def time_text(time):
 
 
 def check_outputs(paths):
-    """Refuses what cannot be written before any work is done."""
+    """Raises BadInput, before any work, for a picture that cannot be written."""
     for path in paths:
         if os.path.splitext(path)[1].lower() not in FORMATS:
             raise BadInput(f"{path}: a picture is written as one of {', '.join(FORMATS)}")

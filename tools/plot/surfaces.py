@@ -1,5 +1,5 @@
 """Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K or pressure.
-One quantity beside the other where there is one time; else one column a time, the quantities above each other."""
+With one time the quantities are side by side; else there is one column per time, with the quantities above each other."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,19 +22,19 @@ SLOTS = {1: ((0.29, 0.42),), 2: ((0.12, 0.34), (0.56, 0.34))}  # left end and wi
 
 
 def slots(count):
-    """Room for that many colour bars beside each other."""
+    """Height for this many colour bars side by side."""
     return SLOTS.get(count) or tuple((0.05 + 0.95 * i / count, 0.95 / count - 0.06) for i in range(count))
 
 
 def _areas(surface):
-    """Area that belongs to each value, near enough for a scale of colours."""
+    """Approximate area of each value, for a colour scale."""
     a, b, c = (surface.points[:, corner] for corner in range(3))
     cell = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2 + 1e-300
     return np.broadcast_to(cell[:, None] / surface.H.shape[1], surface.H.shape)
 
 
 def choose_colours(results, wanted):
-    """Names of the quantities to colour by: the wanted ones, else what moves by its normal velocity, else H and K."""
+    """Names of the quantities to colour by: the requested ones, else the normal velocity of moving surfaces, else H and K."""
     if not wanted:
         return ["u_n"] if all(result.moves for result in results) else ["H", "K"]
     for name in wanted:
@@ -45,7 +45,7 @@ def choose_colours(results, wanted):
 
 
 class Motion:
-    """How fast the surfaces of one result are, for what is drawn relative to the largest value on each shape."""
+    """Speeds of the surfaces of one result, for quantities relative to the largest value on each shape."""
 
     def __init__(self, result):
         self.fastest = max(surface.speed for surface in result.surfaces)
@@ -65,14 +65,14 @@ class Motion:
         return largest if largest > flow.NORMAL_ONLY * surface.speed else 0.0
 
     def words(self, surface):
-        """For below the picture."""
+        """The caption below the picture."""
         found = {"u_n": self.u_n(surface), "u_t": self.u_t(surface)}
         lines = [f"|{flow.SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value]
         return "\n".join(lines) or "at rest"
 
 
 class Quantity:
-    """What a surface is coloured by: numbers at the nodes, and the colours of numbers in between."""
+    """The quantity that colours a surface: its values at the nodes and its colour map."""
 
     def __init__(self, name, symbol, colours):
         self.name, self.symbol, self.colours = name, symbol, colours
@@ -129,7 +129,7 @@ class SurfacePanel:
 
         widths = [max(size.width for size in column) for column in self.sizes] * (len(names) if self.beside else 1)
         heights = [max(size.height for size in row) for row in zip(*self.sizes)]
-        pictures = 1 if self.beside else len(names)  # above each other, of every result
+        pictures = 1 if self.beside else len(names)  # above each other, for every result
         self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
         room_x = WIDTH - left - SCALE_BAR - GAP * len(widths)
@@ -151,7 +151,7 @@ class SurfacePanel:
         times = [column.time for column in columns]
         self.titles = ["last state" if t is None else f"{time_name(i)} = {time_text(t)}" for i, t in enumerate(times)]
         if self.beside and not columns[0].time:
-            self.titles = [""]  # the only time there is, and zero: no more than a shape
+            self.titles = [""]  # only the time zero: a shape without a time
         self.height, self.middles = HEADER if any(self.titles) else 0.08, []  # of each row of pictures, from the top
         for tall, caption_room in zip(heights, below):
             for picture in range(pictures):
@@ -167,7 +167,7 @@ class SurfacePanel:
         return "\n".join(words for words in (caption(column, row), *moving) if words)
 
     def draw(self, figure, bottom):
-        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         width, height = figure.get_size_inches()
         axes = figure.add_axes([0, 0, 1, 1])
         axes.set(xlim=(0, width), ylim=(0, height))
@@ -188,8 +188,8 @@ class SurfacePanel:
         self._draw_scale_bar(axes)
 
     def _samples(self, surface, row, size):
-        """The surface as samples of a picture just large enough: the quantities, then the velocity in the view."""
-        per_pixel = self.scale * DPI  # pixels a unit of length
+        """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
+        per_pixel = self.scale * DPI  # pixels per unit of length
         wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * DPI)) for extent in (size.width, size.height))
         rim = (np.array([wide, tall]) / per_pixel - (size.width, size.height)) / 2
         fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]

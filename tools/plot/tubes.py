@@ -1,4 +1,4 @@
-"""Panel (a): one row of profiles a result, one column a time. Tubes r(z): left halves coloured by H, right by K."""
+"""Panel (a): one row of profiles per result, one column per time. Tubes r(z): left halves coloured by H, right by K."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -32,7 +32,7 @@ def same_time(a, b, span):
 
 
 def choose_columns(results, times=None, frames_of=attrgetter("frames")):
-    """Columns of frames at the wanted times, else at up to six of the times there are, evenly by number.
+    """Columns of frames at the wanted times, else at up to six of the available times, evenly spaced by index.
 
     Times that all results have go before others. Of several results, the last frame of one that did not get
     to its end is no common time: it stands, with the reason, in the first later column.
@@ -44,7 +44,7 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
         return result.stopped_early is not None and frame.time >= result.last_shape_time
 
     def has(result, time):
-        """A frame at that time, or none to expect because the run had stopped."""
+        """The frame at that time, or None because the run had stopped."""
         ended = result.stopped_early is not None and result.end_time < time
         return ended or any(same_time(frame.time, time, span) for frame in frames_of(result))
 
@@ -95,9 +95,9 @@ def _area(frame):
 
 class ProfilePanel:
     """Sizes everything in inches first, so that the figure can be made to fit; then draws. How one profile is drawn
-    and coloured, and what is written below it, is left to those that derive from it."""
+    and coloured, and what is written below it, is defined by derived classes."""
 
-    MARGIN = 0.0  # inches around a profile that belong to it
+    MARGIN = 0.0  # inches of margin around a profile
     COLUMN_GAP = 0.14
     MAX_LENGTH = MAX_HEIGHT  # inches of the longest profile
 
@@ -151,7 +151,7 @@ class ProfilePanel:
         return caption(column, row)
 
     def draw(self, figure, bottom):
-        """Draws into the figure with the panel's lower edge `bottom` inches above the figure's."""
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         width, height = figure.get_size_inches()
         axes = figure.add_axes([0, bottom / height, 1, self.height / height])
         axes.set(xlim=(0, width), ylim=(0, self.height))
@@ -198,17 +198,17 @@ class TubePanel(ProfilePanel):
 
     def _draw_profile(self, axes, frame, x, y):
         points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))
-        place = np.linspace(0, frame.z.size - 1, points)  # as dense as the frame's own samples where those are dense
+        place = np.linspace(0, frame.z.size - 1, points)  # as dense as the samples of the frame
 
         def sampled(values):
             return np.interp(place, np.arange(frame.z.size), values)
 
         r = self.scale * sampled(frame.r)
         z = self.scale * sampled(frame.z - (frame.z.min() + frame.z.max()) / 2) + y
-        # Strips even in the angle around the axis; the light comes from the reader, from a little above.
+        # Strips of equal angle around the axis; the light comes from the viewer, from slightly above.
         s = np.sin(np.linspace(0, np.pi / 2, STRIPS + 1))
         middle = (s[1:] + s[:-1]) / 2
-        slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened: necks would go black
+        slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened, because necks would become black
         lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
         shade = (0.7 + 0.3 * np.clip(lit, 0, 1))[..., None]
         for side, values, colours in ((-1, frame.H, self.H), (1, frame.K, self.K)):

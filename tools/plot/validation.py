@@ -93,7 +93,7 @@ def draw_surface(figure, left, bottom, name, colours, limit):
 
 
 def draw_slope(axes, fine, coarse, order, above):
-    """A dashed line of this order from a point, (h, error), to another h; its name above the one end or below the other."""
+    """A dashed line of this order from a point, (h, error), to another h; labelled above one end or below the other."""
     h, error = fine
     end = error * (coarse / h) ** order
     axes.plot([h, coarse], [error, end], color="0.5", linestyle="--", linewidth=0.7, zorder=1)
@@ -139,7 +139,7 @@ def draw(path, outputs):
             panel = [points for (order, _, which), points in lines.items() if (order, which) == (k, quantity)]
             (h, least), (coarsest, _) = min(points[-1] for points in panel), panel[0][0]
             draw_slope(axes, (h, least / 2), coarsest, k if gradient else k + 1, above=False)
-            if k < 4:  # what the paper has found
+            if k < 4:  # orders found in the paper
                 most = max(points[-1][1] for points in panel)
                 draw_slope(axes, (h, 1.8 * most), 1.6 * h, 1 if gradient else 2, above=True)
             axes.xaxis.set_major_locator(FixedLocator([0.05, 0.1, 0.2, 0.4]))

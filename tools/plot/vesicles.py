@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws branches of vesicles: energy against reduced volume, what is stable, and shapes on the way."""
+"""Draws branches of vesicles: energy against reduced volume, stability, and shapes along the branches."""
 
 import os
 import sys
@@ -10,11 +10,11 @@ import command_line
 
 LIMITS = (0.48, 0.97)  # of the reduced volume
 HEIGHT = 4.4  # inches
-SCALE = 0.0075  # reduced volume a unit of length
+SCALE = 0.0075  # reduced volume per unit of length
 
 
 def unstable(series):
-    """Where an axisymmetric direction or a wave around the axis grows; a motion of no effect is not said to grow."""
+    """Where an axisymmetric direction or a wave around the axis grows; neutral motions do not count."""
     growth = [values for name, values in series.items() if name.startswith("growth_")]
     grows = series["negative_directions"] > 0
     return np.any([grows, *(values > 1e-3 for values in growth)], axis=0)
@@ -48,7 +48,7 @@ def draw(paths, outputs):
             axes.plot(v[at], energy[at], color=colour, marker=mark, linestyle="", markersize=6)
         handles.append(Line2D([], [], color=colour, label=name))
         for wanted in np.arange(0.525, 0.95, 0.05):
-            i = int(np.argmin(np.abs(v - wanted) + 1e-3 * bad))  # rather the stable one
+            i = int(np.argmin(np.abs(v - wanted) + 1e-3 * bad))  # prefers the stable one
             if abs(v[i] - wanted) > 0.01:
                 continue
             frame = result.frames[i]

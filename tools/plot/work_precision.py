@@ -7,14 +7,14 @@ import sys
 import command_line
 
 COLUMNS = ("energy_asked", "error", "estimate", "cpu_ms")
-# CPU milliseconds of the prototype with settings tuned by hand, quintic B-splines, for the errors it then had. Those were
+# CPU milliseconds of the prototype with settings tuned by hand, quintic B-splines, for its errors, which were
 # relative to E(0), which is 0.3946 of E_ref.
 PROTOTYPE = ((0.3946e-4, 0.51), (0.3946e-6, 1.3), (0.3946e-8, 4.8))
 FLOOR = 1e-16  # an error of zero is drawn here
 
 
 def read_table(path):
-    """{series: rows of COLUMNS, by accuracy asked, coarse first}. Raises BadInput."""
+    """{series: rows of COLUMNS, by requested accuracy, coarse first}. Raises BadInput."""
     from results import BadInput
 
     lines = {}
@@ -35,7 +35,7 @@ def read_table(path):
 
 
 def draw(path, outputs):
-    """Error filled, the program's own estimate of it hollow above; dotted lines at the accuracies asked for."""
+    """Filled: errors; hollow: the estimates of the program; dotted lines: requested accuracies."""
     import numpy as np
     import style
     from matplotlib.figure import Figure

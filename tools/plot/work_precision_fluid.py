@@ -17,7 +17,7 @@ STAR = {"color": "k", "marker": "*", "markersize": 6.5, "mew": 0.7, "ls": ""}
 @dataclass
 class Run:
     series: str
-    asked: float  # 0 where settings are given instead
+    asked: float  # 0 with explicit settings
     error: float
     estimate: float
     cpu_s: float
@@ -47,7 +47,7 @@ def read_table(path):
 
 
 def best(runs):
-    """Those that no other run beats in both error and time, cheapest first."""
+    """Runs for which no other is better in both error and time, cheapest first."""
     front = []
     for run in sorted(runs, key=lambda run: (run.cpu_s, run.error)):
         if not front or run.error < front[-1].error:
@@ -77,7 +77,7 @@ def draw_model(axes, runs, styles):
 
 
 def draw(path, outputs):
-    """All runs, faint, and a line through the best of each kind. Stars: accuracies asked for, hollow the estimates."""
+    """All runs, faint, and a line through the best of each kind. Stars: requested accuracies; hollow: the estimates."""
     import style
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
