@@ -63,7 +63,7 @@ public:
     // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
     // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
     CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* defect = nullptr) const;
-    // E_ref, the scale that the asked accuracy refers to: theory.md (11.1).
+    // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
 
 private:

@@ -1,4 +1,4 @@
-// What a profile curve looks like, and whether it still bounds anything.
+// Measures of a profile curve, and whether it intersects itself.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@ namespace tubule::axisym {
 
 struct ShapeMeasures {
     double height = 0;          // from pole to pole along the axis, or the period
-    double r_middle = 0;        // radius at s = 1/2 of the whole curve: the equator, if it mirrors itself
+    double r_middle = 0;        // radius at s = 1/2 of the whole curve: the equator, if symmetric
     double r_max = 0;           // refined between quadrature points
     double pole_curvature = 0;  // kappa at the south pole, negative where convex; 0 for tubes
     double asymmetry = 0;       // largest |r(s) - r(1 - s)|, |z(s) + z(1 - s) - 2 z(1/2)| sampled; 0 for halves

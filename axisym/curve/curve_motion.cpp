@@ -37,7 +37,7 @@ struct PointFields {
     S r_t, z_t, ur_t, uz_t, w_t;
 };
 
-// The law per unit of s, but for the energy, the gauge and the volume.
+// The law per unit of s, except the energy, the gauge and the volume.
 template <class S>
 std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, double drift, double shift) {
     const S &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
@@ -496,7 +496,7 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
         double last = std::numeric_limits<double>::infinity();
         for (int iteration = 0;; ++iteration) {
             if (!residual(s.y.data(), s.rate.data(), F.data()))
-                throw SolveError("the start of the motion leaves the half plane r > 0");
+                throw SolveError("the profile leaves the half plane r > 0 at the start of the motion");
             jacobian(s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
             const Equilibrated scale(J);
             lu.factor(J);

@@ -12,31 +12,31 @@
 
 namespace tubule::axisym {
 
-// A law of motion as a curve follows it. An inextensible curve has a velocity u; else X_t.nu = b - lambda.
+// A law of motion in the form that curves need. With inextensibility there is a velocity u; else X_t.nu = b - lambda.
 struct CurveLaw : MotionLaw {
     CurveLaw(const MotionLaw& law) : MotionLaw(law) {}
 
-    // Of an inextensible curve: whether A(X) and V(X) are held against drift by errors in time. Where H varies little,
+    // With inextensibility: whether A(X) and V(X) are corrected for drift by errors in time. Where H varies little,
     // both are the same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda
-    // nu and a constant pressure are the same force, and keeps_volume must be false, for div u = 0 keeps the volume.
+    // nu and a constant pressure are the same force, and keeps_volume must be false, since div u = 0 keeps the volume.
     bool holds_area = true, holds_volume = true;
-    bool lagrangian = false;  // the parameter goes with the flow, X_t = u, instead of staying even
+    bool lagrangian = false;  // the parametrisation is material, X_t = u, instead of even
     bool swirls = false;      // u has a component around the axis
 };
 
-// The unknowns y and where they stand: the curve X = (r, z) as CurveSpace has it; the velocity u = (u_r, u_z) likewise;
-// the swirl u_theta; the pressure p; numbers. Those that the law has not are -1.
+// Offsets of the unknowns y: the curve X = (r, z) as CurveSpace has it; the velocity u = (u_r, u_z) likewise;
+// the swirl u_theta; the pressure p; multipliers. -1 for those that the law does not have.
 struct MotionLayout {
     int r = 0, z = 0, u_r = -1, u_z = -1, swirl = -1, p = -1;
     int lambda = -1;             // force -lambda nu, by which the volume is kept: INT u.nu = 0
-    int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero but for errors in time
+    int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
-    int shift = -1;              // of INT (X_t - u).t = 0, for a period's parameter has no fixed point
+    int shift = -1;              // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
     int size = 0;
 };
 
 // In weak form, for all test displacements phi, velocities v, and pressures q (dS = 2 pi r g ds):
-//   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve goes with u, its parameter stays even (gauge J)
+//   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve moves with u, its parameter stays even (gauge J)
 //   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
 //   (q, div u) = 0,  dV[u] = 0
 // with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
@@ -63,7 +63,7 @@ public:
     // 1 for unknowns whose rate matters, 0 for the others.
     Eigen::VectorXd differential() const;
 
-    // Kinetic energy and its like: integrals over the whole cell or period.
+    // Kinetic energy and related integrals over the whole cell or period.
     struct Balance {
         double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
         double momentum_z = 0, angular_z = 0;

@@ -12,7 +12,7 @@ namespace tubule::axisym {
 
 Meridian spheroid(double reduced_volume, bool prolate) {
     if (!(reduced_volume > 0 && reduced_volume < 1))
-        throw std::invalid_argument(fmt::format("no spheroid has a reduced volume of {}", reduced_volume));
+        throw std::invalid_argument(fmt::format("a spheroid cannot have a reduced volume of {}", reduced_volume));
     // Area of the spheroid with a = 1, c = q.
     const auto area = [&](double q) {
         const double e = std::sqrt(prolate ? 1 - 1 / (q * q) : 1 - q * q);
@@ -117,7 +117,8 @@ Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology top
     const bool closed = topology == Topology::cell || topology == Topology::half_cell;
     for (int i = closed ? 1 : 0; i < (topology == Topology::cell ? n : n + 1); ++i)
         if (!(points[i][0] > 0))
-            throw std::invalid_argument(fmt::format("point {} of the curve has the radius {}", i, points[i][0]));
+            throw std::invalid_argument(
+                fmt::format("point {} of the curve has radius {}; it must be positive", i, points[i][0]));
     if (closed) require(std::abs(points[0][0]) < tolerance, "the first point of a closed curve must have r = 0");
     if (topology == Topology::cell)
         require(std::abs(points[n][0]) < tolerance, "the last point of a closed curve must have r = 0");
@@ -126,7 +127,7 @@ Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology top
     if (topology == Topology::tube)
         require(std::abs(points[n][0] - points[0][0]) < tolerance &&
                     std::abs(points[n][1] - points[0][1] - length) < tolerance,
-                "the last point of a period must be the first one, a length further");
+                "the last point of a period must be the first one moved up by the length");
     if (topology == Topology::half_tube)
         require(std::abs(points[0][1]) < tolerance && std::abs(points[n][1] - length / 2) < tolerance,
                 "half a period must run from z = 0 to half the length");
@@ -160,7 +161,7 @@ std::array<double, 2> area_and_volume(const Meridian& m) {
 
 Meridian half(const Meridian& whole) {
     const bool cell = whole.topology == Topology::cell;
-    if (!cell && whole.topology != Topology::tube) throw std::invalid_argument("this curve is a half already");
+    if (!cell && whole.topology != Topology::tube) throw std::invalid_argument("the curve is already one half");
     const double shift = whole.at(cell ? 0.5 : 0)[2];
     Meridian out = whole;
     out.topology = cell ? Topology::half_cell : Topology::half_tube;
@@ -176,7 +177,7 @@ Meridian half(const Meridian& whole) {
         const double plane = cell ? shift : shift + whole.length / 2;
         const double size = std::abs(a[0]) + std::abs(a[2] - plane);
         if (std::abs(a[0] - b[0]) + std::abs(a[2] + b[2] - 2 * plane) > 1e-6 * size)
-            throw std::invalid_argument("the curve does not mirror itself about the middle of its parameter");
+            throw std::invalid_argument("the curve is not symmetric about the middle of its parameter range");
     }
     return out;
 }

@@ -46,26 +46,31 @@ public:
             // A direction that turns too far may belong to another branch.
             if (!next || inner(next->tangent, place_.tangent) < 0.8) {
                 step /= 2;
-                if (step < 1e-7) return end(Stop::solver_failed, "the branch cannot be followed any further");
+                if (step < 1e-7)
+                    return end(Stop::solver_failed, "the branch cannot be followed further: the step became too small");
                 continue;
             }
             ++branch_.steps;
             if (!record_between(place_, *next, step, low, high))
-                return end(Stop::solver_failed, fmt::format("a point of the branch between the parameters {:.6g} and "
-                                                            "{:.6g} is not found",
-                                                            place_.parameter(), next->parameter()));
+                return end(Stop::solver_failed,
+                           fmt::format("no stationary shape found on the branch between the parameters {:.6g} and "
+                                       "{:.6g}",
+                                       place_.parameter(), next->parameter()));
             place_ = *next;
             if (!branch_.message.empty()) return end(Stop::self_intersection, branch_.message);
             if (place_.parameter() < low || place_.parameter() > high) return end(Stop::finished, "");
             if (met_itself(system_->space(), curve(place_.w), place_.parameter()))
                 return end(Stop::self_intersection, branch_.message);
             if (!remesh_if_needed())
-                return end(Stop::resolution_lost, fmt::format("{} elements do not do any more at parameter {:.6g}",
-                                                              settings_.shapes.max_elements, place_.parameter()));
+                return end(
+                    Stop::resolution_lost,
+                    fmt::format("the mesh is too coarse at parameter {1:.6g}, with the largest number of elements, {0}",
+                                settings_.shapes.max_elements, place_.parameter()));
             if (iterations <= 4) step = std::min(step * 1.6, 0.2);
         }
         return end(Stop::solver_failed,
-                   fmt::format("{} steps lead to the parameter {:.6g} only", settings_.max_steps, place_.parameter()));
+                   fmt::format("after {} steps, the largest number allowed, the branch is at parameter {:.6g}",
+                               settings_.max_steps, place_.parameter()));
     }
 
 private:
@@ -225,11 +230,11 @@ private:
         return complete;
     }
 
-    // Whether this shape is no surface any more; what there is to say about it is the branch's message then.
+    // Whether the shape intersects itself; if so, sets the message of the branch.
     bool met_itself(const CurveSpace& space, const Eigen::VectorXd& x, double parameter) {
         const auto where = self_intersection(space, x);
         if (where)
-            branch_.message = fmt::format("at the parameter {:.6g} the shape meets itself: s = {:.4f} and {:.4f}",
+            branch_.message = fmt::format("at parameter {:.6g} the shape intersects itself at s = {:.4f} and {:.4f}",
                                           parameter, (*where)[0], (*where)[1]);
         return where.has_value();
     }
@@ -266,7 +271,7 @@ private:
         return out;
     }
 
-    // What the mesh loses, by the jumps it shows; these tell a fifth of it on meshes that are just fine enough.
+    // The error of the mesh, estimated from its jumps, which show a fifth of it on meshes that are just fine enough.
     static double lost(const std::vector<double>& defect) {
         double sum = 0;
         for (double d : defect) sum += d;
@@ -316,8 +321,8 @@ private:
 
 Branch follow_branch(const StationaryProblem& problem, const Equilibrium& start, const SetParameter& set,
                      const BranchSettings& settings) {
-    if (start.stop != Stop::finished) throw std::invalid_argument("a branch starts from an equilibrium");
-    if (settings.from == settings.to) throw std::invalid_argument("a branch needs an interval of its parameter");
+    if (start.stop != Stop::finished) throw std::invalid_argument("a branch must start from an equilibrium");
+    if (settings.from == settings.to) throw std::invalid_argument("the start and the end of a branch must differ");
     return Follower(problem, start, set, settings).run();
 }
 

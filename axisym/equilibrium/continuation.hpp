@@ -15,7 +15,7 @@ using SetParameter = std::function<void(StationaryProblem&, double)>;
 
 struct BranchSettings {
     double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
-    std::vector<double> output;  // parameters at which shapes are wanted, each time the branch comes by
+    std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
     int max_steps = 500;
     EquilibriumSettings shapes;  // accuracy of each
 };

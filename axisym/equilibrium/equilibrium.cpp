@@ -36,16 +36,18 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
 void StationarySystem::set_problem(const StationaryProblem& problem) {
     const Constraints& c = problem.constraints;
     if (c.reduced_volume && (c.area || c.volume))
-        throw std::invalid_argument("the reduced volume is held fixed alone: area and volume determine it already");
+        throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
     const auto positive = [](const std::optional<double>& value, const char* what) {
-        if (value && !(*value > 0)) throw std::invalid_argument(fmt::format("{} of {} cannot be met", what, *value));
+        if (value && !(*value > 0))
+            throw std::invalid_argument(fmt::format("{} of {} is impossible: it must be positive", what, *value));
     };
     positive(c.area, "an area"), positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
     if (space_->closed()) {
         std::optional<double> v = c.reduced_volume;
         if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
         if (v && *v > 1)
-            throw std::invalid_argument(fmt::format("a reduced volume of {:.6g} cannot be met: a sphere has 1", *v));
+            throw std::invalid_argument(
+                fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
     }
     problem_ = problem;
     forms_.set_bending(problem.bending);
@@ -188,8 +190,8 @@ public:
 
     // Damped steps towards a minimum, until they are shorter than `tolerance`. A step solves the equations of the
     // implicit Euler method for the descent, of a duration that grows while the model predicts the energy well. Far
-    // from the area and volume asked for, a step brings them nearer, and the energy may do what it must. False if no
-    // step makes progress any more.
+    // from the required area and volume, a step brings them nearer, and the energy may increase. False if no
+    // step makes further progress.
     bool descend(double tolerance, int most = 200) {
         for (int k = 0; k < most; ++k) {
             ++iterations_;
@@ -231,7 +233,7 @@ private:
     double relative(const Eigen::VectorXd& step) const {
         return step.head(system_.space().size()).lpNorm<Eigen::Infinity>() / size_;
     }
-    // Area and volume off what is asked, in units of the size. (What is not held is off by nothing that matters here.)
+    // Deviation of area and volume from the required values, in units of the size; 0 for what is not held.
     double constraint_error(const Eigen::VectorXd& F) const {
         const Constraints& c = system_.problem().constraints;
         const double area = c.area ? std::abs(F[system_.sigma()]) / (size_ * size_) : 0;
@@ -299,7 +301,7 @@ std::shared_ptr<const CurveSpace> make_space(Topology topology, double length, s
     return std::make_shared<CurveSpace>(topology, std::move(breaks), degree, degree - 1, length);
 }
 
-// Scales a closed curve to the area (or the volume, if that alone is held) that is asked for.
+// Scales a closed curve to the required area (or volume, if that alone is held).
 void scale_to(const CurveForms& forms, const Constraints& c, Eigen::VectorXd& x) {
     if (!forms.space().closed() || !(c.area || c.volume)) return;
     const CurveObservation o = forms.observe(x);
@@ -322,11 +324,11 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
 
 namespace {
 
-// Descends on one mesh; area and volume go from those of the start to the asked ones in steps, and the shape follows.
+// Descends on one mesh; area and volume go from those of the start to the required ones in steps.
 bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
     const StationaryProblem goal = system.problem();
     const CurveObservation o = system.forms().observe(u.head(system.space().size()));
-    if (!(o.area > 0 && o.volume > 0)) return false;  // turned inside out by an attempt before
+    if (!(o.area > 0 && o.volume > 0)) return false;  // turned inside out by an earlier attempt
     const double v = reduced_volume(o.area, o.volume);
     const auto off = [](const std::optional<double>& wanted, double is) {
         return wanted ? std::abs(std::log(*wanted / is)) : 0;
@@ -350,7 +352,7 @@ bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int
 }
 
 // The stationary shape on one mesh; with `from_afar`, and wherever plain Newton steps fail, after a descent. False, and
-// u somewhere on the way, if there is none to be found.
+// u an intermediate state, if none is found.
 bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const EquilibriumSettings& settings,
             Equilibrium& out) {
     const int n = system.space().size();
@@ -369,7 +371,7 @@ bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const 
     return found;
 }
 
-// What energies on a sequence of meshes tell of the error of the last but one.
+// Estimates the error on the last mesh but one from the energies on a sequence of meshes.
 class MeshComparison {
 public:
     // Infinite until there are two in a row.
@@ -392,8 +394,8 @@ private:
     int elements_ = 0;
 };
 
-// A mesh for the shape that has been found on the present one. The jumps that the defect is read from tell less than
-// there is to lose on a coarse mesh: half as many elements again at least.
+// A mesh for the shape found on the present one. The jumps that the defect is read from underestimate
+// the error on a coarse mesh: take at least half as many elements again.
 std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
                                 int max_elements) {
     const int elements = space.splines().elements();
@@ -433,12 +435,12 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         if (out.estimated_error <= settings.accuracy) {
             if (const auto where = self_intersection(*space, x))
                 return end(Stop::self_intersection,
-                           fmt::format("the stationary shape meets itself at s = {:.4f} and {:.4f}", (*where)[0],
+                           fmt::format("the stationary shape intersects itself at s = {:.4f} and {:.4f}", (*where)[0],
                                        (*where)[1]));
             return end(Stop::finished, "");
         }
         if (elements >= settings.max_elements)
-            return end(Stop::resolution_lost, fmt::format("{} elements leave an error of {:.1e} of the energy",
+            return end(Stop::resolution_lost, fmt::format("with {} elements, the error of the energy is still {:.1e}",
                                                           elements, out.estimated_error));
         const auto finer =
             make_space(space->topology(), space->length(),
@@ -468,7 +470,8 @@ int negative_directions(const StationaryProblem& problem, const Equilibrium& sha
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
                              const EquilibriumSettings& settings) {
     if (start.topology == Topology::tube)
-        throw std::invalid_argument("equilibria of a period need a start that mirrors itself, and half of it");
+        throw std::invalid_argument(
+            "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
     const int images = start.topology == Topology::cell ? 1 : 2;
     const auto space = make_space(start.topology, start.length,
                                   equal_breaks(std::max(settings.elements, coarsest) / images), settings.degree);

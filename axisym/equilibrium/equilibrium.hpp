@@ -17,7 +17,7 @@ namespace tubule::axisym {
 // V / (4 pi/3 (A/4 pi)^(3/2)), 1 for a sphere.
 double reduced_volume(double area, double volume);
 
-// What is held fixed. Area and volume each or none; the reduced volume alone, the size being free then.
+// What is held fixed: area, volume, both or neither; or the reduced volume alone, with the size free.
 struct Constraints {
     std::optional<double> area, volume, reduced_volume;
 };
@@ -85,12 +85,12 @@ struct Equilibrium {
     CurveObservation observed;
     double reference_energy = 0, estimated_error = 0;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
-    // finished; or why it is no equilibrium: solver_failed, resolution_lost, self_intersection.
+    // finished; or why this is not an equilibrium: solver_failed, resolution_lost, self_intersection.
     Stop stop = Stop::solver_failed;
     std::string message;
 };
 
-// From a curve. Without constraints of its own the problem is that of a free membrane. Throws std::invalid_argument
+// From a curve. A problem without constraints is that of a free membrane. Throws std::invalid_argument
 // for constraints that contradict each other or cannot be met, and for a period that is not half a tube.
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
                              const EquilibriumSettings& settings = {});

@@ -21,7 +21,7 @@
 namespace tubule::axisym {
 namespace {
 
-// What [equilibrium] comes to for this start.
+// The table [equilibrium], resolved for this start.
 struct Task {
     Meridian start;
     StationaryProblem problem;
@@ -97,8 +97,8 @@ Task task_of(const Case& c) {
         const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
         if (way == 0 || steps > 10000)
             throw CaseError(
-                fmt::format("{}: equilibrium.branch: {} to {} by {} makes {} steps; 1 to 10000 are possible", c.path,
-                            branch.from, branch.to, *b.step, steps));
+                fmt::format("{}: equilibrium.branch: {} to {} by {} makes {} steps; the number must be 1 to 10000",
+                            c.path, branch.from, branch.to, *b.step, steps));
         for (int i = 0; i <= steps; ++i)
             branch.output.push_back(i < steps ? branch.from + i * std::copysign(*b.step, way) : branch.to);
     }
@@ -250,11 +250,11 @@ private:
 std::string advice_for(Stop stop) {
     switch (stop) {
         case Stop::solver_failed:
-            return "begin with a shape nearer to the one looked for, or ask for less accuracy";
+            return "start from a shape closer to the solution, or raise accuracy.energy";
         case Stop::resolution_lost:
-            return "ask for less accuracy; a neck that closes cannot be followed to its end";
+            return "raise accuracy.energy; a neck that closes cannot be followed to its end";
         case Stop::self_intersection:
-            return "the equations hold on, but the surface is none any more";
+            return "the equations can still be solved, but their solution is no longer an embedded surface";
         default:
             return "";
     }
@@ -301,7 +301,8 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
     }
     s.estimated_error = write.worst();
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    if (stop == Stop::finished) message = task.set ? "the branch has left its interval" : "the shape is stationary";
+    if (stop == Stop::finished)
+        message = task.set ? "the branch left its parameter interval" : "the shape is stationary";
     s.stop = {stop, std::max(write.count() - 1, 0) * 1.0, message, advice_for(stop)};
     s.effort =
         fmt::format("{} shape{}, {} elements in the last", write.count(), write.count() == 1 ? "" : "s", s.elements);

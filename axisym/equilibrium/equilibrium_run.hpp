@@ -14,7 +14,7 @@ std::vector<std::string> equilibrium_series_names(const Case& c);
 // Throws CaseError for a start that cannot be set up, and for constraints that cannot be met.
 void check_equilibrium(const Case& c);
 
-// One row and one frame for each shape, numbered from 0 in place of a time: the one shape asked for; or those of the
+// One row and one frame for each shape, numbered from 0 instead of by time: a single shape, or those of the
 // branch at its steps, its folds and its bifurcations, in order. Throws as check_equilibrium().
 RunSummary run_equilibrium(const Case& c, RunObserver& observer);
 

@@ -207,7 +207,7 @@ Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
         }
         return out;
     }
-    throw SolveError("the eigenproblem of the second variation is not solved");
+    throw SolveError("the eigenproblem of the second variation could not be solved");
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ auto integral(const F& f) {
 void require_whole(const Meridian& profile) {
     const bool tube = profile.topology == Topology::tube && profile.length > 0;
     if (!tube && profile.topology != Topology::cell)
-        throw std::invalid_argument("waves are looked for on whole tubes and closed cells");
+        throw std::invalid_argument("wave amplitudes are defined on whole tubes and closed cells only");
 }
 
 // (1/L) INT r exp(-i q z) dz over a period.
@@ -69,10 +69,12 @@ double mean_radius(const Meridian& profile) {
 double mode_amplitude(const Meridian& profile, int n) {
     require_whole(profile);
     if (profile.topology == Topology::tube) {
-        if (n < 1) throw std::invalid_argument("a wave along a tube has n >= 1");
+        if (n < 1) throw std::invalid_argument("a wave along a tube must have n >= 1");
         return 2 * std::abs(tube_mode(profile, n));
     }
-    if (n < 2) throw std::invalid_argument("a wave of a cell has l >= 2: l = 1 is its place, l = 0 its size");
+    if (n < 2)
+        throw std::invalid_argument(
+            "a wave of a cell must have l >= 2: l = 1 is a translation, l = 0 a change of size");
     return std::abs(cell_mode(profile, n)) / mean_radius(profile);
 }
 

@@ -1,4 +1,4 @@
-// How large a wave is on a profile.
+// Amplitudes of waves on a profile.
 #pragma once
 
 #include "axisym/curve/curve_start.hpp"

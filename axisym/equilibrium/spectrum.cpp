@@ -13,7 +13,7 @@
 namespace tubule::axisym {
 namespace {
 
-// The shape on so many elements, with the multipliers that leave the least force, in the norm (INT b^2 dS)^(1/2).
+// The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
 Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> sigma, const Meridian& shape,
                      int elements, double& unbalanced) {
     constexpr int degree = 5;
@@ -50,7 +50,7 @@ Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> si
         if (volume) e.lambda = multipliers[multipliers.size() - 1];
     }
     const double size = e.observed.length / (2 * pi), gauge = 0.01 * e.reference_energy;
-    // A little resistance, for what is neutral: places, and sizes of an energy that knows none.
+    // A little resistance, for neutral modes: translations, and changes of size of a scale-invariant energy.
     const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
     const Eigen::MatrixXd hessian =
         Eigen::MatrixXd(forms.hessian({1, e.sigma, e.lambda, gauge}, e.x)) + resistance * mass;
@@ -77,9 +77,9 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
 void refuse_what_has_none(const MotionLaw& law, int first) {
     if (law.inertia != 0)
         throw std::invalid_argument(
-            "a fluid's inertia is not in the spectrum of a shape; the growing modes of Stokes flow are the same ones");
+            "spectra neglect inertia: use model stokes instead of fluid; its growing modes are the same");
     if (first == 0 && law.inextensible && !law.keeps_volume)
-        throw std::invalid_argument("the spectrum of a model that flows is that with the volume fixed");
+        throw std::invalid_argument("spectra of inextensible models need a fixed volume");
 }
 
 }  // namespace
@@ -104,7 +104,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
         if (settings.first == 0 && held != Held::nothing && !out.at_rest()) {
             if (!last) continue;  // perhaps a finer mesh shows it at rest
             throw std::invalid_argument(
-                "the shape is not at rest: in motion, only the gradient flow with the volume free has a spectrum");
+                "the shape is not at rest: a moving shape has a spectrum only in gradient flow with free volume");
         }
         const ModeStability stability(problem, e);
         std::vector<ModeRates> modes;

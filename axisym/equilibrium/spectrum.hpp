@@ -29,16 +29,16 @@ struct Spectrum {
     bool at_rest() const { return unbalanced < 1e-3; }
 };
 
-// What a law holds fixed by itself: the volume if it keeps it, the area of an inextensible membrane.
+// The quantities that a law conserves: the volume if it keeps it, the area of an inextensible membrane.
 Held held_by(const MotionLaw& law);
 
-// Of a whole tube or cell. Of a shape that is not at rest in the gradient flow, the rates are those of the flow
-// linearised about its motion at this instant. For all else the multipliers are those that balance the force best, as
+// For a whole tube or cell. For a shape that is not at rest in gradient flow, the rates are those of the flow
+// linearised about its motion at this instant. Otherwise the multipliers are those that balance the force best, as
 // if the shape were held by them.
-// With m = 0 there are constraints: no rates then of an inextensible membrane with the volume free, and none of a shape
-// that moves, but for the gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates;
-// what the motion itself does to waves is left out of inextensible ones, so they are an estimate. None of a law with
-// inertia (std::invalid_argument), which is not in the second variation. SolveError if an eigenproblem is not solved.
+// For m = 0 the constraints act: there are no rates for an inextensible membrane with free volume, nor for a moving
+// shape except in gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates;
+// those of inextensible laws neglect the effect of the motion itself on waves, so they are an estimate. A law with
+// inertia is rejected (std::invalid_argument): the second variation has none. SolveError if an eigenproblem fails.
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings = {});
 

@@ -1,4 +1,4 @@
-// Is the discrete gradient the derivative of the discrete energy, term by term?
+// Checks that the discrete gradient is the derivative of the discrete energy, term by term.
 #pragma once
 
 #include <Eigen/Core>

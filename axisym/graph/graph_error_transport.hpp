@@ -1,5 +1,5 @@
-// How far is the computed profile from the exact one? The error obeys the linearised flow, driven by
-// what the computed path leaves undone: the residual of the flow along a smooth curve through the
+// Estimates how far the computed profile is from the exact one. The error obeys the linearised flow, driven by
+// the residual of the flow along a smooth curve through the
 // computed states, tested with splines on halved elements. It is carried along with the run by linearly
 // implicit Euler steps, each spanning several steps of the run.
 #pragma once
@@ -20,17 +20,17 @@ public:
 
     const ProfileSpace& space() const { return fine_space_; }
 
-    // Errors (exact minus computed) as coefficients in space(): all of it, and the part that is due to space alone.
+    // Errors (exact minus computed) as coefficients in space(): total, and the part due to the mesh alone.
     Eigen::VectorXd total, spatial;
 
     // Takes the error over from another mesh; x_old and x_new are the profile before and after remeshing.
     void inherit(const ErrorTransport& other, const Eigen::VectorXd& x_old, const Eigen::VectorXd& x_new);
 
-    // The path begins here, with no error but what is set in total and spatial.
+    // Starts the path here, with the errors that are set in total and spatial.
     void begin(const double* x, const double* v);
     // One step of the run, of size h, to the state x with rates v. The cubic through both states with their
     // rates solves the flow at its ends; Simpson's rule leaves its residual in the middle as the local error.
-    // (IDA's own estimates are no substitute: after changes of step or order they are off by 3.)
+    // (IDA's own estimates cannot replace it: after changes of step or order they are off by a factor of 3.)
     void add_step(double h, const double* x, const double* v);
     // Brings the errors to the time of the last step.
     void advance();

@@ -1,5 +1,5 @@
-// The discrete energy of a profile and its gradient flow: value, gradient and Hessian are three faces
-// of one object, and the mass matrix of the dissipation stands beside them.
+// The discrete energy of a profile and its gradient flow: value, gradient and Hessian come from
+// one object, together with the mass matrix of the dissipation.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 
 namespace tubule::axisym {
 
-// What a state is worth, integrated or extremised over the whole period.
+// Diagnostics of a state, integrated or extremised over the whole period.
 struct Observation {
     double energy = 0;
     std::array<double, n_bending_terms> energy_term{};
@@ -53,7 +53,7 @@ public:
     // variation of the best approximation error, from the jumps of the highest derivative
     // (docs/decisions.md), over the whole period.
     Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
-    // E_ref, the scale that the asked accuracy refers to: theory.md (11.1).
+    // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
     // Functionals of the coefficients that give the cosine and sine amplitudes of the mode with n waves
     // over the period.

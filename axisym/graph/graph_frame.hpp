@@ -1,4 +1,4 @@
-// A profile as a record of the result file: what a reader wants to see, and what a run needs to go on.
+// A profile as a record of the result file: what readers need, and what a run needs to resume.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace tubule::axisym {
 
-// Everything a run carries from one step to the next, but for the integrator's history.
+// Everything a run carries from one step to the next, except the integrator's history.
 struct RestartState {
     Cell cell;
     std::vector<double> breaks;

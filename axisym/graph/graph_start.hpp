@@ -1,4 +1,4 @@
-// How a case becomes a profile to solve for: the cell, the first mesh.
+// From a case to the profile to solve for: the cell, the first mesh.
 #pragma once
 
 #include <vector>
@@ -14,15 +14,15 @@ namespace tubule::axisym {
 // reduced problem. With `symmetry` off: the whole period.
 Cell cell_of(const Tube& tube, bool symmetry);
 
-// Elements such that the energy lost to the spline (the defect of Forms::observe) comes to `target`, as far as that of
-// the present mesh tells: sizes follow the local need, and grow by no more than a fixed ratio. At least `fewest`.
+// Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by that
+// of the present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`.
 std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
                                    int fewest);
 
-// The same by division of the present elements: every spline of the space remains one.
+// The same by division of the present elements: the new space contains the old one.
 std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target);
 
-// The defect of each element that the flow from x will soon want to lose: the largest over x itself and single
+// The defect of each element that the flow from x will soon develop: the largest over x itself and single
 // linearly implicit Euler steps from it, whose sizes span six decades up to `span`. A start is often smooth and
 // grows its sharpest features within its first instants.
 std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span);

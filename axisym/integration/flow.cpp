@@ -90,7 +90,7 @@ int guard_values(double t, N_Vector x, N_Vector v, double* values, void* user) {
     return 0;
 }
 
-// As IDA's own test, but for the first correction, which it may take for the last.
+// IDA's own test, except that the first correction, which IDA may accept as the last, needs a stricter bound.
 template <class Impl>
 int has_converged(SUNNonlinearSolver newton, N_Vector, N_Vector correction, double tolerance, N_Vector weights,
                   void* user) {
@@ -114,7 +114,7 @@ void keep_message(int, const char*, const char*, char* text, void* user) {
 }
 
 void require(int status, const char* what) {
-    if (status < 0) throw std::runtime_error(fmt::format("IDA refused {} (status {})", what, status));
+    if (status < 0) throw std::runtime_error(fmt::format("IDA rejected {} (status {})", what, status));
 }
 
 }  // namespace
@@ -150,7 +150,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     // Newton much more exact than the error test asks, and a Jacobian never far off: fewer steps and fewer
     // failures, and errors that follow the tolerance (docs/decisions.md).
     require(IDASetNonlinConvCoef(s.ida, control.newton), "the Newton tolerance");
-    require(IDASetDeltaCjLSetup(s.ida, 0.1), "the Jacobian's life");
+    require(IDASetDeltaCjLSetup(s.ida, 0.1), "the lifetime of the Jacobian");
     require(IDASetInitStep(s.ida, control.first_step), "the first step");
     s.jacobian = SUNSparseMatrix(n, n, s.system.pattern->nonZeros(), CSC_MAT, s.context);
     set_pattern(*s.system.pattern, s.jacobian);
@@ -161,7 +161,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     if (control.two_iterations) {
         s.newton = SUNNonlinSol_Newton(s.x, s.context);
         require(IDASetNonlinearSolver(s.ida, s.newton), "the nonlinear solver");
-        require(SUNNonlinSolSetConvTestFn(s.newton, has_converged<Impl>, &s), "the test of convergence");
+        require(SUNNonlinSolSetConvTestFn(s.newton, has_converged<Impl>, &s), "the convergence test");
     }
     require(IDARootInit(s.ida, static_cast<int>(s.system.n_guards), guard_values<Impl>), "the guards");
     require(IDASetNoInactiveRootWarn(s.ida), "the guards");

@@ -16,9 +16,9 @@ struct TimeControl {
     double absolute = 1e-9;  // added to that, times the unknown's scale
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
-    double newton = 0.01;    // how far the iteration goes, of what the error test allows
-    // Two iterations at least. IDA is content with one where those before converged quickly; then constraints hold to
-    // the error of the step only, for they are bent.
+    double newton = 0.01;    // tolerance of the iteration, relative to that of the error test
+    // At least two iterations. IDA accepts one where earlier ones converged quickly; then constraints hold only to
+    // the error of the step, because they are nonlinear.
     bool two_iterations = false;
 };
 

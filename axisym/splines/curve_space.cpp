@@ -118,7 +118,7 @@ CurvePoint CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {
 
 Eigen::VectorXd CurveSpace::prolong(const CurveSpace& other, const Eigen::VectorXd& x) const {
     if (other.topology_ != topology_ || other.length_ != length_)
-        throw std::invalid_argument("prolongation between curves of different topology or period");
+        throw std::invalid_argument("curves of different topology or period cannot be prolonged to each other");
     return project([&](double s) {
         const CurvePoint p = other.evaluate(x, s);
         return std::array{p.r, p.z};

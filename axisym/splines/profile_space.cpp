@@ -35,7 +35,7 @@ ProfileSpace::ProfileSpace(Cell cell, std::vector<double> breaks, int degree, in
     if (degree < 2 || degree >= max_width) throw std::invalid_argument("spline degree must be 2 ... 7");
     if (smoothness < 1 || smoothness >= degree) throw std::invalid_argument("smoothness must be 1 ... degree - 1");
     if (breaks_.size() < 3 || !std::is_sorted(breaks_.begin(), breaks_.end(), std::less_equal<>{}))
-        throw std::invalid_argument("breaks must ascend and bound at least two elements");
+        throw std::invalid_argument("breaks must increase and define at least two elements");
     tabulate();
 }
 

@@ -45,7 +45,7 @@ struct Accuracy {
     double r_min = 1e-3;   // floor of the neck radius, below which the run stops with pinch-off; 1e-2 in tier surface3d
 };
 
-// Explicit choices of tier axisym; where absent, the asked accuracy decides.
+// Explicit choices of tier axisym; if absent, the required accuracy decides.
 struct Discretisation {
     std::optional<int> elements;                     // over one period of the tube; switches adaptive refinement off
     int order = 5;                                   // polynomial degree of the spline: 3, 5, 7
@@ -93,7 +93,7 @@ struct Handover {
     double reference_energy = 0;  // E_ref of the whole run
 };
 
-// What a run of the case must give: checked by `tubule run --expect`.
+// Expected results of a run: checked by `tubule run --expect`.
 struct Expectation {
     std::string series;          // e.g. "energy", "r_min"
     std::optional<double> time;  // absent: at the end

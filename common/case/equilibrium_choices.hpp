@@ -58,7 +58,7 @@ void keys(Keys& k, EquilibriumChoices& e) {
     k.check("volume", [&] { return e.volume && !volume ? not_held : ""; });
     k.check("reduced_volume", [&] {
         if (e.reduced_volume && !reduced) return not_held;
-        return e.reduced_volume && e.volume ? "and equilibrium.volume exclude each other" : "";
+        return e.reduced_volume && e.volume ? "cannot be combined with equilibrium.volume" : "";
     });
     k.table("branch", [&](auto& k) {
         std::vector<std::pair<std::string, int>> parameters;
@@ -75,12 +75,12 @@ void keys(Keys& k, EquilibriumChoices& e) {
         k.check("", [&] {
             const BranchChoices& b = e.branch;
             if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
-            if (!b.to || !b.step) return "needs to and step: where the branch ends, and between shapes";
+            if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
             const bool held = *b.parameter == vary_area             ? area
                               : *b.parameter == vary_volume         ? volume && !e.reduced_volume
                               : *b.parameter == vary_reduced_volume ? reduced && !e.volume
                                                                     : true;
-            return held ? "" : "varies what is not held fixed: see equilibrium.held";
+            return held ? "" : "varies a quantity that is not held fixed: see equilibrium.held";
         });
     });
 }

@@ -45,7 +45,7 @@ struct without_optional<std::optional<T>> {
 template <class T>
 using Choices = std::vector<std::pair<std::string, typename without_optional<T>::type>>;
 
-// Names of entries that are not fixed keys: those listed (for messages), told by `accepts`.
+// Names of entries that are not fixed keys: those listed (for messages), recognised by `accepts`.
 struct OpenNames {
     std::vector<std::string> listed;
     bool (*accepts)(std::string_view name);
@@ -82,7 +82,7 @@ void keys(Keys& k, Model& model) {
         k.number("gamma", model.gamma, {.from = 0});
     } else {
         for (const char* key : {"Re", "gamma"})
-            k.absent(key, "must be absent: it belongs to kind " + quoted_names(&ModelEntry::viscous));
+            k.absent(key, "must be absent: only valid with kind = " + quoted_names(&ModelEntry::viscous));
     }
     k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
 }
@@ -96,7 +96,7 @@ void keys(Keys& k, Velocity& velocity, const Model& model) {
     if (velocity.rotates)
         k.number("omega", velocity.omega, {}, k.required);
     else
-        k.absent("omega", "must be absent: it belongs to initial = \"rotation\"");
+        k.absent("omega", "must be absent: only valid with initial = \"rotation\"");
 }
 
 template <class Keys>
@@ -128,7 +128,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
     k.choice("mesh", d.mesh,
              {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
     if (moves) {
-        k.absent("recovery", "must be absent: a surface that moves has its own curvatures");
+        k.absent("recovery", "must be absent: the time scheme determines the curvatures of a moving surface");
         k.choice(
             "scheme", d.scheme,
             {{"bdf2", Scheme::bdf2}, {"alpha", Scheme::alpha}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
@@ -139,7 +139,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
                 k.absent(key, "must be absent: scheme \"paper\" controls neither its step nor its mesh");
             return;
         }
-        k.absent("smoothing", "must be absent: it belongs to scheme \"paper\"");
+        k.absent("smoothing", "must be absent: only valid with scheme = \"paper\"");
         k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
         k.number("relaxation", d.relaxation, {.above = 0});
         k.flag("follow_curvature", d.follow_curvature);
@@ -176,7 +176,7 @@ void keys(Keys& k, Expectation& expected, double end) {
     k.check("", [&]() -> std::string {
         if (!expected.rel && !expected.abs) return "needs a tolerance: rel, abs or both";
         if (!expected.abs && expected.value == 0)
-            return "needs abs: a relative tolerance of the value 0 allows nothing";
+            return "needs abs: a relative tolerance is meaningless for the value 0";
         return {};
     });
 }
@@ -218,7 +218,7 @@ void keys(Keys& k, Expect& expect, double end) {
         k.number("time", moment.time, {.from = 0, .to = end, .note = "time.end"}, k.required);
         k.entries(in_moment, moment.values, &Expectation::series,
                   [&](auto& k, Expectation& value) { keys(k, value, end); });
-        k.check("", [&] { return moment.values.empty() ? "expects nothing: add a series" : ""; });
+        k.check("", [&] { return moment.values.empty() ? "is empty: add a series and its expected value" : ""; });
     });
 
     expect.values = at_end;
@@ -233,7 +233,7 @@ inline bool is_tube(const Shape& shape) {
     return std::holds_alternative<Tube>(shape);
 }
 
-// Why a start is not one for tier "axisym".
+// Why tier "axisym" cannot use a start.
 inline Asymmetry not_axisymmetric(const Shape& shape) {
     return std::visit(
         [](const auto& which) -> Asymmetry {
@@ -243,7 +243,7 @@ inline Asymmetry not_axisymmetric(const Shape& shape) {
         shape);
 }
 
-// Where it is known how narrow the start is.
+// If the smallest radius of the start is known.
 template <class Keys>
 void check_neck(Keys& k, const Case& c) {
     std::visit(
@@ -259,7 +259,7 @@ void check_neck(Keys& k, const Case& c) {
         c.shape);
 }
 
-// What no table can tell alone.
+// Conditions across tables.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
@@ -275,10 +275,10 @@ void check_together(Keys& k, const Case& c) {
     if (c.tier == Tier::surface3d) {
         if (c.surface.scheme != Scheme::paper) return;
         k.check("discretisation.scheme", [&]() -> std::string {
-            if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not control it";
+            if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not adapt the step";
             if (!law.inextensible) return "must not be \"paper\" for a gradient flow";
             if (law.inertia == 0 && law.friction == 0)
-                return "must not be \"paper\" for a Stokes flow without friction: it leaves rigid motions open";
+                return "must not be \"paper\" for a Stokes flow without friction: rigid motions are undetermined";
             if (const auto key = term_beyond_paper(c.energy); !key.empty())
                 return fmt::format("must not be \"paper\" with energy.{}: it has k20, k40 and k42 only", key);
             return {};
@@ -290,7 +290,7 @@ void check_together(Keys& k, const Case& c) {
     k.check("discretisation.parametrisation", [&]() -> std::string {
         const auto chosen = c.discretisation.parametrisation;
         if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained()))
-            return "must not be \"graph\": only the gradient flow of a tube with free volume is computed as one";
+            return "must not be \"graph\": only the gradient flow of a tube with free volume is computed as a graph";
         if (chosen == Parametrisation::material && !law.inextensible)
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
@@ -306,8 +306,8 @@ void check_together(Keys& k, const Case& c) {
         });
         k.check("shape.kind", [&] {
             return std::holds_alternative<Torus>(c.shape)
-                       ? "must not be \"torus\": equilibria are cells, or tubes that "
-                         "mirror themselves"
+                       ? "must not be \"torus\": equilibria are closed cells, or tubes with "
+                         "mirror symmetry"
                        : "";
         });
     }
@@ -325,17 +325,17 @@ void keys(Keys& k, AutoChoices& a) {
     });
 }
 
-// Tier auto moves what the shape is, and finds out how.
+// Tier auto moves the shape and chooses between the other two tiers.
 template <class Keys>
 void automatic_keys(Keys& k, Case& c) {
-    k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
+    k.absent("equilibrium", "must be absent: only valid with tier = \"axisym\"");
     k.table("model", [&](auto& k) { keys(k, c.model); });
     k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
     k.table("auto", [&](auto& k) { keys(k, c.automatic); });
     k.table("time", [&](auto& k) { keys(k, c.time); });
 }
 
-// Tier axisym moves a profile or looks for its equilibria.
+// Tier axisym moves a profile or computes its equilibria.
 template <class Keys>
 void motion_keys(Keys& k, Case& c) {
     k.table("model", [&](auto& k) { keys(k, c.model); });
@@ -346,10 +346,10 @@ void motion_keys(Keys& k, Case& c) {
         k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
 }
 
-// Tier surface3d moves a surface if there is a time to do so.
+// Tier surface3d moves a surface if there is a table [time].
 template <class Keys>
 void surface_motion_keys(Keys& k, Case& c) {
-    k.absent("equilibrium", "must be absent: it belongs to tier \"axisym\"");
+    k.absent("equilibrium", "must be absent: only valid with tier = \"axisym\"");
     std::optional<TimeSpan> time;
     if (c.moves()) time = c.time;
     k.optional_table("time", time, [](auto& k, TimeSpan& t) { keys(k, t); });
@@ -372,7 +372,7 @@ void keys(Keys& k, Case& c) {
         k.text("source", c.source);
     });
     k.table("energy", [&](auto& k) { keys(k, c.energy); });
-    if (c.tier != Tier::automatic) k.absent("auto", "must be absent: it belongs to tier \"auto\"");
+    if (c.tier != Tier::automatic) k.absent("auto", "must be absent: only valid with tier = \"auto\"");
     if (c.tier == Tier::axisym)
         motion_keys(k, c);
     else if (c.tier == Tier::surface3d)

@@ -43,7 +43,8 @@ toml::node& insert(toml::node& parent, std::span<const std::string> where, const
         return *table->get(name);
     }
     toml::array* list = parent.as_array();
-    if (!list) throw CaseError(fmt::format("{}: {} is neither a table nor a list, it has no '{}'", source, path, name));
+    if (!list)
+        throw CaseError(fmt::format("{}: {} is neither a table nor a list, so it has no '{}'", source, path, name));
     const auto index = list_index(name);
     if (!index || *index > list->size())
         throw CaseError(fmt::format("{}: {} is a list of {}: '{}' must be an index from 0 to {} ({} adds an entry)",

@@ -72,7 +72,7 @@ public:
         ((name == Kinds::kind ? void(target = Kinds{}) : void()), ...);
     }
 
-    // An absent table is read like an empty one: what it lacks is missing, the rest has its defaults.
+    // An absent table is read like an empty one: required keys are missing, the rest have their defaults.
     template <class Describe>
     void table(const std::string& key, const Describe& describe) {
         const toml::node* node = find(key, "a table", false);

@@ -29,7 +29,7 @@ Revolution spline_of(const Record& frame) {
                    values(frame, "coefficients")};
     if (out.degree < 1 || out.degree > 7 || !(out.length > 0) || out.coefficients.empty() ||
         out.knots.size() != out.coefficients.size() + static_cast<std::size_t>(out.degree) + 1)
-        refuse("it is damaged: degree, length, knots and coefficients are those of no spline");
+        refuse("it is damaged: degree, length, knots and coefficients do not define a spline");
     return out;
 }
 

@@ -88,7 +88,7 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
     }
     if (record.mesh) {
         if (*record.mesh >= meshes.size())
-            throw std::runtime_error(fmt::format("{} lies on mesh {}, which is missing", name, *record.mesh));
+            throw std::runtime_error(fmt::format("{} refers to mesh {}, which is missing", name, *record.mesh));
         record.arrays = get_grid_arrays(group, meshes[*record.mesh]);
     } else {
         for (const std::string& key : member_names(group)) record.arrays.push_back(get_array(group, key));
@@ -123,10 +123,10 @@ void get_series(hid_t file, Contents& contents) {
 
 void require_parts(hid_t file) {
     for (const char* part : {"case", "about", "series", "frames"})
-        if (!has(file, part)) throw std::runtime_error(fmt::format("no Tubule result: it lacks /{}", part));
+        if (!has(file, part)) throw std::runtime_error(fmt::format("not a Tubule result: /{} is missing", part));
     for (const char* part : {"id", "sequence", "about_begun"})
         if (H5Aexists(file, part) <= 0)
-            throw std::runtime_error(fmt::format("no Tubule result: it lacks the attribute {}", part));
+            throw std::runtime_error(fmt::format("not a Tubule result: the attribute {} is missing", part));
 }
 
 Contents get_contents(hid_t file) {

@@ -15,7 +15,7 @@
 
 namespace tubule::h5 {
 
-// HDF5 prints its errors unless told not to; ours go into exceptions.
+// Turns off HDF5's printing of errors; they go into exceptions.
 class Quiet {
 public:
     Quiet() {

@@ -79,7 +79,7 @@ public:
 
     bool empty() const { return rest_.empty(); }
     std::span<const std::byte> take(std::size_t n) {
-        if (n > rest_.size()) throw std::runtime_error("a journal record is shorter than it says");
+        if (n > rest_.size()) throw std::runtime_error("a journal record is shorter than its stated length");
         const auto taken = rest_.first(n);
         rest_ = rest_.subspan(n);
         return taken;
@@ -189,14 +189,14 @@ void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
         case Entry::point:
             break;  // belongs to a scan
     }
-    throw std::runtime_error(fmt::format("a journal record is of the unknown kind {}", static_cast<unsigned>(kind)));
+    throw std::runtime_error(fmt::format("a journal record has the unknown kind {}", static_cast<unsigned>(kind)));
 }
 
 // Opens and locks; a file that another writer took away between the two is no longer the journal, so try again.
 durable::File open_locked(const std::filesystem::path& path) {
     while (true) {
         durable::File file(path, O_RDWR | O_CREAT | O_APPEND);
-        // Some network file systems know no locks; that is no reason to refuse a run.
+        // Some network file systems do not support locks; that is no reason to reject a run.
         if (::flock(file.descriptor(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
             throw std::runtime_error(
                 fmt::format("{} is in use: another process is writing this result", path.string()));
@@ -266,7 +266,7 @@ void Journal::begin(Entry kind) {
 }
 
 void Journal::commit(std::uint64_t sequence) {
-    if (!sound_) throw std::runtime_error(fmt::format("{} was damaged by the error before", file_.path().string()));
+    if (!sound_) throw std::runtime_error(fmt::format("{} was damaged by an earlier error", file_.path().string()));
     Head head;
     std::memcpy(&head, buffer_.data(), sizeof(Head));
     head.length = buffer_.size() - sizeof(Head);

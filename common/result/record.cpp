@@ -22,7 +22,7 @@ constexpr std::string_view kind_names[] = {"graph", "curve", "equilibrium", "sur
 }
 
 [[noreturn]] void missing(const char* name) {
-    refuse(fmt::format("{} is missing, as in results of another version", name));
+    refuse(fmt::format("{} is missing; results of other versions may not have it", name));
 }
 
 }  // namespace
@@ -33,7 +33,7 @@ std::string_view name(RecordKind kind) {
 
 RecordKind record_kind(std::string_view name) {
     const auto found = std::find(std::begin(kind_names), std::end(kind_names), name);
-    if (found == std::end(kind_names)) throw std::runtime_error(fmt::format("\"{}\" is no kind of frame", name));
+    if (found == std::end(kind_names)) throw std::runtime_error(fmt::format("\"{}\" is not a kind of frame", name));
     return static_cast<RecordKind>(found - std::begin(kind_names));
 }
 
@@ -61,7 +61,7 @@ Array array(const std::string& name, std::vector<double> values) {
 }
 
 RecordReader::RecordReader(const Record& record, RecordKind kind) : record_(record) {
-    if (kind_of(record) != kind) refuse(fmt::format("it is of kind {}, not {}", name(kind_of(record)), name(kind)));
+    if (kind_of(record) != kind) refuse(fmt::format("its kind is {}, not {}", name(kind_of(record)), name(kind)));
 }
 
 double RecordReader::number_of(const char* name) const {

@@ -18,7 +18,7 @@ struct Restart {
     std::optional<SurfaceCells> cells = std::nullopt;
 };
 
-// The declared kind of a record. Older results declare none: there, the arrays tell.
+// The declared kind of a record. Older results declare none: there it follows from the arrays.
 RecordKind kind_of(const Record& record);
 
 const Array* find_array(const Record& record, std::string_view name);  // nullptr if there is none
@@ -64,7 +64,7 @@ private:
 };
 
 // Throws std::runtime_error that begins with "cannot resume from this frame" for a field that is missing, is not of the
-// type asked for, or has another shape: vectors [n], fields [n, 3], where n must be `count` if that is given.
+// required type, or has another shape: vectors [n], fields [n, 3], where n must be `count` if that is given.
 class RecordReader {
 public:
     explicit RecordReader(const Record& record) : record_(record) {}

@@ -35,7 +35,7 @@ void check_finite(double value, const std::string& where, const std::string& nam
 void check_name(const std::string& name, const std::string& where, std::set<std::string>& taken) {
     if (name.empty() || name == "." || name.find('/') != std::string::npos || name.find('\0') != std::string::npos)
         throw std::invalid_argument(fmt::format("{}: \"{}\" cannot be a name", where, name));
-    if (!taken.insert(name).second) throw std::invalid_argument(fmt::format("{}: {} comes twice", where, name));
+    if (!taken.insert(name).second) throw std::invalid_argument(fmt::format("{}: {} occurs twice", where, name));
 }
 
 // HDF5 ends its strings with a zero byte.
@@ -56,12 +56,12 @@ void check_about(const About& about) {
 void check_series(const std::vector<std::string>& series) {
     std::set<std::string> taken;
     for (const std::string& name : series) check_name(name, "series", taken);
-    if (!taken.contains("time")) throw std::invalid_argument("series: there must be one of the name time");
+    if (!taken.contains("time")) throw std::invalid_argument("series: a series named time is required");
 }
 
 void check_free(const std::string& name, std::span<const char* const> taken, const std::string& where) {
     if (std::find(taken.begin(), taken.end(), name) != taken.end())
-        throw std::invalid_argument(fmt::format("{}: {} is a name that the format of meshes needs", where, name));
+        throw std::invalid_argument(fmt::format("{}: {} is a name reserved by the mesh format", where, name));
 }
 
 void check_mesh(const SurfaceCells& mesh) {
@@ -69,20 +69,21 @@ void check_mesh(const SurfaceCells& mesh) {
     if (mesh.order < 1 || mesh.order > 4) refuse(fmt::format("its order is {}, not 1 to 4", mesh.order));
     const int width = (mesh.order + 1) * (mesh.order + 2) / 2;
     if (mesh.cells.empty() || mesh.cells.size() % static_cast<std::size_t>(width) != 0)
-        refuse(fmt::format("{} node numbers for cells of {}", mesh.cells.size(), width));
+        refuse(fmt::format("{} node numbers do not divide into cells of {}", mesh.cells.size(), width));
     for (const int node : mesh.cells)
         if (node < 0 || static_cast<std::size_t>(node) >= mesh.nodes)
-            refuse(fmt::format("a cell has node {}, there are {}", node, mesh.nodes));
+            refuse(fmt::format("a cell uses node {}, but there are {}", node, mesh.nodes));
     if (!std::isfinite(mesh.period) || mesh.period < 0) refuse(fmt::format("its period is {}", mesh.period));
     const std::size_t shifts = mesh.period > 0 ? mesh.cells.size() : 0;
     if (mesh.shifts.size() != shifts)
-        refuse(fmt::format("{} shifts, where its period {} asks for {}", mesh.shifts.size(), mesh.period, shifts));
+        refuse(fmt::format("{} shifts, but its period {} requires {}", mesh.shifts.size(), mesh.period, shifts));
 }
 
 // A record on a curved surface.
 void check_grid(const Record& record, const std::vector<SurfaceCells>& meshes, const std::string& where) {
     const auto refuse = [&](const std::string& why) { throw std::invalid_argument(where + ": " + why); };
-    if (*record.mesh >= meshes.size()) refuse(fmt::format("mesh {}, there are {}", *record.mesh, meshes.size()));
+    if (*record.mesh >= meshes.size())
+        refuse(fmt::format("it refers to mesh {}, but there are {}", *record.mesh, meshes.size()));
     const SurfaceCells& mesh = meshes[*record.mesh];
     const Array* points = find_array(record, "points");
     if (!points || points->shape != std::vector<std::size_t>{mesh.nodes, 3})
@@ -105,7 +106,7 @@ void check_record(const Record& record, const std::vector<SurfaceCells>& meshes,
         std::size_t size = 1;
         for (const std::size_t extent : array.shape) size *= extent;
         if (size != array.data.size())
-            throw std::invalid_argument(fmt::format("{} {}: its shape asks for {} numbers, it has {}", where,
+            throw std::invalid_argument(fmt::format("{} {}: its shape requires {} numbers, but it has {}", where,
                                                     array.name, size, array.data.size()));
         const auto bad =
             std::find_if_not(array.data.begin(), array.data.end(), [](double x) { return std::isfinite(x); });
@@ -126,8 +127,8 @@ void refuse_to_replace_others(const fs::path& file) {
     try {
         require_result(file);
     } catch (const std::runtime_error& e) {
-        throw std::runtime_error(
-            fmt::format("{}\nnot replaced, as it may be needed: remove it first, or write elsewhere", e.what()));
+        throw std::runtime_error(fmt::format(
+            "{}\nit was not replaced, since it may be needed: remove it first, or write elsewhere", e.what()));
     }
 }
 
@@ -148,13 +149,13 @@ Contents load(const fs::path& file) {
 Record rewind(Contents& contents) {
     const Record* newest = contents.frames.empty() ? nullptr : &contents.frames.back();
     if (contents.checkpoint && (!newest || contents.checkpoint->time >= newest->time)) newest = &*contents.checkpoint;
-    if (!newest) throw std::runtime_error("it holds neither frame nor checkpoint to go on from");
+    if (!newest) throw std::runtime_error("it contains no frame or checkpoint to resume from");
     Record record = *newest;
 
     const std::size_t width = contents.series.size();
     const auto time = static_cast<std::size_t>(std::find(contents.series.begin(), contents.series.end(), "time") -
                                                contents.series.begin());
-    if (time == width) throw std::runtime_error("it lacks /series/time");
+    if (time == width) throw std::runtime_error("/series/time is missing");
     std::size_t kept = 0;  // values
     for (std::size_t i = 0; i < contents.rows.size(); i += width) {
         if (contents.rows[i + time] > record.time) continue;
@@ -211,7 +212,9 @@ struct ResultWriter::Impl {
 
     // The sequence number for the next journal record.
     std::uint64_t next() const {
-        if (finished) throw std::logic_error(fmt::format("{}: nothing can follow finish()", file.string()));
+        if (finished)
+            throw std::logic_error(
+                fmt::format("{}: the result is finished; nothing can be written after finish()", file.string()));
         return contents.sequence + 1;
     }
 };
@@ -267,7 +270,7 @@ void ResultWriter::row(std::span<const double> values) {
     Contents& contents = impl_->contents;
     if (values.size() != contents.series.size())
         throw std::invalid_argument(
-            fmt::format("a row of {} values for {} series", values.size(), contents.series.size()));
+            fmt::format("a row has {} values, but there are {} series", values.size(), contents.series.size()));
     for (std::size_t j = 0; j < values.size(); ++j)
         if (!std::isfinite(values[j])) check_finite(values[j], "series", contents.series[j]);
 

@@ -47,7 +47,7 @@ struct Record {
     std::vector<std::pair<std::string, double>> numbers;
     std::vector<Array> arrays;
     // Of a curved surface: the number of its SurfaceCells. Then there must be an array "points" [nodes, 3], and arrays
-    // [nodes], [nodes, 3] and [nodes, 6] are data of the nodes for VTK (but for "restart_...").
+    // [nodes], [nodes, 3] and [nodes, 6] are data of the nodes for VTK (except "restart_...").
     std::optional<std::size_t> mesh = std::nullopt;
     std::optional<RecordKind> kind = std::nullopt;  // kind_of() (record.hpp) knows that of older results
 };
@@ -72,7 +72,7 @@ struct CaseText {
 class ResultWriter {
 public:
     // Begins a new result: NAME.hdf is there when this returns, still without rows. An old result of that
-    // name is replaced; a file that is no result is not (std::runtime_error). `series` must contain "time".
+    // name is replaced; a file that is not a result is kept (std::runtime_error). `series` must contain "time".
     static ResultWriter create(const std::filesystem::path& file, const CaseText& c, const About& about,
                                const std::vector<std::string>& series);
     // Goes on with a result from its newest restart record (checkpoint or last frame, whichever is later);
@@ -112,7 +112,7 @@ struct Result {
 };
 
 // Reads a result; if a journal lies beside it (the run was killed, or is still going on), its complete
-// records are included. Throws std::runtime_error naming the file when it is no result.
+// records are included. Throws std::runtime_error naming the file when it is not a result.
 Result read_result(const std::filesystem::path& file);
 
 // Merges a left-over journal into the file, so that it can be read by any HDF5 program, and into the folder `view`.

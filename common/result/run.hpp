@@ -11,7 +11,7 @@
 
 namespace tubule {
 
-// Who watches a run. Rows hold one value for each series of the tier; a frame is made when asked for.
+// An observer of a run. Rows hold one value for each series of the tier; a frame is made when asked for.
 struct RunObserver {
     virtual ~RunObserver() = default;
     virtual void row(std::span<const double>) {}

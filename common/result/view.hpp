@@ -9,7 +9,7 @@
 
 namespace tubule {
 
-// Writes what is missing or differs, and removes what belongs to frames that are no more.
+// Writes what is missing or differs, and removes what belongs to frames that no longer exist.
 void write_view(const std::filesystem::path& result, const Contents& contents);
 
 }  // namespace tubule

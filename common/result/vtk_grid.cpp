@@ -27,7 +27,7 @@ std::size_t cell_count(const SurfaceCells& mesh) {
     return mesh.cells.size() / nodes_per_cell(mesh);
 }
 
-// What every VTKHDF group begins with. VTK wants a string of fixed length.
+// The header of every VTKHDF group. VTK requires a string of fixed length.
 void put_format(hid_t group, std::array<std::int64_t, 2> version) {
     put_attribute(group, "Version", H5T_NATIVE_INT64, space({2}), version.data());
     const std::string type = "UnstructuredGrid";
@@ -138,7 +138,8 @@ SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     for (const std::int64_t point : get_integers(group, "Connectivity")) {
         const auto p = static_cast<std::size_t>(point);
         if (p >= points)
-            throw std::runtime_error(fmt::format("mesh {}: a cell has point {} of {}", name, point, points));
+            throw std::runtime_error(
+                fmt::format("mesh {}: a cell uses point {}, but there are {}", name, point, points));
         mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
         if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
     }

@@ -39,7 +39,7 @@ inline constexpr const char* grid_members[] = {"NumberOfPoints", "NumberOfCells"
 std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes);
 SurfaceCells get_mesh(hid_t meshes, const std::string& name);
 
-// All that makes the group of a frame an unstructured grid. Arrays that are no point data become plain datasets.
+// Makes the group of a frame an unstructured grid. Arrays that are not point data become plain datasets.
 void put_grid(hid_t group, const Record& record, const WrittenMesh& written);
 // The arrays of such a frame, as they were written.
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh);

@@ -129,7 +129,7 @@ ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<doubl
     std::vector<double> s(n, 0.0);  // by chords first
     for (std::size_t i = 1; i < n; ++i) {
         const double chord = std::hypot(r[i] - r[i - 1], z[i] - z[i - 1]);
-        require(chord > 0, "two neighbours of a profile are the same point");
+        require(chord > 0, "two neighbouring points of a profile coincide");
         s[i] = s[i - 1] + chord;
     }
     Moments total;
@@ -146,7 +146,7 @@ ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<doubl
         }
         s = next;
     }
-    require(total.volume > 0, "a profile must run such that the outside is to its right");
+    require(total.volume > 0, "a profile must be oriented with the outside to its right");
     curve.arc_length = total.length;
     curve.mean_radius = total.radius / total.length;
     return curve;
@@ -155,7 +155,8 @@ ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<doubl
 BlendedCurve along_curve(const ProfileCurve& curve, const std::vector<double>& first,
                          const std::vector<double>& second) {
     std::vector<double> s = curve.functions.x;
-    require(first.size() == s.size() && second.size() == s.size(), "values on a profile: one for each of its points");
+    require(first.size() == s.size() && second.size() == s.size(),
+            "values on a profile: one is needed for each of its points");
     if (curve.kind == ProfileCurve::Kind::cell)
         for (double& c : s) c = std::acos(-std::clamp(c, -1.0, 1.0)) / pi;
     return functions_of(curve.kind, first, second, s);

@@ -59,7 +59,8 @@ void keys(Keys& k, Torus& torus) {
     k.number("radius", torus.radius, {.above = 0}, k.required);
     k.number("tube_radius", torus.tube_radius, {.above = 0}, k.required);
     k.check("tube_radius", [&] {
-        return torus.tube_radius < torus.radius ? std::string() : "must be below shape.radius: the torus meets itself";
+        return torus.tube_radius < torus.radius ? std::string()
+                                                : "must be below shape.radius: the torus intersects itself";
     });
 }
 

@@ -92,8 +92,9 @@ Vector random_direction(const Vector& x, std::mt19937& engine) {
 
 std::string line(const char* what, const TaylorSlope& t) {
     if (std::isnan(t.slope))
-        return fmt::format("{}: {}\n", what,
-                           t.pass ? "right, linear up to rounding" : "NOT CHECKED, the state admits hardly any step");
+        return fmt::format(
+            "{}: {}\n", what,
+            t.pass ? "correct, linear up to rounding" : "NOT CHECKED, the state admits no large enough step");
     return fmt::format("{}: {}, Taylor slope {:.2f} for steps {:.1e} to {:.1e}, remainder {:.1e} of the change\n", what,
                        t.pass ? "right" : "WRONG", t.slope, t.h_small, t.h_large, t.defect);
 }
@@ -108,12 +109,12 @@ DerivativeCheck check_derivatives(const std::function<double(const Vector&)>& va
                                   const std::function<Vector(const Vector&)>& gradient,
                                   const std::function<Vector(const Vector&, const Vector&)>& hessian_times,
                                   const Vector& x, int directions) {
-    if (x.size() == 0) throw std::invalid_argument("derivative check without a state");
+    if (x.size() == 0) throw std::invalid_argument("the derivative check needs a state of size 1 or more");
     const Vector g = gradient(x);
     if (g.size() != x.size())
         throw std::invalid_argument(fmt::format("gradient of size {} for a state of size {}", g.size(), x.size()));
     if (!std::isfinite(value(x)) || !g.allFinite())
-        throw std::invalid_argument("derivative check at a state whose value or gradient is not finite");
+        throw std::invalid_argument("the derivative check needs a state with a finite value and gradient");
 
     DerivativeCheck check;
     std::mt19937 engine(1);
@@ -121,7 +122,7 @@ DerivativeCheck check_derivatives(const std::function<double(const Vector&)>& va
         const Vector v = random_direction(x, engine);
         const Vector Hv = hessian_times(x, v);
         if (Hv.size() != x.size() || !Hv.allFinite())
-            throw std::invalid_argument("derivative check with a Hessian that does not fit the state or is not finite");
+            throw std::invalid_argument("the Hessian in the derivative check does not fit the state or is not finite");
         const Along value_along = [&](double h) { return Vector::Constant(1, value(x + h * v)); };
         const Along gradient_along = [&](double h) { return gradient(x + h * v); };
         const TaylorSlope first = slope_of(value_along, Vector::Constant(1, g.dot(v)));

@@ -1,4 +1,4 @@
-// Taylor slopes: are a gradient and a Hessian the derivatives of the value they claim to belong to?
+// Taylor slopes: check that a gradient and a Hessian are the derivatives of a value.
 // Serves the tests, `tubule run --check-derivatives` and the report of a failed run.
 #pragma once
 
@@ -8,11 +8,11 @@
 
 namespace tubule {
 
-// One quantity's remainder |q(x + h v) - q(x) - h dq(x) v| falls like h^slope: 2 (or more) for a right derivative,
+// One quantity's remainder |q(x + h v) - q(x) - h dq(x) v| falls like h^slope: 2 (or more) for a correct derivative,
 // 1 for a wrong one. Steps h go from 1e-1 down to 1e-8 in units of the size of x; the slope is read from the decade
 // nearest to zero in which the remainder still stands clear of rounding noise, as there a wrong derivative shows most.
 struct TaylorSlope {
-    double slope = 0;                 // NaN: q is linear up to rounding (pass), or x admits hardly any step (no pass)
+    double slope = 0;  // NaN: q is linear up to rounding (pass), or x admits no large enough step (no pass)
     double h_small = 0, h_large = 0;  // range it was read from
     double defect = 0;                // remainder / |h dq v| at h_small: at most this wrong, relatively
     bool pass = false;

@@ -68,7 +68,8 @@ Gmres::Answer Gmres::solve(const Operator& A, const Operator& preconditioner, co
         throw std::invalid_argument(
             fmt::format("GMRES of size {} with vectors of sizes {} and {}", size_, b.size(), x.size()));
     const double norm = b.norm();
-    if (!std::isfinite(norm) || !x.allFinite()) throw SolveError("GMRES begins with a vector that is not finite");
+    if (!std::isfinite(norm) || !x.allFinite())
+        throw SolveError("the right-hand side or the initial guess of GMRES is not finite");
     if (norm == 0) {
         x.setZero();
         return {};
@@ -82,9 +83,9 @@ Gmres::Answer Gmres::solve(const Operator& A, const Operator& preconditioner, co
         if (answer.residual <= tolerance) return answer;
         const bool exhausted = answer.iterations >= max_iterations;
         if (exhausted || (before >= 0 && !(answer.residual < 0.5 * before)))
-            throw SolveError(fmt::format(
-                "GMRES of size {} {} at a residual of {:.1e} after {} iterations; {:.1e} was asked for", size_,
-                exhausted ? "is" : "no longer gets on", answer.residual, answer.iterations, tolerance));
+            throw SolveError(
+                fmt::format("GMRES of size {} {} at a residual of {:.1e} after {} iterations; the tolerance is {:.1e}",
+                            size_, exhausted ? "ended" : "stagnated", answer.residual, answer.iterations, tolerance));
         rhs_[0] = answer.residual * norm;
         residual /= rhs_[0];
         const int most = std::min(restart_, max_iterations - answer.iterations);

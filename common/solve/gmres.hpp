@@ -10,7 +10,7 @@
 namespace tubule {
 
 // Flexible, right-preconditioned GMRES (Saad 1993): what it minimises is the true residual, whatever the preconditioner
-// does, also one in single precision that is not quite linear. It keeps its vectors between solves: make one and use it
+// does, even one in single precision that is not quite linear. It keeps its vectors between solves: make one and use it
 // often.
 class Gmres {
 public:

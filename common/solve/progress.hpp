@@ -1,4 +1,4 @@
-// Shows how far a run has come: a bar on a terminal, a line now and then elsewhere.
+// Progress of a run: a bar on a terminal, a line from time to time elsewhere.
 #pragma once
 
 #include <cstdio>

@@ -113,7 +113,7 @@ struct SparseSolver::Impl {
     }
 
     void require_factors(const char* what) const {
-        if (!factored) throw std::logic_error(fmt::format("{}::{} without factors", name, what));
+        if (!factored) throw std::logic_error(fmt::format("{}::{} needs factors: call factor() first", name, what));
     }
 };
 
@@ -129,7 +129,7 @@ void SparseSolver::factor(const Matrix& A) {
     Impl& s = *impl_;
     s.factored = false;
     if (A.rows() != A.cols() || A.rows() == 0)
-        throw std::invalid_argument(fmt::format("{} wants a square matrix, not {} x {}", s.name, A.rows(), A.cols()));
+        throw std::invalid_argument(fmt::format("{} needs a square matrix, not {} x {}", s.name, A.rows(), A.cols()));
     if (!A.isCompressed()) {
         Matrix compressed = A;
         compressed.makeCompressed();

@@ -39,7 +39,7 @@ public:
     ~SparseSolver();
 
     // Throws SolveError when A has entries that are not finite, is singular or has a condition number beyond 1/epsilon;
-    // std::invalid_argument when A is not square or empty. There are no factors afterwards then.
+    // std::invalid_argument when A is not square or empty. There are then no factors.
     void factor(const Eigen::SparseMatrix<double>& A);
 
     // X with A X = B, one or several right-hand sides, followed by this many steps of iterative refinement.
@@ -52,7 +52,7 @@ public:
         return X;
     }
 
-    // Estimate of 1/(|A|_1 |A^-1|_1), hardly ever too large by more than a factor 3; costs a few solves.
+    // Estimate of 1/(|A|_1 |A^-1|_1), rarely too large by more than a factor 3; costs a few solves.
     // std::logic_error without factors.
     double reciprocal_condition() const;
 

@@ -111,8 +111,8 @@ public:
 private:
     [[noreturn]] void fail() const {
         if (common_.status == CHOLMOD_OUT_OF_MEMORY || common_.status == CHOLMOD_TOO_LARGE)
-            throw SolveError("the Cholesky factors do not fit into memory");
-        throw SolveError(fmt::format("CHOLMOD gives up (status {})", common_.status));
+            throw SolveError("not enough memory for the Cholesky factors");
+        throw SolveError(fmt::format("CHOLMOD failed (status {})", common_.status));
     }
 
     Ordering ordering_;
@@ -179,7 +179,8 @@ void require_ordering(const Ordering& ordering, int size) {
     std::vector<bool> found(ordering.size());
     for (const int i : ordering) {
         if (i < 0 || i >= size || found[i])
-            throw std::invalid_argument(fmt::format("ordering is no permutation: {} of {} again or beyond", i, size));
+            throw std::invalid_argument(
+                fmt::format("ordering is not a permutation: {} of {} is repeated or out of range", i, size));
         found[i] = true;
     }
 }
@@ -187,7 +188,7 @@ void require_ordering(const Ordering& ordering, int size) {
 Ordering nested_dissection(const Matrix& A, const std::vector<int>& node_of_unknown) {
     if (A.rows() != A.cols() || A.rows() == 0)
         throw std::invalid_argument(
-            fmt::format("nested_dissection wants a square matrix, not {} x {}", A.rows(), A.cols()));
+            fmt::format("nested_dissection needs a square matrix, not {} x {}", A.rows(), A.cols()));
     std::vector<int> node = node_of_unknown;
     if (node.empty()) {
         node.resize(A.cols());
@@ -199,7 +200,7 @@ Ordering nested_dissection(const Matrix& A, const std::vector<int>& node_of_unkn
     CholmodCommon common;
     Ordering node_at(nodes);
     if (!cholmod_metis(&view, nullptr, 0, /*postorder*/ 1, node_at.data(), &common))
-        throw SolveError(fmt::format("METIS gives up on {} nodes (status {})", nodes, common.status));
+        throw SolveError(fmt::format("METIS failed on {} nodes (status {})", nodes, common.status));
     std::vector<int> position(nodes);
     for (int k = 0; k < nodes; ++k) position[node_at[k]] = k;
     Ordering ordering(A.cols());

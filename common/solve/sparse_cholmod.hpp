@@ -1,4 +1,4 @@
-// What our uses of CHOLMOD share. Private to common/solve.
+// Shared by all uses of CHOLMOD. Private to common/solve.
 #pragma once
 
 #include <cholmod.h>

@@ -39,7 +39,7 @@ public:
     void solve(double* x, int size, int count, bool transposed) override {
         const auto solve = transposed ? klu_tsolve : klu_solve;
         if (!solve(symbolic_, numeric_, size, count, x, &common_))
-            throw SolveError(fmt::format("KLU does not solve (status {})", common_.status));
+            throw SolveError(fmt::format("KLU failed to solve (status {})", common_.status));
     }
 
     double pivot_ratio() override {
@@ -70,7 +70,7 @@ private:
             throw SolveError(
                 fmt::format("matrix of size {} is singular: no pivot in column {}", A.cols(), common_.singular_col));
         if (common_.status == KLU_OUT_OF_MEMORY) throw std::bad_alloc();
-        throw SolveError(fmt::format("matrix of size {} is refused by KLU (status {})", A.cols(), common_.status));
+        throw SolveError(fmt::format("KLU cannot factor the matrix of size {} (status {})", A.cols(), common_.status));
     }
 
     klu_common common_{};

@@ -247,8 +247,8 @@ struct SparseLdlt<Scalar>::Impl {
             if (!(sum > 0)) {
                 require_finite(A);
                 throw SolveError(
-                    fmt::format("matrix of size {} is singular or no saddle point: unknown {} has no "
-                                "entry on the diagonal nor with unknowns that have",
+                    fmt::format("matrix of size {} is singular or not a saddle point: unknown {} has no "
+                                "entry on the diagonal and none with an unknown that has one",
                                 tree.size, j));
             }
             scale[column] = 1 / std::sqrt(sum);
@@ -330,7 +330,7 @@ struct SparseLdlt<Scalar>::Impl {
         const Elimination& found = eliminations[s];
         throw SolveError(
             fmt::format("matrix of size {} is singular or not quasi-definite: pivot {:.1e} for unknown {}, "
-                        "diagonals being scaled to 1",
+                        "with diagonals scaled to 1",
                         tree.size, found.failed_pivot, tree.order[tree.column[s] + found.failed]));
     }
 
@@ -392,7 +392,7 @@ void SparseLdlt<Scalar>::factor(const View& A) {
     Impl& s = *impl_;
     s.factored = false;
     if (A.rows != A.cols || A.rows == 0)
-        throw std::invalid_argument(fmt::format("SparseLdlt wants a square matrix, not {} x {}", A.rows, A.cols));
+        throw std::invalid_argument(fmt::format("SparseLdlt needs a square matrix, not {} x {}", A.rows, A.cols));
     if (!s.knows_pattern(A)) s.analyse(A);
     s.find_scale(A);
     s.eliminate_all(A);
@@ -410,7 +410,7 @@ void SparseLdlt<Scalar>::factor(const View& A) {
 template <class Scalar>
 void SparseLdlt<Scalar>::solve(const Vector& b, Vector& x) const {
     const Impl& s = *impl_;
-    if (!s.factored) throw std::logic_error("SparseLdlt::solve without factors");
+    if (!s.factored) throw std::logic_error("SparseLdlt::solve needs factors: call factor() first");
     const int n = s.tree.size;
     if (b.size() != n)
         throw std::invalid_argument(fmt::format("right-hand side of size {} for a matrix of size {}", b.size(), n));

@@ -14,7 +14,7 @@ namespace tubule {
 // Factors of the symmetric part (A + A^T)/2 of A, its rows and columns scaled so that the diagonal becomes +-1, in the
 // given order and on all threads. Meant for quasi-definite matrices, the saddle points [K B^T; B -C] with K and C
 // positive definite in whatever order their unknowns come: these have such factors for every ordering (Vanderbei 1995).
-// Others do with luck, which `pivots` tells. A matrix of the same pattern reuses the symbolic analysis.
+// Others may or may not, see `pivots`. A matrix of the same pattern reuses the symbolic analysis.
 // One thread at a time. Scalar: float or double.
 template <class Scalar>
 class SparseLdlt {
@@ -28,7 +28,7 @@ public:
     ~SparseLdlt();
 
     // Throws SolveError when a pivot is not finite or less than 1e-12 (float: 1e-6) after scaling, naming the unknown;
-    // std::invalid_argument when A is not square or empty. There are no factors afterwards then.
+    // std::invalid_argument when A is not square or empty. There are then no factors.
     template <int Options>
     void factor(const Eigen::SparseMatrix<double, Options>& A) {
         if (!A.isCompressed()) {

@@ -75,7 +75,7 @@ private:
                 fmt::format("factors of a matrix of size {} exceed the memory or UMFPACK's 32-bit sizes; "
                             "an ordering by nodes needs less",
                             n));
-        throw SolveError(fmt::format("matrix of size {} is refused by UMFPACK (status {})", n, status));
+        throw SolveError(fmt::format("UMFPACK cannot factor the matrix of size {} (status {})", n, status));
     }
 
     Ordering ordering_;

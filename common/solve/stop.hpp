@@ -8,20 +8,20 @@
 
 namespace tubule {
 
-// For each reason: its name here and in files, the exit status of the program (0 as asked, 3 the physics ended it, 4
-// the numerics failed, 5 time limit, 130 interrupted; bad input, 2, never gets as far as a Stop), and when it is given.
+// For each reason: its name here and in files, the exit status of the program (0 as requested, 3 ended by the physics,
+// 4 the numerics failed, 5 time limit, 130 interrupted; bad input, 2, never becomes a Stop), and when it is given.
 // clang-format off
 #define TUBULE_STOPS(reason) \
     reason(finished, "finished", 0, "the run reached `time.end`") \
-    reason(stationary, "stationary", 0, "nothing moves any more, as asked by `time.stationary`") \
+    reason(stationary, "stationary", 0, "the shape is stationary within `time.stationary`") \
     reason(pinch_off, "pinch-off", 3, "a neck reached the floor `accuracy.r_min`") \
     reason(overhang, "overhang", 3, "a graph r(z) has a vertical tangent") \
-    reason(ill_posed, "ill-posed", 3, "the flow is no longer parabolic: no resolution helps") \
+    reason(ill_posed, "ill-posed", 3, "the flow is no longer parabolic: refinement does not help") \
     reason(self_intersection, "self-intersection", 3, "the surface touches itself") \
     reason(resolution_lost, "resolution-lost", 4, "the discretisation can no longer represent the shape") \
     reason(mesh_lost, "mesh-lost", 4, "elements degenerated beyond repair") \
-    reason(solver_failed, "solver-failed", 4, "the time integrator or the linear solver gave up") \
-    reason(time_limit, "time-limit", 5, "`time.limit` seconds of wall clock are used") \
+    reason(solver_failed, "solver-failed", 4, "the time integrator or the linear solver failed") \
+    reason(time_limit, "time-limit", 5, "`time.limit` seconds of wall time have passed") \
     reason(interrupted, "interrupted", 130, "SIGINT or SIGTERM")
 // clang-format on
 

@@ -61,19 +61,19 @@ Motion prepared(const UniformTube& tube, const MotionLaw& law, double length, co
     double moves = 0;
     for (const Wave& wave : waves) {
         if (wave.n < 0 || (wave.n == 0 && wave.m == 0))
-            throw std::invalid_argument(fmt::format("no wave has n = {}, m = {}", wave.n, wave.m));
+            throw std::invalid_argument(fmt::format("there is no wave with n = {}, m = {}", wave.n, wave.m));
         if (!seen.insert({wave.n, wave.m}).second)
-            throw std::invalid_argument(fmt::format("the wave n = {}, m = {} is there twice", wave.n, wave.m));
+            throw std::invalid_argument(fmt::format("the wave n = {}, m = {} occurs twice", wave.n, wave.m));
         motion.of.push_back(coefficients(motion, wave));
         const Coefficients& k = motion.of.back();
         if (!std::isfinite(k.M) && k.G0 != 0)
-            throw std::invalid_argument(
-                fmt::format("the wave n = 0, m = {} is infinitely fast in Stokes flow without friction", wave.m));
+            throw std::invalid_argument(fmt::format(
+                "the growth rate of the wave n = 0, m = {} is infinite in Stokes flow without friction", wave.m));
         if (!std::isfinite(k.M)) motion.of.back().M = 0;
         moves += k.Z * k.Z * motion.of.back().M * wave.amplitude * wave.amplitude;
     }
     if (motion.tension_is_outcome && !(moves > 0))
-        throw std::invalid_argument("the tension that keeps area and volume needs a wave with an amplitude");
+        throw std::invalid_argument("the tension that keeps area and volume is undetermined: no wave has an amplitude");
     return motion;
 }
 
@@ -175,10 +175,10 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
     std::vector<WaveState> out;
     double t = 0;
     for (const double until : times) {
-        if (until < t) throw std::invalid_argument(fmt::format("times must ascend from 0, and {} does not", until));
+        if (until < t) throw std::invalid_argument(fmt::format("times must increase from 0, but {} does not", until));
         const int status = until > t ? gsl_odeiv2_driver_apply(driver.get(), &t, until, y.data()) : GSL_SUCCESS;
         if (status != GSL_SUCCESS)
-            throw SolveError(fmt::format("the amplitude equations are not solved beyond t = {:.6g}: {}", t,
+            throw SolveError(fmt::format("the amplitude equations could not be solved beyond t = {:.6g}: {}", t,
                                          status == GSL_EBADFUNC ? "the radius vanishes" : gsl_strerror(status)));
         out.push_back(state(motion, until, y));
     }

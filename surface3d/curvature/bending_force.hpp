@@ -23,10 +23,10 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
 // Vertices - edges + triangles: 2 for a sphere, 0 for a torus or a periodic tube.
 int euler_characteristic(const CurvedMesh& mesh);
 
-// INT K dS - 2 pi chi, which a surface has not: how far the curvatures are from belonging to one.
+// INT K dS - 2 pi chi, zero on every surface: how far the recovered curvatures are from those of a surface.
 double gauss_bonnet_defect(const Observables& o, const CurvedMesh& mesh);
 
-// 16 pi, for no closed surface has less INT H^2 (Willmore): a run below it is spurious.
+// 16 pi, the minimum of INT H^2 over closed surfaces (Willmore): a run below it is spurious.
 inline constexpr double willmore_bound = 16 * 3.14159265358979323846;
 
 // (b, phi_a e_d) for node a and direction d, one column a node: the weak form theory.md (2.9)

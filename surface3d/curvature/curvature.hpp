@@ -22,7 +22,7 @@ struct CurvatureField {
 };
 
 // All but `patch_nodal` solve with the mass matrix: SolveError if the mesh is degenerate. std::invalid_argument for
-// `exact`, which nodes do not tell (exact_curvature.hpp).
+// `exact`, which nodes do not determine (exact_curvature.hpp).
 CurvatureField recover(const SurfaceSpace& space, const CurvedMesh& mesh, Recovery recovery = Recovery::patch);
 
 // The paper's smoothing, one implicit step of length eps >= 0 of heat flow on the surface: H and K are replaced by
@@ -45,7 +45,7 @@ public:
     explicit PatchRecovery(const CurvedMesh& mesh);
 
     // `mesh` has the triangles of the constructor's; its nodes may have moved. The projection keeps integrals: energies
-    // are free of the error of interpolation, which has a sign. Whoever has a projection of this mesh can lend it.
+    // are free of the error of interpolation, which has a sign. An existing projection of this mesh can be passed.
     CurvatureField nodal(const CurvedMesh& mesh) const;
     CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh) const;
     CurvatureField projected(const SurfaceSpace& space, const CurvedMesh& mesh, const Projection& project) const;

@@ -1,4 +1,4 @@
-// Curvatures of a surface that is known exactly, at the nodes of a mesh of it: what no recovery needs to find.
+// Curvatures of a surface that is known exactly, at the nodes of a mesh of it: no recovery is needed.
 #pragma once
 
 #include "surface3d/curvature/curvature.hpp"

@@ -1,4 +1,4 @@
-// How large a wave is on a curved surface: for growth rates, and for comparisons with the axisymmetric tier.
+// Amplitudes of waves on a curved surface: for growth rates, and for comparisons with the axisymmetric tier.
 #pragma once
 
 #include "common/result/result.hpp"
@@ -15,7 +15,7 @@ CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells);
 double tube_mode_amplitude(const CurvedMesh& tube, int n, int m);
 
 // Amplitude of Y_l^m in the distance from the middle of the area, over its mean (as in shape.mode), any turn about z;
-// l >= 2. l = 0: the mean distance itself. Throws std::invalid_argument for a tube and for l = 1, the place.
+// l >= 2. l = 0: the mean distance itself. Throws std::invalid_argument for a tube and for l = 1, a translation.
 double sphere_mode_amplitude(const CurvedMesh& surface, int l, int m);
 
 }  // namespace tubule::surface3d

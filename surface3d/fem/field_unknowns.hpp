@@ -7,8 +7,8 @@
 
 namespace tubule::surface3d {
 
-// So many fields of P_k, one after the other, each numbered as the nodes of the mesh; then, if its order is not 0, one
-// field more of another order (the pressure of Taylor and Hood) on the same triangles.
+// This many fields of P_k, one after the other, each numbered as the nodes of the mesh; then, if its order is not 0,
+// one more field of another order (the pressure of Taylor-Hood elements) on the same triangles.
 class FieldUnknowns {
 public:
     FieldUnknowns(const CurvedMesh& mesh, int fields, int last_order = 0);

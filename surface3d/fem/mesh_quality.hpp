@@ -1,4 +1,4 @@
-// How good the triangles of a curved mesh are, and whether they resolve the surface: the one definition behind the
+// Quality of the triangles of a curved mesh, and whether they resolve the surface: the one definition behind the
 // series `quality` and `turn`, folds, new meshes and what ends a run. Cheap enough for every step.
 #pragma once
 

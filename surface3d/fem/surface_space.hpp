@@ -36,7 +36,7 @@ Eigen::Matrix3d tensor(const Packed& b) {
     return out;
 }
 
-// Quadrature for integrals of curvatures, of this degree unless told: there the error of the rule stays below that of
+// Quadrature for integrals of curvatures, by default of this degree: there the error of the rule stays below that of
 // P_k (docs/curvature.md).
 int default_degree(int order);
 

@@ -1,4 +1,4 @@
-// Triangulations to start from: spheres, tori, tubes and other surfaces of revolution, structured or not.
+// Base triangulations: spheres, tori, tubes and other surfaces of revolution, structured or not.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace tubule::surface3d {
 
-// The unit sphere: an icosahedron with every edge divided in n, 20 n^2 triangles.
+// The unit sphere: an icosahedron with every edge divided into n parts, 20 n^2 triangles.
 TriangleMesh icosphere(int n);
 
 // n_axis quadrangles around the axis times n_tube around the tube, each cut in two along alternating diagonals; both

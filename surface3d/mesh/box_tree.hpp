@@ -1,4 +1,4 @@
-// Boxes over halves of halves of items, to find those nearest to a point or those that meet a box.
+// A bounding-volume hierarchy, to find the items nearest to a point or those that intersect a box.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -25,7 +25,7 @@ public:
 
     const Box& item(std::size_t i) const { return item_[i]; }
 
-    // Calls visit(item) for those whose boxes meet `box`.
+    // Calls visit(item) for those whose boxes intersect `box`.
     template <class Visit>
     void meeting(const Box& box, const Visit& visit) const {
         descend(0, 0, order_.size(), box, visit);

@@ -7,7 +7,7 @@
 
 namespace tubule::surface3d {
 
-// Plain data. The nodes of a cell stand in VTK's order of Lagrange triangles: the vertices, counter-clockwise seen from
+// Plain data. The nodes of a cell are in VTK's order of Lagrange triangles: the vertices, counter-clockwise seen from
 // outside; the nodes inside the edges v0v1, v1v2, v2v0, each running along its edge; the interior (k = 3: the centre;
 // k = 4: three, the one nearest to v0 first, then v1, v2).
 struct CurvedMesh {

@@ -1,4 +1,4 @@
-// A triangulation that can be changed locally: edges flipped, split, collapsed.
+// A triangulation that can be modified locally: edges flipped, split, collapsed.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace tubule::surface3d {
 
-// Plain data. Half-edge h = 3 t + c runs from corner c of triangle t to the next one. What is removed stays in place
+// Plain data. Half-edge h = 3 t + c runs from corner c of triangle t to the next one. Removed items stay in place
 // with -1 as its origin, or as the half-edge that leaves it, until `triangles` leaves it out.
 struct HalfEdges {
     std::vector<Eigen::Vector3d> points;
@@ -54,7 +54,7 @@ struct HalfEdges {
     void flip(int h);
     // Divides it, and the triangles beside it, by a new vertex at x, as the triangle of h sees it.
     int split(int h, const Eigen::Vector3d& x);
-    // Its origin goes and the target takes over the triangles around.
+    // Removes its origin; the target takes over the triangles around it.
     void collapse(int h);
 
     TriangleMesh triangles() const;

@@ -17,7 +17,7 @@ TriangleMesh corner_triangles(const CurvedMesh& mesh);
 // The interpolant of another order of the same triangles.
 CurvedMesh with_order(const CurvedMesh& mesh, int order);
 
-// The isoparametric interpolant of the surface map(base). `map` takes and gives an Eigen::Vector3d, is smooth on each
+// The isoparametric interpolant of the surface map(base). `map` takes and returns an Eigen::Vector3d, is smooth on each
 // triangle, and on a tube commutes with the shift by a period, e.g. [&](const auto& p) { return position(shape, p); }
 template <class Map>
 CurvedMesh mapped_mesh(const TriangleMesh& base, int order, const Map& map) {

@@ -1,4 +1,4 @@
-// Does a triangle mesh meet itself?
+// Finds self-intersections of a triangle mesh.
 #pragma once
 
 #include <optional>

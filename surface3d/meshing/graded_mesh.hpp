@@ -12,10 +12,10 @@
 
 namespace tubule::surface3d {
 
-// What decides on sizes, at evenly spaced parameters 0 ... 1: lengths on the surface for a step of the parameter and
-// around the axis, and in column i of `defect` the errors of the shape operator, root mean square, that elements of
-// edge spans[i] would make: of its best approximation (along or around, whichever is more) and of PatchRecovery,
-// together.
+// The data that determine sizes, at evenly spaced parameters 0 ... 1: lengths on the surface for a step of the
+// parameter and around the axis, and in column i of `defect` the errors of the shape operator, root mean square, that
+// elements of edge spans[i] would make: of its best approximation (along or around, whichever is more) and of
+// PatchRecovery, together.
 struct Resolution {
     std::vector<double> speed, around, spans;
     Eigen::MatrixXd defect;

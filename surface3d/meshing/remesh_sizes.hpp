@@ -1,4 +1,4 @@
-// How wide the triangles of a new mesh should be.
+// Target widths of the triangles of a new mesh.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@ namespace tubule::surface3d {
 struct MeshSizes {
     Eigen::VectorXd width;
     double triangles = 0;            // how many equilateral ones have these widths
-    std::optional<StopReport> lost;  // curvature asks for too many triangles
+    std::optional<StopReport> lost;  // curvature requires too many triangles
 
     // In between, linear or more but within those of the cell.
     double at(const CurvedMesh& mesh, const MeshPoint& p) const;

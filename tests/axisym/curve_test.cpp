@@ -79,7 +79,7 @@ TEST(CurveSpace, refusesWhatMakesNoCurve) {
                       b(Topology::tube, equal_breaks(4), 5, 4, 1);
                   a.prolong(b, Vector::Zero(b.size()));
               }),
-              "prolongation between curves of different topology or period");
+              "curves of different topology or period cannot be prolonged to each other");
 }
 
 TEST(CurveSpace, prolongationIsTheSameCurve) {
@@ -256,9 +256,9 @@ TEST(CurveForms, halvesAreWorthTheirWhole) {
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   half(meridian(Sphere{1, {{0.2, 3, 0}}}));
               }),
-              "the curve does not mirror itself about the middle of its parameter");
+              "the curve is not symmetric about the middle of its parameter range");
     EXPECT_EQ(message_of<std::invalid_argument>([] { half(half(meridian(Sphere{}))); }),
-              "this curve is a half already");
+              "the curve is already one half");
 }
 
 TEST(CurveForms, tubesAgreeWithTheirGraphs) {
@@ -343,10 +343,10 @@ TEST(CurveStart, refusals) {
     EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::half_cell); }),
               "the last point of a half cell must have z = 0");
     EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::tube, 2); }),
-              "point 0 of the curve has the radius 0");
+              "point 0 of the curve has radius 0; it must be positive");
     points[3][0] = -1;
     EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
-              "point 3 of the curve has the radius -1");
+              "point 3 of the curve has radius -1; it must be positive");
     points[3] = points[2];
     EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
               "points 2 and 3 of the curve coincide or are not finite");

@@ -92,16 +92,16 @@ TEST(EquilibriumCase, refusals) {
     expect("modes = 1", "held = \"nothing\"\nreduced_volume = 0.8",
            "14:18: equilibrium.reduced_volume is not held fixed: see " + held);
     expect("modes = 1", "volume = 2.0\nreduced_volume = 0.8",
-           "14:18: equilibrium.reduced_volume and equilibrium.volume exclude each other");
+           "14:18: equilibrium.reduced_volume cannot be combined with equilibrium.volume");
     expect("modes = 1", "modes = -1", "13:9: equilibrium.modes must be an integer >= 0 and <= 100, not -1");
     expect("vary = \"energy.k42\"\n", "", "14:1: equilibrium.branch needs vary: the key that changes along the branch");
     expect("step = 0.05\n", "",
-           "14:1: equilibrium.branch needs to and step: where the branch ends, and between shapes");
+           "14:1: equilibrium.branch needs to and step: the end of the branch and the distance between shapes");
     expect("energy.k42", "energy.k43",
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
            "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", not "
            "\"energy.k43\"; did you mean 'energy.k40'?");
-    const std::string varies = "14:1: equilibrium.branch varies what is not held fixed: see " + held;
+    const std::string varies = "14:1: equilibrium.branch varies a quantity that is not held fixed: see " + held;
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.volume\"", varies);
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
@@ -111,13 +111,15 @@ TEST(EquilibriumCase, refusals) {
     expect("[accuracy]", "[time]\nend = 1.0\n[accuracy]",
            "10:1: time must be absent: nothing moves in a case with [equilibrium]");
     expect("kind = \"capsule\"\nradius = 0.5\nlength = 2.0", "kind = \"torus\"\nradius = 2.0\ntube_radius = 1.0",
-           "7:8: shape.kind must not be \"torus\": equilibria are cells, or tubes that mirror themselves");
+           "7:8: shape.kind must not be \"torus\": equilibria are closed cells, or tubes with mirror symmetry");
     expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
            "11:10: model.volume must be absent: equilibrium.held says what is held fixed");
     expect("[accuracy]", "[model]\nkind = \"fluid\"\n[accuracy]",
            "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia");
-    expect("to = 0.0", "to = 0.12", " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; 1 to 10000 are possible");
-    expect("modes = 1", "area = 1.0", " equilibrium: a reduced volume of 22.2733 cannot be met: a sphere has 1");
+    expect("to = 0.0", "to = 0.12",
+           " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; the number must be 1 to 10000");
+    expect("modes = 1", "area = 1.0",
+           " equilibrium: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere");
 }
 
 TEST(EquilibriumCase, writtenOutItIsTheSame) {
@@ -203,7 +205,7 @@ held = "area"
     EXPECT_GT(R, 1.0001);
     EXPECT_NEAR(o.at("energy", 0), (-1 / (R * R) + 0.5 / std::pow(R, 4)) * A, 1e-8);
     const std::string slanted = std::string(tube).replace(tube.find("n = 1"), 5, "n = 1\nphase = 0.3");
-    EXPECT_EQ(refusal(slanted), "case.toml: shape: the curve does not mirror itself about the middle of its parameter");
+    EXPECT_EQ(refusal(slanted), "case.toml: shape: the curve is not symmetric about the middle of its parameter range");
 }
 
 TEST(EquilibriumCase, canBeInterrupted) {

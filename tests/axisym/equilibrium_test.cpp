@@ -65,13 +65,13 @@ TEST(StationarySystem, refusals) {
             StationarySystem(std::make_shared<CurveSpace>(Topology::cell, equal_breaks(7), 5, 4), {bending(1), c}, 1);
         });
     };
-    EXPECT_EQ(with({4.0, {}, 0.5}), "the reduced volume is held fixed alone: area and volume determine it already");
-    EXPECT_EQ(with({-4.0, {}, {}}), "an area of -4 cannot be met");
-    EXPECT_EQ(with({1.0, 1.0, {}}), "a reduced volume of 10.6347 cannot be met: a sphere has 1");
+    EXPECT_EQ(with({4.0, {}, 0.5}), "the reduced volume cannot be combined with area and volume, which determine it");
+    EXPECT_EQ(with({-4.0, {}, {}}), "an area of -4 is impossible: it must be positive");
+    EXPECT_EQ(with({1.0, 1.0, {}}), "a reduced volume of 10.6347 is impossible: the largest is 1, that of a sphere");
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   find_equilibrium({bending(1), {}}, meridian(Torus{}));
               }),
-              "equilibria of a period need a start that mirrors itself, and half of it");
+              "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
 }
 
 struct Reference {
@@ -225,7 +225,7 @@ TEST(Equilibrium, failuresAreSaid) {
     coarse.max_elements = 20;
     const auto e = find_equilibrium(vesicle(0.7), spheroid(0.7, false), coarse);
     EXPECT_EQ(e.stop, Stop::resolution_lost);
-    EXPECT_EQ(e.message.substr(0, 29), "20 elements leave an error of");
+    EXPECT_EQ(e.message.substr(0, 45), "with 20 elements, the error of the energy is ");
     // Without descent, a start far from any stationary shape.
     EquilibriumSettings direct = accurate(1e-8);
     direct.descend = false;
@@ -328,11 +328,11 @@ TEST(Branch, bifurcationOfTheOblates) {
 TEST(Branch, refusals) {
     Equilibrium none;
     EXPECT_EQ(message_of<std::invalid_argument>([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, {}); }),
-              "a branch starts from an equilibrium");
+              "a branch must start from an equilibrium");
     none.stop = Stop::finished;
     EXPECT_EQ(message_of<std::invalid_argument>(
                   [&] { follow_branch(vesicle(0.9), none, set_reduced_volume, outputs(0.5, 0.5, {})); }),
-              "a branch needs an interval of its parameter");
+              "the start and the end of a branch must differ");
 }
 
 TEST(Measures, hausdorffDistance) {

@@ -103,7 +103,7 @@ TEST(Restart, refusesRecordsOfAnotherKind) {
     EXPECT_EQ(message(record), "accepted");
     record.kind = RecordKind::equilibrium;
     EXPECT_EQ(message(record),
-              "cannot resume from this frame: it is of kind equilibrium, not graph; run the case without --resume");
+              "cannot resume from this frame: its kind is equilibrium, not graph; run the case without --resume");
 }
 
 // Expected: every field of the state is needed, for a run as a graph and one as a curve.

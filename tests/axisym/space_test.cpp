@@ -61,7 +61,7 @@ TEST(ProfileSpace, refusesWhatIsNoSpace) {
     for (int smoothness : {-1, 0, 5})
         EXPECT_EQ(message(good, 5, smoothness), "smoothness must be 1 ... degree - 1") << smoothness;
     for (const auto& breaks : {std::vector<double>{}, {0, 1}, {0, 0.5, 0.5, 1}, {0, 0.7, 0.5, 1}})
-        EXPECT_EQ(message(breaks, 5, 4), "breaks must ascend and bound at least two elements") << breaks.size();
+        EXPECT_EQ(message(breaks, 5, 4), "breaks must increase and define at least two elements") << breaks.size();
 }
 
 TEST(ProfileSpace, hasTheDimensionOfItsPiecewisePolynomials) {

@@ -222,7 +222,7 @@ class Shapes(Compare):
     def test_a_tube_is_no_sphere(self):
         one = self.made("one", STRAIGHT.format(radius=1.0, H0=-1.0))
         err = self.refused(one, self.made("sphere", SPHERE.format(radius=1.0)))
-        self.assertIn("one is a tube of period 2.000000, the other one a closed surface", err)
+        self.assertIn("one is a tube of period 2.000000, the other is a closed surface", err)
         damaged = self.edited(one, "damaged.hdf", lambda file: [frame.pop("knots") for frame in file["frames"].values()])
         self.edited(damaged, "damaged.hdf2", lambda file: [frame.pop("r") for frame in file["frames"].values()])
         self.assertIn("frame 0 of B, t = 0: it is damaged: knots is missing", self.refused(one, "damaged.hdf2"))

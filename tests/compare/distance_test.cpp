@@ -318,10 +318,9 @@ TEST(Distance, RefusesWhatCannotBeCompared) {
         }
         return "";
     };
-    EXPECT_EQ(message(wave(0.1, 2), spheroid(1, 1)),
-              "one is a tube of period 2.000000, the other one a closed surface");
+    EXPECT_EQ(message(wave(0.1, 2), spheroid(1, 1)), "one is a tube of period 2.000000, the other is a closed surface");
     EXPECT_EQ(message(wave(0.1, 2), wave(0.1, 3)),
-              "one is a tube of period 2.000000, the other one a tube of period 3.000000");
+              "one is a tube of period 2.000000, the other is a tube of period 3.000000");
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0"},
         Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
         Edit{"kind = \"gr", "Re = 1\nkind = \"gr",
-             "8:6: model.Re must be absent: it belongs to kind \"stokes\" or \"fluid\""},
+             "8:6: model.Re must be absent: only valid with kind = \"stokes\" or \"fluid\""},
         // Reported as misspelt, not as the missing radius:
         Edit{"radius", "  raduis",
              "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
@@ -296,8 +296,9 @@ TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
              "16:1: accuracy.r_min must be below the smallest radius of the start (0.0005 at z = 1), not 0.001"},
         Edit{", rel = 1e-6", "", "24:10: expect.energy needs a tolerance: rel, abs or both"},
         Edit{"value = 1.0", "value = 0",
-             "24:10: expect.energy needs abs: a relative tolerance of the value 0 allows nothing"},
-        Edit{"r_min = {value = 0.7, abs = 1e-3}", "", "25:1: expect.at.0 expects nothing: add a series"},
+             "24:10: expect.energy needs abs: a relative tolerance is meaningless for the value 0"},
+        Edit{"r_min = {value = 0.7, abs = 1e-3}", "",
+             "25:1: expect.at.0 is empty: add a series and its expected value"},
     });
 }
 
@@ -564,7 +565,7 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
     EXPECT_EQ(refused("auto.mods=3"),
               "--set auto.mods=3: unknown key auto.mods; did you mean 'modes'? Allowed here: noise, largest, modes");
     EXPECT_EQ(refused("equilibrium.modes=2"),
-              "--set equilibrium.modes=2: equilibrium must be absent: it belongs to tier \"axisym\"");
+              "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\"");
     EXPECT_EQ(refused("discretisation.parametrisation=even").substr(0, 92),
               "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation. Allow");
     EXPECT_EQ(
@@ -575,7 +576,7 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
               "--set accuracy.r_min=0.8: accuracy.r_min must be below the smallest radius of t");
     for (const std::string tier : {"axisym", "surface3d"})
         EXPECT_EQ(refusal(with("tier = \"axisym\"", "tier = \"" + tier + "\"") + "[auto]\nmodes = 3\n"),
-                  "case.toml:28:1: auto must be absent: it belongs to tier \"auto\"");
+                  "case.toml:28:1: auto must be absent: only valid with tier = \"auto\"");
 }
 
 TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {

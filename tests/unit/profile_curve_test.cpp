@@ -129,7 +129,7 @@ TEST(ProfileCurve, Refusals) {
     EXPECT_EQ(refusal(r, z), "accepted");
     EXPECT_EQ(refusal({0, 1, 0}, {-1, 0, 1}), "a profile needs r and z of at least 9 points");
     EXPECT_EQ(refusal({r.rbegin(), r.rend()}, {z.rbegin(), z.rend()}),
-              "a profile must run such that the outside is to its right");
+              "a profile must be oriented with the outside to its right");
     std::vector<double> other = r;
     other[5] = 0;
     EXPECT_EQ(refusal(other, z), "r of a profile must be positive between its ends");
@@ -138,7 +138,7 @@ TEST(ProfileCurve, Refusals) {
     EXPECT_EQ(refusal(r, z, 2), "a profile must run from pole to pole, over one period, or once around");
     std::vector<double> doubled_r = r, doubled_z = z;
     doubled_r[4] = doubled_r[5], doubled_z[4] = doubled_z[5];
-    EXPECT_EQ(refusal(doubled_r, doubled_z), "two neighbours of a profile are the same point");
+    EXPECT_EQ(refusal(doubled_r, doubled_z), "two neighbouring points of a profile coincide");
 }
 
 }  // namespace

@@ -304,25 +304,26 @@ TEST_F(ResultFile, MalformedMeshesAndFramesOnThemAreRefused) {
     EXPECT_CONTAINS(refused([](auto& m) { m.order = 5; }), "mesh: its order is 5, not 1 to 4");
     EXPECT_CONTAINS(refused([](auto& m) { m.order = 3; }), "mesh: 12 node numbers for cells of 10");
     EXPECT_CONTAINS(refused([](auto& m) { m.cells.clear(); }), "mesh: 0 node numbers for cells of 6");
-    EXPECT_CONTAINS(refused([](auto& m) { m.nodes = 8; }), "mesh: a cell has node 8, there are 8");
-    EXPECT_CONTAINS(refused([](auto& m) { m.cells[3] = -1; }), "mesh: a cell has node -1, there are 9");
+    EXPECT_CONTAINS(refused([](auto& m) { m.nodes = 8; }), "mesh: a cell uses node 8, but there are 8");
+    EXPECT_CONTAINS(refused([](auto& m) { m.cells[3] = -1; }), "mesh: a cell uses node -1, but there are 9");
     EXPECT_CONTAINS(refused([](auto& m) { m.period = nan; }), "mesh: its period is nan");
-    EXPECT_CONTAINS(refused([](auto& m) { m.period = 0; }), "mesh: 12 shifts, where its period 0 asks for 0");
-    EXPECT_CONTAINS(refused([](auto& m) { m.shifts.clear(); }), "mesh: 0 shifts, where its period 2.5 asks for 12");
+    EXPECT_CONTAINS(refused([](auto& m) { m.period = 0; }), "mesh: 12 shifts, but its period 0 requires 0");
+    EXPECT_CONTAINS(refused([](auto& m) { m.shifts.clear(); }), "mesh: 0 shifts, but its period 2.5 requires 12");
 
-    EXPECT_CONTAINS(message_of([&] { writer.frame(surface_record_at(0, 0)); }), "frame: mesh 0, there are 0");
+    EXPECT_CONTAINS(message_of([&] { writer.frame(surface_record_at(0, 0)); }),
+                    "frame: it refers to mesh 0, but there are 0");
     writer.mesh(two_cells());
     const auto refused_frame = [&](const std::function<void(Record&)>& spoil) {
         Record record = surface_record_at(0, 0);
         spoil(record);
         return message_of([&] { writer.checkpoint(record); });
     };
-    EXPECT_CONTAINS(refused_frame([](auto& r) { r.mesh = 1; }), "checkpoint: mesh 1, there are 1");
+    EXPECT_CONTAINS(refused_frame([](auto& r) { r.mesh = 1; }), "checkpoint: it refers to mesh 1, but there are 1");
     EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays.erase(r.arrays.begin() + 2); }),
                     "checkpoint: on a mesh it must have an array points [9, 3]");
     EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays[2].shape = {27}; }), "must have an array points [9, 3]");
     EXPECT_CONTAINS(refused_frame([](auto& r) { r.arrays[4].name = "Offsets"; }),
-                    "checkpoint: Offsets is a name that the format of meshes needs");
+                    "checkpoint: Offsets is a name reserved by the mesh format");
     EXPECT_CONTAINS(refused_frame([](auto& r) { r.numbers.push_back({"Type", 1}); }), "checkpoint: Type is a name");
     EXPECT_EQ(message_of([&] {
                   Record record = surface_record_at(0, 0);
@@ -346,9 +347,10 @@ TEST_F(ResultFile, ADamagedSurfaceNamesItsLack) {
         fs::remove(file);
         return message;
     };
-    EXPECT_CONTAINS(damaged("del f['meshes']"), "000000 lies on mesh 0, which is missing");
+    EXPECT_CONTAINS(damaged("del f['meshes']"), "000000 refers to mesh 0, which is missing");
     EXPECT_CONTAINS(damaged("del f['meshes/000000/point_shift']"), "point_shift");
-    EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"), "mesh 000000: a cell has point 99 of 14");
+    EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"),
+                    "mesh 000000: a cell uses point 99, but there are 14");
     EXPECT_CONTAINS(damaged("f['meshes/000000'].attrs['order'] = 7"), "mesh 000000: its order is 7, not 1 to 4");
     EXPECT_CONTAINS(damaged("g = f['frames/000000']; del g['Points']; g['Points'] = np.zeros((3, 3))"),
                     "Points has fewer rows than its mesh has nodes");
@@ -525,19 +527,22 @@ TEST_F(ResultFile, MalformedInputIsRefused) {
     EXPECT_CONTAINS(make({zero, {}}, {}, series), "the case contains a zero byte");
     EXPECT_CONTAINS(make({"", {zero}}, {}, series), "--set contains a zero byte");
     EXPECT_CONTAINS(make({"", {}}, {{"v", zero}}, series), "about v contains a zero byte");
-    EXPECT_CONTAINS(make({"", {}}, {{"v", "1"}, {"v", "2"}}, series), "about: v comes twice");
-    EXPECT_CONTAINS(make({"", {}}, {}, {"energy"}), "there must be one of the name time");
-    EXPECT_CONTAINS(make({"", {}}, {}, {"time", "energy", "energy"}), "series: energy comes twice");
+    EXPECT_CONTAINS(make({"", {}}, {{"v", "1"}, {"v", "2"}}, series), "about: v occurs twice");
+    EXPECT_CONTAINS(make({"", {}}, {}, {"energy"}), "a series named time is required");
+    EXPECT_CONTAINS(make({"", {}}, {}, {"time", "energy", "energy"}), "series: energy occurs twice");
     EXPECT_CONTAINS(make({"", {}}, {}, {"time", "a/b"}), "series: \"a/b\" cannot be a name");
     EXPECT_TRUE(fs::is_empty(directory));
 
     auto writer = create();
-    EXPECT_CONTAINS(message_of([&] { writer.row(std::vector<double>{1, 2}); }), "a row of 2 values for 4 series");
+    EXPECT_CONTAINS(message_of([&] {
+                        writer.row(std::vector<double>{1, 2});
+                    }),
+                    "a row has 2 values, but there are 4 series");
     EXPECT_CONTAINS(message_of([&] {
                         writer.frame({0, {}, {{"z", {2, 2}, {1, 2, 3}}}});
                     }),
-                    "frame z: its shape asks for 4 numbers, it has 3");
-    EXPECT_CONTAINS(message_of([&] { writer.frame({0, {{"time", 1}}, {}}); }), "frame: time comes twice");
+                    "frame z: its shape requires 4 numbers, but it has 3");
+    EXPECT_CONTAINS(message_of([&] { writer.frame({0, {{"time", 1}}, {}}); }), "frame: time occurs twice");
     EXPECT_CONTAINS(message_of([&] { writer.frame({0, {}, {{"", {0}, {}}}}); }), "frame: \"\" cannot be a name");
 }
 
@@ -565,9 +570,9 @@ TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
     EXPECT_EQ(fs::file_size(file), 16u);
 
     python("h5py.File(name, 'w').create_group('series')");
-    expect_refused("no Tubule result: it lacks /case");
+    expect_refused("not a Tubule result: /case is missing");
     python("f = h5py.File(name, 'w')\nfor part in 'about series frames'.split(): f.create_group(part)\nf['case'] = ''");
-    expect_refused("no Tubule result: it lacks the attribute id");
+    expect_refused("not a Tubule result: the attribute id is missing");
 
     fs::remove(file);
     fs::create_directory(file);

@@ -92,7 +92,7 @@ TEST(ShapeKeys, ImpossibleShapes) {
                   .find("case.toml:4:1: shape must have a positive radius everywhere, but it is -"),
               std::string::npos);
     EXPECT_EQ(refused("kind = \"torus\"\nradius = 1\ntube_radius = 1\n"),
-              "case.toml:7:15: shape.tube_radius must be below shape.radius: the torus meets itself");
+              "case.toml:7:15: shape.tube_radius must be below shape.radius: the torus intersects itself");
     EXPECT_EQ(refused("kind = \"file\"\n"), "case.toml:4:1: missing key shape.path: a string");
     // A wave around the axis that the meridian theta = 0 does not show: r0 = 1 - 1.1 sin(theta).
     EXPECT_EQ(refused("kind = \"tube\"\nradius = 1\nlength = 2\n[[shape.mode]]\namplitude = 1.1\nn = 0\nm = 1\n"
@@ -116,9 +116,10 @@ TEST(ShapeKeys, WhatEachTierTakes) {
     EXPECT_EQ(still("[discretisation]\nstep = 0.1\n"),
               "case.toml:7:8: discretisation.step must be absent: only valid with a table [time]");
     EXPECT_EQ(still(time_span + "[discretisation]\nrecovery = \"patch\"\n"),
-              "case.toml:9:12: discretisation.recovery must be absent: a surface that moves has its own curvatures");
+              "case.toml:9:12: discretisation.recovery must be absent: the time scheme determines the curvatures of a "
+              "moving surface");
     EXPECT_EQ(still(time_span + "[discretisation]\nscheme = \"paper\"\n"),
-              "case.toml:9:10: discretisation.scheme \"paper\" needs discretisation.step: it does not control it");
+              "case.toml:9:10: discretisation.scheme \"paper\" needs discretisation.step: it does not adapt the step");
     EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
               "case.toml:7:9: accuracy.r_min must be absent: without a table [time] nothing moves");
 }
@@ -132,7 +133,7 @@ TEST(ModelKeys, WhatGoesTogether) {
               "accepted");
     EXPECT_EQ(tube("kind = \"fluid\"\nRe = 0\n"), "case.toml:12:6: model.Re must be a number > 0, not 0");
     EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 1\n"),
-              "case.toml:12:9: model.gamma must be absent: it belongs to kind \"stokes\" or \"fluid\"");
+              "case.toml:12:9: model.gamma must be absent: only valid with kind = \"stokes\" or \"fluid\"");
     EXPECT_EQ(
         tube("kind = \"stokes\"\n", "[velocity]\ninitial = \"rest\"\n"),
         "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
@@ -140,7 +141,7 @@ TEST(ModelKeys, WhatGoesTogether) {
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"graph\": only the gradient flow of a tube "
-              "with free volume is computed as one");
+              "with free volume is computed as a graph");
     EXPECT_EQ(tube("kind = \"gradient-flow\"\n", "[discretisation]\nparametrisation = \"material\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"material\": the gradient flow has no flow "
               "along the membrane");

@@ -196,32 +196,34 @@ TEST(Ordering, refusesWhatDoesNotFit) {
     EXPECT_EQ(message_of([&] {
                   SparseCholesky({0, 1, 1}).factor(A);
               }),
-              "ordering is no permutation: 1 of 3 again or beyond");
+              "ordering is not a permutation: 1 of 3 is repeated or out of range");
     EXPECT_EQ(message_of([&] {
                   SparseLuLarge({0, 1, 3}).factor(A);
               }),
-              "ordering is no permutation: 3 of 3 again or beyond");
+              "ordering is not a permutation: 3 of 3 is repeated or out of range");
     EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 1}); }), "nodes of 2 unknowns for a matrix of size 3");
     EXPECT_EQ(message_of([&] { nested_dissection(A, {0, -1, 1}); }), "nodes from -1 to 1 for a matrix of size 3");
     EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 3, 1}); }), "nodes from 0 to 3 for a matrix of size 3");
     EXPECT_EQ(message_of([&] { nested_dissection(Matrix(2, 3)); }),
-              "nested_dissection wants a square matrix, not 2 x 3");
+              "nested_dissection needs a square matrix, not 2 x 3");
     EXPECT_EQ(nested_dissection(A, {0, 0, 0}), Ordering({0, 1, 2}));
 }
 
 template <class Solver>
 void expect_common_refusals(const std::string& name) {
     Solver solver;
-    EXPECT_EQ(message_of([&] { solver.factor(Matrix(2, 3)); }), name + " wants a square matrix, not 2 x 3");
-    EXPECT_EQ(message_of([&] { solver.factor(Matrix(0, 0)); }), name + " wants a square matrix, not 0 x 0");
+    EXPECT_EQ(message_of([&] { solver.factor(Matrix(2, 3)); }), name + " needs a square matrix, not 2 x 3");
+    EXPECT_EQ(message_of([&] { solver.factor(Matrix(0, 0)); }), name + " needs a square matrix, not 0 x 0");
     EXPECT_EQ(message_of([&] {
                   solver.factor(sparse(Dense{{1, 0}, {0, std::nan("")}}));
               }),
               "matrix entry (1, 1) is nan");
     // Constants are in the kernel of the stiffness matrix.
     EXPECT_THROW(solver.factor(positive_definite(0)), SolveError);
-    EXPECT_EQ(message_of([&] { solver.solve(Vector::Ones(162)); }), name + "::solve without factors");
-    EXPECT_EQ(message_of([&] { solver.reciprocal_condition(); }), name + "::reciprocal_condition without factors");
+    EXPECT_EQ(message_of([&] { solver.solve(Vector::Ones(162)); }),
+              name + "::solve needs factors: call factor() first");
+    EXPECT_EQ(message_of([&] { solver.reciprocal_condition(); }),
+              name + "::reciprocal_condition needs factors: call factor() first");
     // Rows differ in the last bit: condition number 8/epsilon.
     const double e = std::numeric_limits<double>::epsilon();
     EXPECT_NE(message_of([&] {

@@ -1,4 +1,4 @@
-// How far two curved surfaces are from each other.
+// Distances between two curved surfaces.
 #pragma once
 
 #include <Eigen/Core>

@@ -8,7 +8,7 @@
 
 namespace tubule::compare {
 
-// Throws std::invalid_argument if it holds none, or a damaged one.
+// Throws std::invalid_argument if it has none, or a damaged one.
 std::unique_ptr<Surface> frame_surface(const Record& frame, const Result& result);
 
 }  // namespace tubule::compare

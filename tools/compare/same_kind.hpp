@@ -14,7 +14,7 @@ inline void require_same_kind(const Surface& a, const Surface& b) {
         return s.period() > 0 ? "a tube of period " + std::to_string(s.period()) : std::string("a closed surface");
     };
     if (std::abs(a.period() - b.period()) > 1e-9 * a.period())
-        throw std::invalid_argument("one is " + words(a) + ", the other one " + words(b));
+        throw std::invalid_argument("one is " + words(a) + ", the other is " + words(b));
 }
 
 }  // namespace tubule::compare

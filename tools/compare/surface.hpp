@@ -1,4 +1,4 @@
-// What two shapes need to be compared: the nearest point of one, and points all over the other.
+// The interface for comparing two shapes: the nearest point of one, and samples of the other.
 #pragma once
 
 #include <Eigen/Core>

@@ -42,7 +42,7 @@ void add_waves(Case& c, double noise) {
     }
     const auto start = theory::tube_start(c);
     if (!start)
-        throw CaseError(c.path + ": only tubes and spheres are confirmed: waves cannot be added to another shape");
+        throw CaseError(c.path + ": only tubes and spheres can be confirmed: waves cannot be added to other shapes");
     double phase = 0;  // each its own, so that no mirror is left
     for (const auto& [n, m] : added_waves(c))
         std::get<Tube>(c.shape).modes.push_back({noise * start->tube.radius, n, m, phase += 1});
@@ -61,7 +61,7 @@ std::vector<double> output_times(const Case& c, const PointResult& axisymmetric,
     return times;
 }
 
-// All waves with m >= 1 that are looked for, but for a tube that is moved as a whole.
+// All waves with m >= 1 that are considered, except a translation of the tube.
 std::vector<Wave> watched(const Case& c) {
     int highest = 0;
     std::vector<Wave> waves;
@@ -105,7 +105,7 @@ void fit_largest_wave(Answer& a, const Case& c, const Result& result) {
     }
 }
 
-// What became of it, if its symmetry held. A run that goes on to its end has come to rest if the one in tier 1 had by
+// The outcome, if the symmetry held. A run that goes on to its end has come to rest if the one in tier 1 had by
 // then.
 Outcome outcome_in_3d(const Answer& a, const PointResult& axisymmetric, const Result& surface) {
     const auto last = [&](const char* name) { return surface.series.at(name).back(); };

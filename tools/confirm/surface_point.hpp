@@ -36,11 +36,11 @@ enum class Verdict {
     agrees,
     symmetry_broken,  // a wave with m >= 1 has grown
     other_outcome,
-    no_answer  // the numerics gave up in three dimensions, or it ended before tier 1 had its outcome
+    no_answer  // the numerics failed in three dimensions, or it ended before tier 1 had its outcome
 };
 std::string_view name(Verdict verdict);
 
-// The symmetry counts as broken when the largest wave is so many times what the largest was at the start.
+// The symmetry counts as broken when the largest wave is this many times the largest at the start.
 inline constexpr double grown = 3;
 
 inline constexpr double not_known = std::numeric_limits<double>::quiet_NaN();

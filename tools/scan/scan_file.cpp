@@ -407,7 +407,8 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
     const auto path = fs::weakly_canonical(file);
     if (fs::exists(path) && !is_scan(path))
         throw std::runtime_error(fmt::format(
-            "{}: is no scan\nnot replaced, as it may be needed: remove it first, or write elsewhere", path.string()));
+            "{}: is no scan\nit was not replaced, since it may be needed: remove it first, or write elsewhere",
+            path.string()));
     auto impl = std::make_unique<Impl>(path);
     std::random_device random;
     Stored& c = impl->stored;
