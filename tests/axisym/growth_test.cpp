@@ -42,7 +42,7 @@ struct Base {
     double R, log_growth;
 };
 
-// The radius at t and INT growth dt, by the classical Runge-Kutta method with steps far below any error asked for.
+// The radius at t and INT growth dt, by the classical Runge-Kutta method with steps far below any required error.
 Base base_at(const Material& m, double R0, double q, double t) {
     Base y{R0, 0};
     const int n = 20000;

@@ -267,7 +267,7 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
         ASSERT_EQ(found.shape.size(), 201u);
         EXPECT_EQ(*std::max_element(found.shape.begin(), found.shape.end()), 1);
     }
-    // k20 alone knows no size: with the reduced volume alone held, the change of size is neutral.
+    // k20 alone is scale-invariant: with the reduced volume alone held, the change of size is neutral.
     const StationaryProblem free_size{bending(1), {{}, {}, 0.655}};
     const auto rates = ModeStability(free_size, after).rates(0, gradient_flow).rates;
     EXPECT_GT(rates[0], 0.1);

@@ -164,7 +164,7 @@ TEST(CurveRun, wavesOfATubeFollowTheAmplitudeEquations) {
 TEST(CurveRun, lawsOfConservation) {
     for (const char* model : {"gradient-flow", "overdamped", "stokes", "fluid"})
         for (const char* parametrisation : {"even", "material"}) {
-            // Waves of a fluid on an even parameter want many elements (docs/decisions.md).
+            // Waves of a fluid on an even parameter need many elements (docs/decisions.md).
             const bool even = std::string(parametrisation) == "even";
             const double asked = even ? 1e-3 : 1e-5;
             std::vector<std::string> sets{std::string("model.kind=") + model, "model.volume=fixed",
@@ -290,7 +290,7 @@ TEST(CurveRun, givenSettingsAreUsed) {
 }
 
 TEST(CurveRun, anErrorThatIsNotKnownIsNotStatedAsSmall) {
-    // Four elements are two of a half, and there is no mesh of fewer to compare with.
+    // Four elements are two of a half; no coarser mesh exists to compare with.
     const Outcome o = run_text(spheroid, {"model.kind=stokes", "discretisation.elements=4",
                                           "discretisation.time_tolerance=1e-3", "time.end=1e-3"});
     EXPECT_EQ(o.summary.estimated_error, 1);

@@ -198,7 +198,7 @@ TEST(Confirm, seesAWaveThatGrows) {
     EXPECT_EQ(broken.verdict, Verdict::symmetry_broken);
     EXPECT_EQ(broken.n, 1);
     EXPECT_EQ(broken.m, 1);
-    EXPECT_NEAR(broken.noise, 1e-3, 1e-5);  // as made, but for the triangles
+    EXPECT_NEAR(broken.noise, 1e-3, 1e-5);  // as set, up to the error of the triangles
     EXPECT_NEAR(broken.amplitude, 2e-2, 2e-4);
     EXPECT_NEAR(broken.fit.rate, std::log(20) / 2, 1e-2);           // as made
     EXPECT_NEAR(broken.linear_rate, rate(1, 1), 1e-10);             // of the case, whatever the frames show

@@ -122,7 +122,7 @@ TEST(UniformFate, FollowsTheDispersionRelation) {
     EXPECT_FALSE(UniformFate::of(c)->decided(s)) << "waves that are low, but steep";
 }
 
-// Wherever the fate is said to be known, a run to the end comes to the same; no outcome is lost by deciding early.
+// Wherever the outcome is decided early, a run to the end gives the same; no outcome is lost.
 void compare_random_points(int count, unsigned seed) {
     std::mt19937 random(seed);
     const auto in = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };

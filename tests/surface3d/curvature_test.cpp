@@ -97,7 +97,7 @@ TEST(Curvature, SmoothingDampsEigenfunctionsAsItMust) {
 
 TEST(Curvature, ExactNodesAreInterpolated) {
     // Interpolation in P_k: order k + 1 for values, k for gradients. No recovery is far better than it; the default is
-    // as good but for a factor.
+    // as good up to a factor.
     const auto map = map_of(Ellipsoid{1, 1.2, 1.5});
     FieldErrors errors[2];
     for (int i : {0, 1}) {

@@ -220,7 +220,7 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
         const CurvedMesh mesh = tube ? tube_mesh({.radius = 1, .length = 3, .modes = {}}, 6, 10, 3)
                                      : mapped_mesh(icosphere(3), 3, map_of(Sphere{.radius = 1, .modes = {}}));
         for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid}) {
-            // A mesh that lacks 1e-6 of the area and, through another error, 4e-6 of the volume.
+            // A mesh whose area is 1e-6 too small and, through another error, its volume 4e-6.
             const SurfaceSpace space(mesh);
             const Extent now = extent(space, mesh);
             MotionControl control{.area = now.area * (1 + 1e-6), .volume = now.volume * (1 + 4e-6)};
@@ -233,7 +233,7 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
             // A sphere's radius grows by half as much, relatively, a tube's by as much.
             const double most = (start.X - node_positions(mesh)).colwise().norm().maxCoeff();
             EXPECT_NEAR(most, tube ? 1e-6 : 0.5e-6, 2e-7);
-            // Nor do steps make up for the volume: they are those of a run that lacks none.
+            // Nor do steps correct the volume: they are those of a run without that defect.
             control.volume = now.volume;
             MotionStepper other(mesh, law, bending, control);
             EXPECT_EQ(stepper.step(start, 1e-6).state.X, other.step(other.start(mesh), 1e-6).state.X);

@@ -241,7 +241,7 @@ double distance(const Eigen::MatrixXd& M, const Eigen::MatrixXd& N) {
 }
 
 TEST(StepMatrix, IsSymmetricWhereNothingStretches) {
-    // The evolution times -f_HH/te and -f_KK/te is the transpose of the force but for (H f_H v.nu, phi) and the like,
+    // The evolution times -f_HH/te and -f_KK/te is the transpose of the force except (H f_H v.nu, phi) and the like,
     // which vanish with f_H and f_K: at H = H0 and K = 0.
     Bending bending{.k = {1, 0, 1}, .H0 = -0.5};
     const double te = 0.1;

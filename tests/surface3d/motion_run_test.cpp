@@ -382,7 +382,7 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     const RunSummary whole = run(c, undisturbed);
     ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
     ASSERT_EQ(detail(whole, "pairs"), 2);
-    EXPECT_EQ(undisturbed.frames_at_first_look, 1u);  // the start, for whoever is killed in the coarser run
+    EXPECT_EQ(undisturbed.frames_at_first_look, 1u);  // the start, in case the coarser run is killed
     // Again and again: in the coarser run, in the run that is found wanting, and in the one that will do.
     int times = 0, before_rows = 0, in_first_pair = 0;
     std::optional<Restart> restart;

@@ -16,7 +16,7 @@ namespace {
 const Bending all_terms{.k = {0.3, 0.02, 0.1}, .H0 = -1};
 
 // A damped oscillator y' = A y by scheme alpha, steps in turn short and `uneven` times as long, the carried rate exact
-// at the start. At t = 2: what lacks to the exact solution, and the same by the error constants of the steps.
+// at the start. At t = 2: the error, measured and from the error constants of the steps.
 struct OscillatorEnd {
     double error, ratio;  // |error|, and that of the constants along it, relative
 };
@@ -41,7 +41,7 @@ OscillatorEnd oscillator(double radius, double uneven, int steps) {
     return {lacks.norm(), predicted.dot(lacks) / lacks.squaredNorm()};
 }
 
-// X_t = X in many steps of one length: what one lacks, over tau^3.
+// X_t = X in many steps of one length: the error of one, over tau^3.
 double lack_of_a_step(double radius, double tau, int steps) {
     double X = 1, rate = 1, lag = 0;
     for (int i = 0; i < steps; ++i) {
@@ -55,7 +55,7 @@ double lack_of_a_step(double radius, double tau, int steps) {
 }
 
 TEST(Alpha, IsOfSecondOrderForUnevenSteps) {
-    // By the matrix exponential. With equal steps what a step lacks is C tau^3 |y_ttt|, C below 1/3, 1/9, .085 for
+    // By the matrix exponential. With equal steps the error of a step is C tau^3 |y_ttt|, C below 1/3, 1/9, .085 for
     // these radii (next test), and |y_ttt| < 1.1; with steps of 1/2 and 3/2 of tau 7/4 times as much.
     for (const auto& [radius, constant] : {std::pair{0.0, 1.0 / 3}, {0.5, 1.0 / 9}, {0.9, 0.085}})
         for (const double uneven : {1.0, 3.0, 1.0 / 3}) {

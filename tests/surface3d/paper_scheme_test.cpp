@@ -17,7 +17,7 @@ MotionLaw law_of(ModelKind kind, double Re = 1, double gamma = 0) {
     return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
 }
 
-// A smooth shape without symmetries but for y -> -y.
+// A smooth shape without symmetries except y -> -y.
 CurvedMesh smooth_cell(int order) {
     return mapped_mesh(icosphere(2), order, map_of(Sphere{.radius = 1, .modes = {{0.3, 2, 0}, {0.2, 3, 1}}}));
 }

@@ -45,7 +45,7 @@ Outcome run_case(const std::string& shape, const std::vector<std::string>& sets 
 
 const std::string perturbed = "kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 0.5, l = 5, m = 3}]\n";
 
-// The energy is off by no more than stated, and what is stated is no more than asked; nor is it idle talk.
+// The error of the energy is at most the stated one, which is at most the required one, and the run says so.
 void expect_honest(const Outcome& o, double exact) {
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     const double error = std::abs(o.summary.energy - exact) / o.summary.reference_energy;

@@ -1,7 +1,7 @@
 // A result is killed at every system call by which it reaches the disk, and at twenty random moments. What a call has
 // reported must be there afterwards, bit for bit, and nothing else but the call under way.
 //
-// Expected values: `Model` below, which keeps in plain vectors what the calls mean, and knows no file.
+// Expected values: `Model` below, which keeps the meaning of the calls in plain vectors, without any file.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -511,7 +511,7 @@ TEST_F(Durability, ATornRecordThatCannotBeCutOffStopsTheJournal) {
     };
     EXPECT_THROW(writer.row(std::vector<double>{1, 2}), std::runtime_error);
     durable::fault = nullptr;
-    // Accepting this row would promise what a kill would break.
+    // Accepting this row would give a guarantee that a kill would break.
     EXPECT_NE(message_of<std::runtime_error>([&] {
                   writer.row(std::vector<double>{2, 3});
               }).find("damaged"),

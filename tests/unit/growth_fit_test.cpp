@@ -44,7 +44,7 @@ TEST(GrowthFit, betweenTransientAndSaturation) {
 }
 
 TEST(GrowthFit, aFloorOfNoise) {
-    // A decay that ends in what is no wave at all: the floor counts neither by itself nor when named.
+    // A decay that ends in a floor that is not a wave: the floor counts neither by itself nor when named.
     const auto decay = [](double t) { return std::exp(-2 * t) + 1e-7 * (1 + std::sin(40 * t)); };
     for (const double noise : {0.0, 1e-5}) {
         const auto fit = Samples(20, 400, decay).fit(noise);

@@ -47,7 +47,7 @@ TEST(ShapeKeys, EveryShapeReadsBackAsWritten) {
 }
 
 TEST(ShapeKeys, HarmonicsOfHighDegree) {
-    // Against the standard library, which too has the sign (-1)^m of Condon and Shortley. (2 l)! is no double here.
+    // Against the standard library, which also has the sign (-1)^m of Condon and Shortley. (2 l)! overflows a double.
     for (const auto [l, m] : {std::array{100, 100}, std::array{120, 60}, std::array{300, 3}})
         for (const double theta : {0.3, 1.2, 2.0}) {
             const double expected = std::sph_legendre(l, m, theta);

@@ -279,7 +279,7 @@ TEST(DerivativeCheck, leavesOutInadmissibleSteps) {
     EXPECT_TRUE(check.pass()) << check.text();
     EXPECT_LT(check.gradient.h_large, 1e-1);
 
-    // Where no step is admissible nothing was checked, which is no pass.
+    // Where no step is admissible, nothing was checked, which does not count as a pass.
     const auto only_here = check_derivatives([&](const Vector& y) { return y == x ? 1.0 : nan; },
                                              [&](const Vector&) { return x; }, hessian, x);
     EXPECT_FALSE(only_here.pass());

@@ -60,7 +60,7 @@ void expect_dense_answers(const Matrix& A, std::vector<SparseSolver*> solvers) {
         const double c = condition(A), rounding = 10 * c * std::numeric_limits<double>::epsilon();
         EXPECT_LT(difference_from_dense(*solver, A, waves(A.rows(), 1)), rounding);
         EXPECT_LT(difference_from_dense(*solver, A, waves(A.rows(), 7)), rounding);
-        // A lower bound of the condition number, but for rounding, and not ten times below it.
+        // A lower bound of the condition number, up to rounding, and not ten times below it.
         EXPECT_LT(solver->reciprocal_condition() * c, 10);
         EXPECT_GT(solver->reciprocal_condition() * c, 1 - 1e-6);
     }
@@ -283,7 +283,7 @@ TEST(SparseCholesky, namesWhatIsNotSymmetricPositiveDefinite) {
                   cholesky.factor(sparse(Dense{{2, 0, 1}, {1, 2, 0}, {1, 0, 2}}));
               }),
               "matrix of size 3 is not symmetric in (1, 0)");
-    // Rounding in an assembly is no asymmetry.
+    // Rounding in an assembly does not count as asymmetry.
     cholesky.factor(sparse(Dense{{1e8, 1 + 1e-9}, {1, 1}}));
     EXPECT_EQ(message_of([&] {
                   cholesky.factor(sparse(Dense{{1, 0}, {0, -2}}));
