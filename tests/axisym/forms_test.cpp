@@ -10,6 +10,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/axisym/series.hpp"
+#include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -20,11 +21,7 @@ const Cell whole{0, 2, false, 1}, half{0, 1, true, 1};
 
 // A profile between 0.4 and 1.6 with no smoothness beyond that of its space.
 Vector rough(int n, unsigned seed = 5) {
-    std::mt19937 engine(seed);
-    std::uniform_real_distribution<double> value(0.4, 1.6);
-    Vector x(n);
-    for (double& c : x) c = value(engine);
-    return x;
+    return test::uniform_vector(n, 0.4, 1.6, seed);
 }
 
 TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {

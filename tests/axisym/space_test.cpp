@@ -9,6 +9,7 @@
 #include "axisym/splines/profile_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -37,11 +38,7 @@ std::vector<double> uneven(const Cell& cell, int n, unsigned seed = 1) {
 }
 
 Vector rough(int n, unsigned seed = 2) {
-    std::mt19937 engine(seed);
-    std::uniform_real_distribution<double> value(0.5, 1.5);
-    Vector x(n);
-    for (double& c : x) c = value(engine);
-    return x;
+    return test::uniform_vector(n, 0.5, 1.5, seed);
 }
 
 const Cell periodic{-0.3, 1.7, false, 1}, mirrored{-0.3, 0.7, true, 1};

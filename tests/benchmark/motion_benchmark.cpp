@@ -8,6 +8,7 @@
 
 #include "common/solve/sparse.hpp"
 #include "surface3d/motion/motion_measures.hpp"
+#include "tests/benchmark/main.hpp"
 #include "tests/benchmark/motion_scene.hpp"
 
 namespace tubule::surface3d {
@@ -49,8 +50,5 @@ void add_all() {
 }  // namespace tubule::surface3d
 
 int main(int argc, char** argv) {
-    benchmark::Initialize(&argc, argv);
-    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-    tubule::surface3d::add_all();
-    benchmark::RunSpecifiedBenchmarks();
+    return tubule::run_benchmarks(argc, argv, tubule::surface3d::add_all);
 }

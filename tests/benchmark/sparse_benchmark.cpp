@@ -14,6 +14,7 @@
 #include "common/solve/gmres.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/sparse_ldlt.hpp"
+#include "tests/benchmark/main.hpp"
 #include "tests/sphere_matrices.hpp"
 
 namespace tubule {
@@ -238,8 +239,5 @@ void add_all() {
 }  // namespace tubule
 
 int main(int argc, char** argv) {
-    benchmark::Initialize(&argc, argv);
-    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-    tubule::add_all();
-    benchmark::RunSpecifiedBenchmarks();
+    return tubule::run_benchmarks(argc, argv, tubule::add_all);
 }

@@ -9,6 +9,7 @@
 #include "surface3d/curvature/bending_force.hpp"
 #include "surface3d/fem/projection.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
+#include "tests/benchmark/main.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
@@ -90,8 +91,5 @@ void add_all() {
 }  // namespace tubule::surface3d
 
 int main(int argc, char** argv) {
-    benchmark::Initialize(&argc, argv);
-    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-    tubule::surface3d::add_all();
-    benchmark::RunSpecifiedBenchmarks();
+    return tubule::run_benchmarks(argc, argv, tubule::surface3d::add_all);
 }

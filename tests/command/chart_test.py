@@ -52,13 +52,6 @@ class Charts(ProgramTest):
         with open(self.folder / name, newline="") as file:
             return list(csv.DictReader(file))
 
-    def refused(self, *arguments):
-        before = self.files()
-        out, err = self.tubule("chart", *arguments, status=2)
-        self.assertEqual(out, "")
-        self.assertEqual(self.files(), before)
-        return err
-
 
 class RealRuns(Charts):
     def test_a_chart_of_accuracies(self):
@@ -136,7 +129,7 @@ class Refusals(Charts):
             (["case.toml", *vary, "--times", "0.2,0.1"], "must be growing numbers above 0"),
         ):
             with self.subTest(arguments=arguments):
-                self.assertIn(words, self.refused(*arguments))
+                self.assertIn(words, self.refused("chart", *arguments))
 
 
 class Outcomes(Charts):

@@ -83,13 +83,6 @@ class Run(ProgramTest):
 class Refused(ProgramTest):
     """Bad input: exit status 2, and nothing is written."""
 
-    def refused(self, *arguments):
-        before = self.files()
-        out, err = self.tubule(*arguments, status=2)
-        self.assertEqual(self.files(), before)
-        self.assertEqual(out, "")
-        return err
-
     def test_unknown_key(self):
         bad = self.write("bad.toml", QUICK.replace("radius", "raduis"))
         self.assertIn("bad.toml:10:1: unknown key shape.raduis; did you mean 'radius'?", self.refused("run", bad))

@@ -49,13 +49,6 @@ class Compare(ProgramTest):
     def compared(self, *arguments, status=0):
         return json.loads(self.tubule("compare", "--json", *arguments, status=status)[0])
 
-    def refused(self, *arguments):
-        before = self.files()
-        out, err = self.tubule("compare", *arguments, status=2)
-        self.assertEqual(out, "")
-        self.assertEqual(self.files(), before)
-        return err
-
     def edited(self, original, name, edit):
         shutil.copy(self.folder / original, self.folder / name)
         with h5py.File(self.folder / name, "r+") as file:
@@ -154,27 +147,27 @@ class Runs(Compare):
         self.assertIn("picture.jpg", self.tubule("compare", self.coarse, self.fine, "--plot", "picture.jpg", status=2)[1])
 
     def test_refusals(self):
-        self.assertIn("nowhere.hdf", self.refused("nowhere.hdf", self.fine))
-        self.assertIn("case.toml", self.refused(self.fine, self.case))
-        self.assertIn("required", self.refused(self.fine))
-        self.assertIn("did you mean 'energy'; it must be one of", self.refused(self.fine, self.fine, "--tolerance=enregy=1"))
+        self.assertIn("nowhere.hdf", self.refused("compare", "nowhere.hdf", self.fine))
+        self.assertIn("case.toml", self.refused("compare", self.fine, self.case))
+        self.assertIn("required", self.refused("compare", self.fine))
+        self.assertIn("did you mean 'energy'; it must be one of", self.refused("compare", self.fine, self.fine, "--tolerance=enregy=1"))
         for bad in ("energy", "energy=", "energy=-1", "energy=much", "energy=nan"):
-            self.assertIn("must be NAME=VALUE", self.refused(self.fine, self.fine, f"--tolerance={bad}"))
+            self.assertIn("must be NAME=VALUE", self.refused("compare", self.fine, self.fine, f"--tolerance={bad}"))
         for bad in ("1", "1:", "a:0", "1:2:3"):
-            self.assertIn("must be I:J", self.refused(self.fine, self.fine, f"--frames={bad}"))
-        self.assertIn("no frame 4: there are 4 frames", self.refused(self.fine, self.fine, "--frames=0:4"))
-        self.assertIn("excludes", self.refused(self.fine, self.fine, "--align", "--no-shapes"))
+            self.assertIn("must be I:J", self.refused("compare", self.fine, self.fine, f"--frames={bad}"))
+        self.assertIn("no frame 4: there are 4 frames", self.refused("compare", self.fine, self.fine, "--frames=0:4"))
+        self.assertIn("excludes", self.refused("compare", self.fine, self.fine, "--align", "--no-shapes"))
 
         def later(file):
             for frame in file["frames"].values():
                 frame.attrs["time"] += 7
 
         other = self.edited(self.fine, "later.hdf", later)
-        err = self.refused(self.fine, other)
+        err = self.refused("compare", self.fine, other)
         self.assertIn("no frames in common: A has t = 0, 0.01, 0.05, 0.2; B has t = 7, 7.01, 7.05, 7.2", err)
         self.assertIn("--frames", err)
         self.tubule("compare", self.fine, other, "--no-shapes")
-        self.assertIn("must be one of", self.refused(self.fine, other, "--no-shapes", "--tolerance=shape=1"))
+        self.assertIn("must be one of", self.refused("compare", self.fine, other, "--no-shapes", "--tolerance=shape=1"))
 
 
 class Shapes(Compare):
@@ -221,11 +214,11 @@ class Shapes(Compare):
 
     def test_a_tube_is_no_sphere(self):
         one = self.made("one", STRAIGHT.format(radius=1.0, H0=-1.0))
-        err = self.refused(one, self.made("sphere", SPHERE.format(radius=1.0)))
+        err = self.refused("compare", one, self.made("sphere", SPHERE.format(radius=1.0)))
         self.assertIn("one is a tube of period 2.000000, the other is a closed surface", err)
         damaged = self.edited(one, "damaged.hdf", lambda file: [frame.pop("knots") for frame in file["frames"].values()])
         self.edited(damaged, "damaged.hdf2", lambda file: [frame.pop("r") for frame in file["frames"].values()])
-        self.assertIn("frame 0 of B, t = 0: it is damaged: knots is missing", self.refused(one, "damaged.hdf2"))
+        self.assertIn("frame 0 of B, t = 0: it is damaged: knots is missing", self.refused("compare", one, "damaged.hdf2"))
 
 
 if __name__ == "__main__":

@@ -4,22 +4,9 @@ import subprocess
 import unittest
 from pathlib import Path
 
-from program import ProgramTest, about, series
+from program import CAPSULE, ProgramTest, about, series
 
-CAPSULE = """tier = "axisym"
-[energy]
-k20 = 0.125
-H0 = -2.0
-k42 = 0.12
-[shape]
-kind = "capsule"
-radius = 0.5
-length = 2.0
-[accuracy]
-energy = 1e-8
-[equilibrium]
-modes = 2
-"""
+CASE = CAPSULE + "modes = 2\n"
 BRANCH = """[equilibrium.branch]
 vary = "energy.k42"
 to = 0.0
@@ -34,7 +21,7 @@ PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 
 class Equilibrium(ProgramTest):
     def test_one_shape(self):
-        case = self.write("cell.toml", CAPSULE)
+        case = self.write("cell.toml", CASE)
         out, _ = self.tubule("equilibrium", case)
         header, row = out.splitlines()[-2:]
         self.assertEqual(header.split(), ["energy", "sigma", "lambda", "height", "r_max", "neg", "growth", "of", "m"])
@@ -48,21 +35,21 @@ class Equilibrium(ProgramTest):
         self.assertIn("other.hdf", self.files())
 
     def test_branch_and_shapes_as_starts(self):
-        case = self.write("branch.toml", CAPSULE + BRANCH)
+        case = self.write("branch.toml", CASE + BRANCH)
         out, _ = self.tubule("equilibrium", case)
         rows = [line.split() for line in out.splitlines()[-3:]]
         for row, k42, energy in zip(rows, (0.12, 0.06, 0), ENERGIES):
             self.assertAlmostEqual(float(row[0]), k42, delta=1e-9)
             self.assertAlmostEqual(float(row[1]), energy, delta=1e-6)
         # The shape at k42 = 0.06 is at rest already, with the area and volume it has.
-        again = CAPSULE.replace('kind = "capsule"\nradius = 0.5\nlength = 2.0', 'kind = "result"\npath = "branch.hdf"\nframe = 1')
+        again = CASE.replace('kind = "capsule"\nradius = 0.5\nlength = 2.0', 'kind = "result"\npath = "branch.hdf"\nframe = 1')
         self.tubule("equilibrium", "--quiet", self.write("again.toml", again), "--set", "energy.k42=0.06")
         found = series(self.folder / "again.hdf")
         self.assertAlmostEqual(found["energy"][0], ENERGIES[1], delta=1e-6)
         self.assertLess(found["distance_to_start"][0], 1e-5)
 
     def test_the_surface_meets_itself(self):
-        text = CAPSULE.replace("k42 = 0.12", "").replace("H0 = -2.0", "").replace("modes = 2", "reduced_volume = 0.55")
+        text = CASE.replace("k42 = 0.12", "").replace("H0 = -2.0", "").replace("modes = 2", "reduced_volume = 0.55")
         text = text.replace('kind = "capsule"\nradius = 0.5\nlength = 2.0', 'kind = "ellipsoid"\na = 1.0\nb = 1.0\nc = 0.5')
         case = self.write(
             "oblate.toml", text + '[equilibrium.branch]\nvary = "equilibrium.reduced_volume"\nto = 0.4\nstep = 0.02\n'
@@ -72,10 +59,10 @@ class Equilibrium(ProgramTest):
         self.assertEqual(about(self.folder / "oblate.hdf")["stop"], "self-intersection")
 
     def test_pictures(self):
-        case = self.write("branch_cell.toml", CAPSULE + BRANCH)
+        case = self.write("branch_cell.toml", CASE + BRANCH)
         for length in (2, 3, 4):
             self.tubule("equilibrium", "--quiet", case, "--set", f"shape.length={length}.0", "-o", f"l{length}.hdf")
-        single = self.write("single.toml", CAPSULE)
+        single = self.write("single.toml", CASE)
         for k42 in (0, 0.06, 0.12):
             for i, length in enumerate((2.0, 2.5)):
                 sets = ("--set", f"energy.k42={k42}", "--set", f"shape.length={length}")
@@ -95,7 +82,7 @@ class Equilibrium(ProgramTest):
     def test_refusals(self):
         _, err = self.tubule("equilibrium", self.case, status=2)
         self.assertEqual(err, f"{self.case}: is a time-dependent case: an equilibrium needs a table [equilibrium]\n")
-        cell = self.write("cell.toml", CAPSULE)
+        cell = self.write("cell.toml", CASE)
         _, err = self.tubule("equilibrium", cell, "--set", "equilibrium.area=1.0", status=2)
         self.assertEqual(err, f"{cell}: equilibrium: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere\n")
         self.assertEqual(self.files(), {"case.toml", "cell.toml"})

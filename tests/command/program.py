@@ -46,6 +46,21 @@ time_tolerance = 1e-12
 time_order = 2
 """
 
+# A tubular cell at rest; to be completed by what is asked of it.
+CAPSULE = """tier = "axisym"
+[energy]
+k20 = 0.125
+H0 = -2.0
+k42 = 0.12
+[shape]
+kind = "capsule"
+radius = 0.5
+length = 2.0
+[accuracy]
+energy = 1e-8
+[equilibrium]
+"""
+
 ACCURACY, E_REF = 1e-6, 24.5  # E_ref is printed by the program; tests/axisym holds it against its definition
 
 
@@ -87,6 +102,14 @@ class ProgramTest(unittest.TestCase):
             out, err = process.communicate()
         self.assertEqual(process.returncode, status, f"tubule {arguments}\n{out}{err}")
         return out, err
+
+    def refused(self, *arguments):
+        """What the program says when it refuses the arguments, which changes no file."""
+        before = self.files()
+        out, err = self.tubule(*arguments, status=2)
+        self.assertEqual(out, "")
+        self.assertEqual(self.files(), before)
+        return err
 
     def shown(self, result):
         """The series as `tubule show --csv` gives them, journal included: header, rows of strings."""

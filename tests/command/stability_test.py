@@ -9,7 +9,7 @@ import subprocess
 import sys
 import unittest
 
-from program import ProgramTest, series
+from program import CAPSULE, ProgramTest, series
 
 WRITER = sys.argv[2]
 
@@ -62,19 +62,6 @@ step = 0.0025
 end = 0.15
 output = [0.015, 0.03, 0.045, 0.06, 0.075, 0.09, 0.105, 0.12, 0.135]
 """
-CAPSULE = """tier = "axisym"
-[energy]
-k20 = 0.125
-H0 = -2.0
-k42 = 0.12
-[shape]
-kind = "capsule"
-radius = 0.5
-length = 2.0
-[accuracy]
-energy = 1e-8
-[equilibrium]
-"""
 
 
 def rate_at_rest(q, k20=0.2, beta=-0.2):
@@ -93,9 +80,8 @@ class Stability(ProgramTest):
     def json(self, *arguments):
         return json.loads(self.tubule("stability", *arguments, "--json")[0])
 
-    def refused(self, message, *arguments):
-        _, err = self.tubule("stability", *arguments, status=2)
-        self.assertIn(message, err)
+    def refuses(self, message, *arguments):
+        self.assertIn(message, self.refused("stability", *arguments))
 
     def test_table_of_a_tube(self):
         rows = {(row["m"], row["n"]): row for row in self.table(self.tube)}
@@ -192,9 +178,9 @@ class Stability(ProgramTest):
         numerical = [row for row in self.table(self.tube, "--numerical") if row["m"] == "0"]
         self.assertAlmostEqual(float(numerical[0]["rate"]), rate_at_rest(2 * math.pi / 7), delta=1e-5)
         wavy = ("--set", "shape.mode.0.amplitude=0.2", "--numerical")
-        self.refused("not at rest", self.tube, *wavy, "--model", "overdamped")
+        self.refuses("not at rest", self.tube, *wavy, "--model", "overdamped")
         self.tubule("stability", self.tube, *wavy)
-        self.refused("inertia", self.write("fluid.toml", FLUID), "--numerical")
+        self.refuses("inertia", self.write("fluid.toml", FLUID), "--numerical")
 
     def test_fits_of_tier_1(self):
         self.tubule("run", "--quiet", self.tube)
@@ -253,24 +239,24 @@ class Stability(ProgramTest):
     def test_bad_input_is_refused(self):
         result = self.folder / "tube.hdf"
         self.tubule("run", "--quiet", self.tube)
-        self.refused("--fit needs a result", self.tube, "--fit", "1")
-        self.refused("--frame needs a result", self.tube, "--frame", "1")
-        self.refused("--set needs a case", result, "--set", "energy.k20=1.0")
-        self.refused("there are 0 to", result, "--frame", "99")
+        self.refuses("--fit needs a result", self.tube, "--fit", "1")
+        self.refuses("--frame needs a result", self.tube, "--frame", "1")
+        self.refuses("--set needs a case", result, "--set", "energy.k20=1.0")
+        self.refuses("there are 0 to", result, "--frame", "99")
         for wave in ("x", "1,", "-1", "0", "1,2,3"):
-            self.refused("--fit must be n or n,m", result, f"--fit={wave}")
-        self.refused("no waves around the axis", result, "--fit", "1,2")
-        self.refused("--fit goes with", result, "--fit", "1", "--tension", "1")
-        self.refused("exclude each other", self.tube, "--q", "1", "--waves", "3")
-        self.refused("from:to:count", self.tube, "--q", "1:2")
-        self.refused("2 to 100000", self.tube, "--q", "2:1:5")
-        self.refused("'x' is no number", self.tube, "--q", "1,x")
-        self.refused("are >= 0", self.tube, "--q=-1")
-        self.refused("--Re and --gamma belong", self.tube, "--Re", "3")
-        self.refused("with the volume free", self.write("fluid.toml", FLUID), "--set", 'model.volume="free"', "--tension", "1")
-        self.refused("a picture is written as", self.tube, "--plot", "waves.txt")
-        self.refused("belong to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")
-        self.refused("missing.hdf", self.folder / "missing.hdf")
+            self.refuses("--fit must be n or n,m", result, f"--fit={wave}")
+        self.refuses("no waves around the axis", result, "--fit", "1,2")
+        self.refuses("--fit goes with", result, "--fit", "1", "--tension", "1")
+        self.refuses("exclude each other", self.tube, "--q", "1", "--waves", "3")
+        self.refuses("from:to:count", self.tube, "--q", "1:2")
+        self.refuses("2 to 100000", self.tube, "--q", "2:1:5")
+        self.refuses("'x' is no number", self.tube, "--q", "1,x")
+        self.refuses("are >= 0", self.tube, "--q=-1")
+        self.refuses("--Re and --gamma belong", self.tube, "--Re", "3")
+        self.refuses("with the volume free", self.write("fluid.toml", FLUID), "--set", 'model.volume="free"', "--tension", "1")
+        self.refuses("a picture is written as", self.tube, "--plot", "waves.txt")
+        self.refuses("belong to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")
+        self.refuses("missing.hdf", self.folder / "missing.hdf")
         self.tubule("stability", self.tube, "--model", "solid", status=2)
         self.tubule("stability", self.tube, "--modes", "-1", status=2)
 

@@ -15,4 +15,13 @@ inline Eigen::VectorXd random_vector(int n, double size, unsigned seed = 1) {
     return x;
 }
 
+// Uniformly distributed between the two.
+inline Eigen::VectorXd uniform_vector(int n, double low, double high, unsigned seed) {
+    std::mt19937 engine(seed);
+    std::uniform_real_distribution<double> value(low, high);
+    Eigen::VectorXd x(n);
+    for (double& c : x) c = value(engine);
+    return x;
+}
+
 }  // namespace tubule::test

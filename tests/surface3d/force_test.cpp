@@ -10,25 +10,14 @@
 #include "surface3d/curvature/bending_force.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
 namespace {
 
-// A smooth vector field of space without symmetries, along no normal.
-Eigen::Vector3d velocity(const Eigen::Vector3d& x) {
-    return {std::exp(0.4 * x.x()) + std::sin(x.y() + 0.3), x.y() * (1 + 0.5 * x.y() + 0.3 * x.z() * x.x()),
-            std::cos(x.z() + x.x()) + 0.7 * x.z()};
-}
-
-VectorField nodal_velocity(const CurvedMesh& mesh) {
-    VectorField v(3, mesh.size());
-    for (int i = 0; i < mesh.size(); ++i) v.col(i) = velocity(mesh.nodes[i]);
-    return v;
-}
-
 double paired(const CurvedMesh& mesh, const Bending& bending) {
     const SurfaceSpace space(mesh);
-    return bending_force(space, mesh, recover(space, mesh), bending).cwiseProduct(nodal_velocity(mesh)).sum();
+    return bending_force(space, mesh, recover(space, mesh), bending).cwiseProduct(smooth_at(mesh)).sum();
 }
 
 // The energy's rate of change while the nodes move with the field; fourth order in the step.
@@ -36,7 +25,7 @@ double energy_rate(const CurvedMesh& mesh, const Bending& bending) {
     const SurfaceSpace space(mesh);
     const auto energy = [&](double t) {
         CurvedMesh moved = mesh;
-        for (Eigen::Vector3d& x : moved.nodes) x += t * velocity(x);
+        for (Eigen::Vector3d& x : moved.nodes) x += t * smooth(x);
         return observe(space, moved, recover(space, moved), bending).energy;
     };
     const double step = 1e-3;

@@ -14,12 +14,6 @@ namespace {
 
 using namespace samples;
 
-ImportedMesh imported(const TriangleMesh& mesh) {
-    ImportedMesh out;
-    out.mesh = mesh;
-    return out;
-}
-
 std::string refusal(ImportedMesh mesh) {
     return test::message_of<MeshError>([&] { close_mesh(mesh); });
 }

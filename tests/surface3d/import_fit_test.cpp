@@ -16,8 +16,7 @@ namespace {
 using namespace samples;
 
 ImportedMesh closed(const TriangleMesh& mesh) {
-    ImportedMesh out;
-    out.mesh = mesh;
+    ImportedMesh out = imported(mesh);
     close_mesh(out);
     return out;
 }

@@ -14,6 +14,7 @@
 #include "surface3d/fem/projection.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -25,18 +26,6 @@ const SurfaceLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma =
 template <class Shape>
 CurvedMesh mesh_of(const Shape& shape, const TriangleMesh& base, int order) {
     return mapped_mesh(base, order, [&](const auto& p) { return position(shape, p); });
-}
-
-// A smooth vector field of space without symmetries, along no normal.
-Eigen::Vector3d smooth(const Eigen::Vector3d& x) {
-    return {std::exp(0.4 * x.x()) + std::sin(x.y() + 0.3), x.y() * (1 + 0.5 * x.y() + 0.3 * x.z() * x.x()),
-            std::cos(x.z() + x.x()) + 0.7 * x.z()};
-}
-
-VectorField smooth_at(const CurvedMesh& mesh) {
-    VectorField v(3, mesh.size());
-    for (int i = 0; i < mesh.size(); ++i) v.col(i) = smooth(mesh.nodes[i]);
-    return v;
 }
 
 // Component by component, as a velocity in MotionUnknowns.

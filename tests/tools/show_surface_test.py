@@ -11,27 +11,17 @@ import io
 import json
 import subprocess
 import sys
-import tempfile
 import unittest
-from pathlib import Path
 
 import h5py
 import numpy as np
 
-SURFACE_RESULTS = TUBULE = None
+from made_surfaces import MadeSurfaces
+
+TUBULE = None
 
 
-class Show(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.scratch = tempfile.TemporaryDirectory()
-        cls.folder = Path(cls.scratch.name)
-        subprocess.run([SURFACE_RESULTS, cls.folder], check=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.scratch.cleanup()
-
+class Show(MadeSurfaces):
     def show(self, name, *arguments):
         command = [TUBULE, "show", self.folder / name, *arguments]
         done = subprocess.run(command, capture_output=True, text=True)
@@ -75,5 +65,5 @@ class Show(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    SURFACE_RESULTS, TUBULE = sys.argv.pop(1), sys.argv.pop(1)
+    MadeSurfaces.program, TUBULE = sys.argv.pop(1), sys.argv.pop(1)
     unittest.main()

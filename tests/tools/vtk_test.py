@@ -9,11 +9,8 @@ cannot.
 """
 
 import json
-import subprocess
 import sys
-import tempfile
 import unittest
-from pathlib import Path
 
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -21,7 +18,8 @@ from vtkmodules.vtkCommonCore import reference, vtkVersion
 from vtkmodules.vtkCommonDataModel import VTK_LAGRANGE_TRIANGLE
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-SURFACE_RESULTS = None
+from made_surfaces import MadeSurfaces
+
 ORDERS = (2, 3, 4)
 PLACES = [(0.2, 0.3), (0.6, 0.1), (0.05, 0.9), (0.45, 0.45), (0.5, 0.0)]  # (r, s) in a cell
 TEMPORAL = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 3)
@@ -51,17 +49,7 @@ def array(grid, name):
     return vtk_to_numpy(grid.GetPointData().GetArray(name))
 
 
-class Surfaces(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.scratch = tempfile.TemporaryDirectory()
-        cls.folder = Path(cls.scratch.name)
-        subprocess.run([SURFACE_RESULTS, cls.folder], check=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.scratch.cleanup()
-
+class Surfaces(MadeSurfaces):
     def view(self, name, frame):
         return read(self.folder / f"view/{name}_{frame:06d}.hdf")
 
@@ -174,5 +162,5 @@ class Surfaces(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    SURFACE_RESULTS = sys.argv.pop(1)
+    MadeSurfaces.program = sys.argv.pop(1)
     unittest.main()

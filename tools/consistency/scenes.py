@@ -145,21 +145,16 @@ MOVING_TUBES = [
                within(1e-4, "energy", "energy_20", "energy_42") | within(1e-3, "dissipated")
                | within(2e-4, "area", "volume", "r_min", "r_max", *SHAPES)),
     ),
-    Scene(
-        "waves-overdamped",
-        "Two waves on a tube, overdamped",
-        "The start of `cases/surface_tube_waves_overdamped.toml`.",
-        motion(waves("overdamped", time={"end": 0.1, "output": [0.01, 0.03]}), 1e-7, 8e-5,
-               within(5e-4, "energy", "energy_20", "energy_42") | within(1e-3, "dissipated", "r_min", "r_max", *SHAPES)
-               | within(2e-2, "speed") | within(5e-3, "lambda")),
-    ),
-    Scene(
-        "waves-stokes",
-        "Two waves on a tube, Stokes flow",
-        "The start of `cases/surface_tube_waves_stokes.toml`.",
-        motion(waves("stokes", time={"end": 0.1, "output": [0.01, 0.03]}), 1e-7, 8e-5,
-               within(5e-4, "energy", "energy_20", "energy_42") | within(1e-3, "dissipated", "r_min", "r_max", *SHAPES)
-               | within(2e-2, "speed") | within(5e-3, "lambda")),
+    *(
+        Scene(
+            f"waves-{kind}",
+            f"Two waves on a tube, {name}",
+            f"The start of `cases/surface_tube_waves_{kind}.toml`.",
+            motion(waves(kind, time={"end": 0.1, "output": [0.01, 0.03]}), 1e-7, 8e-5,
+                   within(5e-4, "energy", "energy_20", "energy_42") | within(1e-3, "dissipated", "r_min", "r_max", *SHAPES)
+                   | within(2e-2, "speed") | within(5e-3, "lambda")),
+        )
+        for kind, name in (("overdamped", "overdamped"), ("stokes", "Stokes flow"))
     ),
     Scene(
         "waves-fluid",

@@ -5,8 +5,8 @@ import os
 import sys
 
 
-def run(draw, outputs):
-    """Draws, or says why not. The exit status."""
+def run(draw, outputs, name=None):
+    """Draws and prints the pictures by name(path), if given, or says why not. The exit status."""
     from results import BadInput
 
     try:
@@ -14,16 +14,15 @@ def run(draw, outputs):
     except BadInput as error:
         print(error, file=sys.stderr)
         return 2
+    for path in outputs if name else ():
+        print(name(path))
     return 0
 
 
 def main(description, draw, argument="table", nargs=None):
-    """Calls draw(argument, outputs) with what the command line gives, and prints the names of the pictures."""
+    """Calls draw(argument, outputs) with what the command line gives."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(argument, nargs=nargs)
     parser.add_argument("-o", "--output", action="append", required=True)
     options = parser.parse_args()
-    status = run(lambda outputs: draw(getattr(options, argument), outputs), options.output)
-    for path in options.output if status == 0 else ():
-        print(os.path.relpath(path))
-    return status
+    return run(lambda outputs: draw(getattr(options, argument), outputs), options.output, os.path.relpath)

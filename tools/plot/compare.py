@@ -5,7 +5,9 @@ volume and shapes. See `tubule compare --help`."""
 import json
 import sys
 
-EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
+import command_line
+
+EXIT_UNAVAILABLE = 4
 HEIGHT = 2.3  # inches of the axes
 SERIES = {"energy": "energy E", "rate": "rate dE/dt", "area": "area", "volume": "volume"}
 SHAPES = {"hausdorff": ("shape", "shape, Hausdorff"), "l2": ("shape_l2", "shape, L2")}
@@ -105,21 +107,17 @@ class Page:
 def main():
     outputs = sys.argv[1:]
     try:
-        from results import BadInput
         import style
     except ImportError as error:
         packages = "python3-numpy python3-matplotlib python3-h5py"
         print(f"tubule compare: {sys.executable}: {error}; install the packages {packages}", file=sys.stderr)
         return EXIT_UNAVAILABLE
-    try:
+
+    def draw(outputs):
         style.check_outputs(outputs)
         Page(json.load(sys.stdin)).draw(outputs)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
-    for path in outputs:
-        print(path)
-    return 0
+
+    return command_line.run(draw, outputs, str)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ import re
 import sys
 from operator import attrgetter
 
+import command_line
+
 EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
 COLOURS = ("u_n", "H", "K", "p")
@@ -148,6 +150,19 @@ def read_arguments(options):
     options.terms = dict(term.split("=", 1) for term in options.term)
 
 
+def draw_any(options, outputs):
+    """A scan, or runs."""
+    import scan
+    from results import BadInput
+
+    if not any(scan.is_scan(path) for path in options.results):
+        draw(options.results, outputs, options)
+        return
+    if len(options.results) > 1 or options.times or options.colour or options.kind != "all":
+        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour and --kind")
+    scan.draw(options.results[0], outputs)
+
+
 def main():
     options = arguments()
     base = os.path.splitext(options.results[0])[0]
@@ -165,22 +180,7 @@ def main():
             return EXIT_UNAVAILABLE
     # A result file never changes in place, so it needs no lock; on some disks locks fail.
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
-    import scan
-    from results import BadInput
-
-    try:
-        if any(scan.is_scan(path) for path in options.results):
-            if len(options.results) > 1 or options.times or options.colour or options.kind != "all":
-                raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour and --kind")
-            scan.draw(options.results[0], outputs)
-        else:
-            draw(options.results, outputs, options)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
-    for path in outputs:
-        print(path)
-    return 0
+    return command_line.run(lambda pictures: draw_any(options, pictures), outputs, str)
 
 
 if __name__ == "__main__":
