@@ -6,12 +6,13 @@ set(precompiled_headers
   <fmt/format.h> <fmt/ranges.h>
   <Eigen/Dense> <Eigen/SparseCore>)
 
-# tubule_precompile(target [header...]): these, and further ones that this target uses throughout. Without further ones the
-# target shares what was compiled for tubule_common; its flags have to be the same.
+# tubule_precompile(target [header...]): these, and further ones that this target uses throughout. Targets whose compile
+# flags and definitions agree share what was compiled for tubule_axisym; those that see toml++ have a definition more.
 function(tubule_precompile target)
-  if(target STREQUAL tubule_common OR ARGN)
+  get_target_property(libraries ${target} LINK_LIBRARIES)
+  if(target STREQUAL tubule_axisym OR ARGN OR tomlplusplus::tomlplusplus IN_LIST libraries)
     target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
   else()
-    target_precompile_headers(${target} REUSE_FROM tubule_common)
+    target_precompile_headers(${target} REUSE_FROM tubule_axisym)
   endif()
 endfunction()
