@@ -41,6 +41,7 @@ struct MotionLayout {
 //   (q, div u) = 0,  dV[u] = 0
 // with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + lambda dV[phi] + c dJ[phi] = 0.
+// Many fields: besides the problem, the places of all its terms in the matrix, found once.
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.

@@ -13,6 +13,7 @@ namespace tubule {
 
 enum class Output { words, csv, json };
 
+// Many fields: one for each option of the command.
 struct StabilityOptions {
     std::string file, model, q, fit, plot;
     std::vector<std::string> sets;
