@@ -65,7 +65,7 @@ struct SurfaceDiscretisation {
     Recovery recovery = Recovery::patch;
     double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none. Of its scheme, too
     // Of a motion:
-    std::optional<Scheme> scheme;          // by default alpha for fluids, bdf2 for what has no inertia
+    std::optional<Scheme> scheme;          // by default that of the model, see default_scheme()
     std::optional<double> step;            // the same for all steps; switches their control off
     std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
     std::optional<double> relaxation;      // time in which the mesh becomes even

@@ -121,6 +121,30 @@ void keys(Keys& k, Discretisation& d) {
         {{"graph", Parametrisation::graph}, {"even", Parametrisation::even}, {"material", Parametrisation::material}});
 }
 
+// What a case may say with a time scheme.
+template <class Keys>
+void keys_of_scheme(Keys& k, SurfaceDiscretisation& d, const SchemeEntry& scheme) {
+    const auto absent = [&](const char* key, const char* what) {
+        k.absent(key, fmt::format("must be absent: scheme \"{}\" {}", scheme.name, what));
+    };
+    if (scheme.smooths) {
+        k.number("smoothing", d.smoothing, {.from = 0});
+    } else {
+        const auto smoothing = std::find_if(schemes.begin(), schemes.end(), [](const auto& s) { return s.smooths; });
+        k.absent("smoothing", fmt::format("must be absent: only valid with scheme = \"{}\"", smoothing->name));
+    }
+    if (scheme.controls_steps)
+        k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
+    else
+        absent("time_tolerance", "does not adapt its step");
+    if (scheme.controls_mesh) {
+        k.number("relaxation", d.relaxation, {.above = 0});
+        k.flag("follow_curvature", d.follow_curvature);
+    } else {
+        for (const char* key : {"relaxation", "follow_curvature"}) absent(key, "does not control its mesh");
+    }
+}
+
 template <class Keys>
 void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
     k.integer("elements", d.elements, {.from = 20, .to = 1000000});
@@ -129,20 +153,11 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
              {{"uniform", MeshKind::uniform}, {"graded", MeshKind::graded}, {"irregular", MeshKind::irregular}});
     if (moves) {
         k.absent("recovery", "must be absent: the time scheme determines the curvatures of a moving surface");
-        k.choice(
-            "scheme", d.scheme,
-            {{"bdf2", Scheme::bdf2}, {"alpha", Scheme::alpha}, {"euler", Scheme::euler}, {"paper", Scheme::paper}});
+        Choices<Scheme> choices;
+        for (std::size_t i = 0; i < schemes.size(); ++i) choices.emplace_back(schemes[i].name, Scheme{i});
+        k.choice("scheme", d.scheme, choices);
         k.number("step", d.step, {.above = 0});
-        if (d.scheme == Scheme::paper) {
-            k.number("smoothing", d.smoothing, {.from = 0});
-            for (const char* key : {"time_tolerance", "relaxation", "follow_curvature"})
-                k.absent(key, "must be absent: scheme \"paper\" controls neither its step nor its mesh");
-            return;
-        }
-        k.absent("smoothing", "must be absent: only valid with scheme = \"paper\"");
-        k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
-        k.number("relaxation", d.relaxation, {.above = 0});
-        k.flag("follow_curvature", d.follow_curvature);
+        keys_of_scheme(k, d, d.scheme ? entry(*d.scheme) : SchemeEntry{});
         return;
     }
     k.choice("recovery", d.recovery,
@@ -263,24 +278,27 @@ void check_neck(Keys& k, const Case& c) {
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
+    const SchemeEntry scheme = c.surface.scheme ? entry(*c.surface.scheme) : SchemeEntry{};
     if (c.tier == Tier::automatic) {
-        k.check("discretisation.scheme", [&] {
-            return c.surface.scheme == Scheme::paper
-                       ? "must not be \"paper\" in tier \"auto\": it has no error estimate"
-                       : "";
+        k.check("discretisation.scheme", [&]() -> std::string {
+            if (scheme.controls_steps) return {};
+            return fmt::format("must not be \"{}\" in tier \"auto\": it has no error estimate", scheme.name);
         });
         if (not_axisymmetric(c.shape).first.empty()) check_neck(k, c);
         return;
     }
     if (c.tier == Tier::surface3d) {
-        if (c.surface.scheme != Scheme::paper) return;
         k.check("discretisation.scheme", [&]() -> std::string {
-            if (!c.surface.step) return "\"paper\" needs discretisation.step: it does not adapt the step";
-            if (!law.inextensible) return "must not be \"paper\" for a gradient flow";
+            if (!scheme.controls_steps && !c.surface.step)
+                return fmt::format("\"{}\" needs discretisation.step: it does not adapt the step", scheme.name);
+            if (scheme.general) return {};
+            if (!law.inextensible) return fmt::format("must not be \"{}\" for a gradient flow", scheme.name);
             if (law.inertia == 0 && law.friction == 0)
-                return "must not be \"paper\" for a Stokes flow without friction: rigid motions are undetermined";
+                return fmt::format(
+                    "must not be \"{}\" for a Stokes flow without friction: rigid motions are undetermined",
+                    scheme.name);
             if (const auto key = term_beyond_paper(c.energy); !key.empty())
-                return fmt::format("must not be \"paper\" with energy.{}: it has k20, k40 and k42 only", key);
+                return fmt::format("must not be \"{}\" with energy.{}: it has k20, k40 and k42 only", scheme.name, key);
             return {};
         });
         return;

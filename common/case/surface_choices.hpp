@@ -1,6 +1,8 @@
 // Choices of tier surface3d that a case may make.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string_view>
 
 #include "common/energy/bending.hpp"
@@ -25,13 +27,41 @@ enum class MeshKind {
     irregular  // uniform, then disturbed at random: to see that nothing hangs on regular neighbours
 };
 
-// How a surface is moved.
-enum class Scheme {
-    bdf2,   // H and K implicit, backward differences of second order
-    alpha,  // the same, the generalised alpha method, which hardly damps waves
-    euler,  // the same of first order
-    paper   // the paper's: Euler steps with K explicit and smoothed
+// A time scheme that moves a surface: its name in a case, and what a case may say with it. A new scheme is a line of
+// `schemes` and a file in surface3d/motion/schemes/ (see its README).
+struct SchemeEntry {
+    std::string_view name;
+    bool default_with_inertia = false, default_without_inertia = false;  // where a case names no scheme
+    bool controls_steps = true;  // estimates its error; else a case gives discretisation.step
+    bool controls_mesh = true;   // keeps triangles even, and the volume; else no new meshes are made
+    bool smooths = false;        // takes discretisation.smoothing
+    bool general = true;         // else no gradient flow, no Stokes flow without friction, no terms but k20, k40, k42
 };
+inline constexpr std::array schemes{
+    SchemeEntry{.name = "bdf2", .default_without_inertia = true},
+    SchemeEntry{.name = "alpha", .default_with_inertia = true},
+    SchemeEntry{.name = "euler"},
+    SchemeEntry{.name = "paper", .controls_steps = false, .controls_mesh = false, .smooths = true, .general = false},
+};
+
+enum class Scheme : std::size_t {};  // a line of `schemes`
+
+consteval Scheme scheme_named(std::string_view name) {
+    for (std::size_t i = 0; i < schemes.size(); ++i)
+        if (schemes[i].name == name) return Scheme{i};
+    throw "no such line in `schemes`";
+}
+
+constexpr const SchemeEntry& entry(Scheme scheme) {
+    return schemes.at(static_cast<std::size_t>(scheme));
+}
+
+constexpr Scheme default_scheme(bool inertia) {
+    const auto is_default = inertia ? &SchemeEntry::default_with_inertia : &SchemeEntry::default_without_inertia;
+    std::size_t i = 0;
+    while (!(schemes.at(i).*is_default)) ++i;
+    return Scheme{i};
+}
 
 // The first term in use that the paper's scheme has no force for; "" if there is none.
 inline std::string_view term_beyond_paper(const Bending& energy) {

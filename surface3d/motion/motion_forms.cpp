@@ -15,15 +15,15 @@ Dependence dependence(const Bending& bending) {
     return {f.H != 0, f.K != 0};
 }
 
-// Taylor-Hood where the surface flows.
-int pressure_order(const SurfaceLaw& law, const CurvedMesh& mesh) {
-    return !law.inextensible ? 0 : law.flows ? mesh.order - 1 : mesh.order;
-}
-
 }  // namespace
 
+int pressure_order(const SurfaceLaw& law, int order) {
+    return !law.inextensible ? 0 : law.flows ? order - 1 : order;
+}
+
 MotionUnknowns::MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending)
-    : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K, pressure_order(law, mesh)) {
+    : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K,
+                    pressure_order(law, mesh.order)) {
     int next = law.components() * nodes();
     if (dependence(bending).H) H = std::exchange(next, next + nodes());
     if (dependence(bending).K) K = std::exchange(next, next + nodes());
@@ -264,7 +264,7 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
 
 // (H, phi) + te (c.grad (H - H*), phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with
 // c = u* - w* along the surface if there is inertia, else 0, L_H on the left and of X* - Xbar and u* - w* taken
-// 1 + stiffer |B| (width) times, and what a velocity makes of them:
+// 1 + curvature_stabilisation |B| (width) times, and what a velocity makes of them:
 //   L_H(v) = (grad(v.nu), grad phi) - (|B|^2 v.nu, phi)
 //   L_K(v) = ((HP-B) grad(v.nu), grad phi) - (H K v.nu, phi)
 // div(HP-B) = 0 makes the second the transpose of K's force, as the first is of H's.
@@ -309,7 +309,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
     add(
         H_, base_.fields.H,
         [&](const Point& s) {
-            const double more = base_.stiffer * std::sqrt(s.B2) * s.width;
+            const double more = base_.curvature_stabilisation * std::sqrt(s.B2) * s.width;
             return Eigen::Matrix2d((1 + more) * Eigen::Matrix2d::Identity());
         },
         [](const Point& s) { return s.B2; });

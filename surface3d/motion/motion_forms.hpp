@@ -10,6 +10,9 @@
 
 namespace tubule::surface3d {
 
+// Of the pressure's elements, on surfaces of this order: Taylor-Hood where the surface flows; 0 without a pressure.
+int pressure_order(const SurfaceLaw& law, int order);
+
 // Which fields a law has, and the numbers of their unknowns.
 struct MotionUnknowns : FieldUnknowns {
     MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending);
@@ -20,14 +23,14 @@ struct MotionUnknowns : FieldUnknowns {
 // What a step is linearised about: the surface X* that is expected at its end, and what is known of its past. Over the
 // step, X = Xbar + te w and u_t = (u - ubar)/te: theory.md (10.4), backward differences of any order.
 struct StepBase {
-    const CurvedMesh* mesh;     // X*
-    MotionFields fields;        // of X*
-    VectorField displacement;   // X* - Xbar
-    VectorField mesh_velocity;  // w*, expected
-    Eigen::VectorXd velocity;   // u*, expected, as numbered in MotionUnknowns; of one or three components
-    Eigen::VectorXd past;       // ubar
-    double te = 0;              // the step, effectively
-    double stiffer = 0;         // L_H is taken by this * |B| (width of a triangle) of itself more than it is
+    const CurvedMesh* mesh;              // X*
+    MotionFields fields;                 // of X*
+    VectorField displacement;            // X* - Xbar
+    VectorField mesh_velocity;           // w*, expected
+    Eigen::VectorXd velocity;            // u*, expected, as numbered in MotionUnknowns; of one or three components
+    Eigen::VectorXd past;                // ubar
+    double te = 0;                       // the step, effectively
+    double curvature_stabilisation = 0;  // L_H is taken 1 + this * |B| (width of a triangle) times
 };
 
 struct StepSystem {

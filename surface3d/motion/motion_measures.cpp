@@ -11,12 +11,12 @@ constexpr int n_sums = 15;
 using Sums = Eigen::Matrix<double, n_sums, 1>;
 
 // Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p|^2.
-Sums integrals(const MotionStepper& stepper, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
+Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
                const VectorField& rate) {
-    const SurfaceSpace& space = stepper.space();
+    const SurfaceSpace& space = surface.space();
     const Tabulation& table = space.tabulation();
     Eigen::Matrix<double, n_sums, Eigen::Dynamic> of_cell(n_sums, space.cells());
-    const bool slips = !stepper.law().flows && stepper.law().inextensible;
+    const bool slips = !surface.law().flows && surface.law().inextensible;
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell), U = space.gather(u, cell), A = space.gather(rate, cell);
         Sums sum = Sums::Zero();
@@ -65,23 +65,24 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 
 }  // namespace
 
-MotionMeasures measure(MotionStepper& stepper, const MotionState& s, const Bending& bending) {
-    const SurfaceLaw& law = stepper.law();
-    const SurfaceSpace& space = stepper.space();
-    const CurvedMesh mesh = stepper.mesh(s.X);
+MotionMeasures measure(MovingSurface& surface, const MotionState& s, const MotionState* before) {
+    const Bending& bending = surface.bending();
+    const SurfaceLaw& law = surface.law();
+    const SurfaceSpace& space = surface.space();
+    const CurvedMesh mesh = surface.mesh(s.X);
     MotionMeasures m;
-    m.fields = stepper.fields(mesh);
+    m.fields = surface.fields(mesh);
     m.bending = observe(space, mesh, {m.fields.normal, {}, m.fields.H, m.fields.K}, bending);
-    m.velocity = stepper.velocity(s, m.fields);
+    m.velocity = surface.velocity(s, m.fields);
     VectorField rate = VectorField::Zero(3, mesh.size());
-    if (law.inertia != 0 && s.step > 0)
+    if (law.inertia != 0 && before)
         for (int d = 0; d < 3; ++d)
-            rate.row(d) = (s.u - s.u_past).segment(d * mesh.size(), mesh.size()).transpose() / s.step;
-    const Sums sum = integrals(stepper, s, mesh, m.velocity, rate);
+            rate.row(d) = (s.u - before->u).segment(d * mesh.size(), mesh.size()).transpose() / s.step;
+    const Sums sum = integrals(surface, s, mesh, m.velocity, rate);
     m.kinetic = law.inertia * sum[0] / 2;
     m.dissipation = law.viscosity * sum[1] + law.friction * sum[0];
     if (!law.flows) {  // without an error of the projection of -grad p
-        const Eigen::RowVectorXd load = stepper.flux(s.u, mesh, m.fields).transpose();
+        const Eigen::RowVectorXd load = surface.flux(s.u, mesh, m.fields).transpose();
         m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
     }
     m.acceleration = law.inertia * sum[4] / 2;

@@ -3,7 +3,7 @@
 
 #include "surface3d/curvature/bending_force.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
-#include "surface3d/motion/motion_step.hpp"
+#include "surface3d/motion/moving_surface.hpp"
 
 namespace tubule::surface3d {
 
@@ -26,8 +26,9 @@ struct MotionMeasures {
     Eigen::Vector3d least_symbol;  // where it is
 };
 
-// `stepper` made the state; its projection is brought to the surface of the state.
-MotionMeasures measure(MotionStepper& stepper, const MotionState& state, const Bending& bending);
+// Of a state on the mesh of `surface`, whose projection is brought there. `before`: where the step that led to it
+// began; the acceleration is 0 without.
+MotionMeasures measure(MovingSurface& surface, const MotionState& state, const MotionState* before = nullptr);
 
 // INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.
 double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);

@@ -68,19 +68,14 @@ double MotionAttempt::length() const {
     return std::sqrt(memory_.area);
 }
 
-void MotionAttempt::make_stepper(const CurvedMesh& mesh) {
-    SurfaceLaw law = motion_law(case_.model);
-    if (case_.surface.scheme == Scheme::paper) {
-        law.flows = true;  // it has all components of u in all models
-        paper_ = std::make_unique<PaperStepper>(mesh, law, case_.energy, case_.surface.smoothing);
-    }
+void MotionAttempt::use_mesh(const CurvedMesh& mesh) {
     const MotionControl control{.area = memory_.area,
                                 .volume = memory_.volume,
                                 .relaxation = memory_.relaxation,
                                 .follow_curvature = case_.surface.follow_curvature,
                                 .least_variation = memory_.least_variation,
-                                .scheme = time_scheme(case_)};
-    stepper_ = std::make_unique<MotionStepper>(mesh, law, case_.energy, control);
+                                .smoothing = case_.surface.smoothing};
+    scheme_ = make_scheme(time_scheme(case_), mesh, motion_law(case_.model), case_.energy, control);
     summary.elements = mesh.triangles();
 }
 
@@ -95,11 +90,11 @@ void MotionAttempt::begin(const Start& from) {
     remember_start(case_, start, space, memory_);
     memory_.next_step =
         case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end - begin_time(case_)));
-    make_stepper(start.mesh);
+    use_mesh(start.mesh);
     const VectorField u = start_velocity(case_, start);
-    state_ = u.size() > 0 ? stepper_->start(start.mesh, u.transpose().reshaped()) : stepper_->start(start.mesh);
+    state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped()) : surface().start(start.mesh);
     state_.time = begin_time(case_);
-    if (stepper_->law().inertia == 0 && !paper_) set_moving();
+    if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
     look();
     memory_.total_start = memory_.lowest_total = total();
     trace.add(state_.time, now_.bending.energy);
@@ -107,23 +102,22 @@ void MotionAttempt::begin(const Start& from) {
     write_frame();
 }
 
-// Without inertia the surface is not at rest at the start: the velocity of a very short step. Where there is none, the
-// first step says why.
+// Without inertia the surface is not at rest at the start: the velocity of a very short step, which the error of the
+// first one is measured by. Where there is none, the first step says why.
 void MotionAttempt::set_moving() {
     try {
-        const MotionState soon = stepper_->step(state_, moment * memory_.next_step).state;
+        const MotionState soon = scheme_->step(state_, moment * memory_.next_step).state;
         if (!is_finite(soon)) return;
-        state_.u = state_.u_past = soon.u;
-        state_.w = state_.w_past = soon.w;
+        state_.u = soon.u, state_.w = soon.w;
         state_.p = soon.p, state_.lambda = soon.lambda;
     } catch (const SolveError&) {
     }
 }
 
 void MotionAttempt::resume(const Restart& restart) {
-    auto [state, memory] = motion_restart(restart.record);
+    auto [state, memory] = motion_restart(restart.record, time_scheme(case_));
     memory_ = memory;
-    make_stepper(curved_mesh(restart.cells.value(), array("points", state.X)));
+    use_mesh(curved_mesh(restart.cells.value(), array("points", state.X)));
     state_ = std::move(state);
     look();
     next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), state_.time) - outputs_.begin();
@@ -133,12 +127,12 @@ void MotionAttempt::resume(const Restart& restart) {
 }
 
 void MotionAttempt::look() {
-    now_ = measure(*stepper_, state_, case_.energy);
+    now_ = measure(surface(), state_);
 }
 
 // A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
 std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const VectorField& X) const {
-    return find_impossible_motion(o, stepper_->mesh(X), reported() ? 0.01 : 0.05, state_.time);
+    return find_impossible_motion(o, surface().mesh(X), reported() ? 0.01 : 0.05, state_.time);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
@@ -156,19 +150,19 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
         return Refusal{0.25, {Stop::solver_failed, t, what, "try other elements, or another discretisation.order"}};
     };
     try {
-        const MotionStep next = paper_ ? paper_->step(state_, tau) : stepper_->step(state_, tau);
+        const MotionStep next = scheme_->step(state_, tau);
         if (!is_finite(next.state)) return failed("the step overflows");
         const double error = next.error / (memory_.settings.tolerance * length());
         if (!case_.surface.step && error > 2)
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
                             "ask for less accuracy, or use more elements"}};
-        const CurvedMesh mesh = stepper_->mesh(next.state.X);
+        const CurvedMesh mesh = surface().mesh(next.state.X);
         if (auto fold = find_fold(mesh_quality(mesh))) {
             fold->time = t;
             return Refusal{0.25, *fold};
         }
-        const MotionMeasures m = measure(*stepper_, next.state, case_.energy);
+        const MotionMeasures m = measure(surface(), next.state, &state_);
         if (const auto refusal = judge(next, m)) return refusal;
         take(next, m);
         set_next_step(tau, memory_.next_step, error);
@@ -198,7 +192,7 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 }
 
 bool MotionAttempt::wants_new_mesh() const {
-    if (paper_ || memory_.steps < memory_.mesh_since + steps_between_meshes) return false;
+    if (!traits().controls_mesh || memory_.steps < memory_.mesh_since + steps_between_meshes) return false;
     const double most = turn_to_remesh * (reported() ? 1 : farther_apart);
     return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > most);
 }
@@ -208,19 +202,19 @@ bool MotionAttempt::wants_new_mesh() const {
 // when it will do no longer.
 void MotionAttempt::make_new_mesh() {
     memory_.mesh_since = memory_.steps;
-    const int n = static_cast<int>(state_.X.cols()), d = stepper_->law().components();
-    const auto found = remesh(stepper_->mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
+    const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
+    const auto found = remesh(surface().mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
     const double time = state_.time, energy = now_.bending.energy, before = total();
-    const Eigen::VectorXd momenta = stepper_->momenta(state_);
+    const Eigen::VectorXd momenta = surface().momenta(state_);
     const int old_elements = summary.elements;
-    std::unique_ptr<MotionStepper> old = std::move(stepper_);
-    make_stepper(better->mesh);
+    std::unique_ptr<TimeScheme> old = std::move(scheme_);
+    use_mesh(better->mesh);
     try {
-        state_ = stepper_->start(better->mesh, better->fields.transpose().reshaped(), momenta);
+        state_ = surface().start(better->mesh, better->fields.transpose().reshaped(), momenta);
     } catch (const SolveError&) {
-        stepper_ = std::move(old), summary.elements = old_elements;
+        scheme_ = std::move(old), summary.elements = old_elements;
         return;
     }
     ++memory_.meshes;
@@ -275,7 +269,7 @@ std::optional<StopReport> MotionAttempt::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
     if (auto bad = find_bad_shape(now_, case_.accuracy.r_min, t)) return bad;
     if (auto rise = find_slow_rise((total() - memory_.lowest_total) / memory_.reference_energy, asked, t)) return rise;
-    if (!paper_ && stepper_->law().keeps_volume)
+    if (traits().controls_mesh && surface().law().keeps_volume)
         if (auto drift = find_drift(now_.bending.volume / memory_.volume - 1, asked, t)) return drift;
     return std::nullopt;
 }
@@ -287,7 +281,7 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
     memory_.moved += state_.step * now_.speed;
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
     memory_.moved = 0;
-    auto crossing = find_self_intersection(stepper_->mesh(state_.X));
+    auto crossing = find_self_intersection(surface().mesh(state_.X));
     if (crossing) crossing->time = state_.time;
     return crossing;
 }
@@ -298,7 +292,7 @@ std::optional<StopReport> MotionAttempt::check_progress() {
     if (auto pause = find_pause(case_, watch_, started_, t)) return pause;
     if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.reference_energy)
         return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
-    return crawl_.look(t, state_.step, first_step * memory_.relaxation, memory_.lowest_total / memory_.reference_energy,
+    return stall_.look(t, state_.step, first_step * memory_.relaxation, memory_.lowest_total / memory_.reference_energy,
                        case_.accuracy.energy);
 }
 
@@ -334,8 +328,8 @@ void MotionAttempt::write_checkpoint() {
 }
 
 Record MotionAttempt::record() const {
-    const std::size_t mesh = watch_.mesh(cells_of(stepper_->mesh(state_.X)));
-    Record out = motion_record(*stepper_, state_, now_, case_.energy, memory_, mesh);
+    const std::size_t mesh = watch_.mesh(cells_of(surface().mesh(state_.X)));
+    Record out = motion_record(surface(), state_, now_, memory_, mesh);
     out.arrays.push_back(trace.array(own_trace));
     if (coarser_) out.arrays.push_back(coarser_->array(coarser_trace));
     return out;
@@ -345,7 +339,7 @@ void MotionAttempt::summarise(const StopReport& stop) {
     summary.stop = stop;
     summary.energy = now_.bending.energy;
     summary.reference_energy = memory_.reference_energy;
-    if (!stepper_) return;
+    if (!scheme_) return;
     write_row();
     if (!can_go_on(stop.reason))
         write_frame();

@@ -9,7 +9,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/run.hpp"
-#include "surface3d/motion/paper_scheme.hpp"
+#include "surface3d/motion/schemes/time_scheme.hpp"
 #include "surface3d/run/motion_checks.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_run.hpp"
@@ -51,7 +51,7 @@ private:
     };
 
     // The start.
-    void make_stepper(const CurvedMesh& mesh);
+    void use_mesh(const CurvedMesh& mesh);
     void set_moving();
     void look();
 
@@ -79,6 +79,8 @@ private:
     void summarise(const StopReport& stop);
     Record record() const;
 
+    const SchemeEntry& traits() const { return entry(time_scheme(case_)); }
+    MovingSurface& surface() const { return scheme_->surface(); }
     bool reported() const { return memory_.settings.role == Role::reported; }
     double seconds() const;
     double length() const;
@@ -90,12 +92,11 @@ private:
     RunObserver& watch_;
     const MotionTrace* coarser_;
     Clock::time_point started_;
-    std::unique_ptr<MotionStepper> stepper_;
-    std::unique_ptr<PaperStepper> paper_;  // makes the steps instead where the case says so
+    std::unique_ptr<TimeScheme> scheme_;
     MotionState state_;
     MotionMeasures now_;
     MotionMemory memory_;
-    Crawl crawl_;
+    StallDetector stall_;
     std::optional<StopReport> early_;  // nothing can be begun, or nothing is left to do
     std::vector<double> outputs_;
     std::size_t next_output_ = 0;

@@ -34,7 +34,7 @@ std::optional<StopReport> find_drift(double change, double asked, double time);
 // Steps that lead nowhere: a hundred in which neither time goes on by a thousandth nor the lowest energy falls by a
 // tenth of the accuracy asked, while steps are shorter than `tiny`. A run that follows a singularity by shorter and
 // shorter steps is none, as its energy falls.
-class Crawl {
+class StallDetector {
 public:
     std::optional<StopReport> look(double time, double step, double tiny, double lowest_energy, double asked);
 

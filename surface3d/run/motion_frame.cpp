@@ -1,6 +1,7 @@
 #include "surface3d/run/motion_frame.hpp"
 
 #include "common/result/record.hpp"
+#include "surface3d/motion/schemes/time_scheme.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -9,15 +10,8 @@ namespace {
 template <class Fields, class State>
 void state_fields(Fields&& f, State& s) {
     const auto nodes = s.X.cols();
-    f.number("restart_step", s.step), f.number("restart_lambda", s.lambda), f.number("restart_lag", s.lag);
-    f.number("restart_solved_time", s.solved.time), f.number("restart_solved_lambda", s.solved.lambda);
-    f.number("restart_missed_area", s.missed.area), f.number("restart_missed_volume", s.missed.volume);
-    f.array("restart_w", s.w, nodes), f.array("restart_u", s.u);
-    f.array("restart_X_past", s.X_past, nodes), f.array("restart_w_past", s.w_past, nodes);
-    f.array("restart_u_past", s.u_past, s.u.size());
-    f.optional_array("restart_p", s.p);
-    f.optional_array("restart_X_rate", s.X_rate, nodes), f.optional_array("restart_u_rate", s.u_rate, s.u.size());
-    f.optional_array("restart_solved_p", s.solved.p);
+    f.number("restart_step", s.step), f.number("restart_lambda", s.lambda);
+    f.array("restart_w", s.w, nodes), f.array("restart_u", s.u), f.optional_array("restart_p", s.p);
 }
 template <class Fields, class Memory>
 void memory_fields(Fields&& f, Memory& m) {
@@ -37,8 +31,9 @@ void memory_fields(Fields&& f, Memory& m) {
 
 }  // namespace
 
-Record motion_record(const MotionStepper& stepper, const MotionState& s, const MotionMeasures& m,
-                     const Bending& bending, const MotionMemory& memory, std::size_t mesh_number) {
+Record motion_record(const MovingSurface& surface, const MotionState& s, const MotionMeasures& m,
+                     const MotionMemory& memory, std::size_t mesh_number) {
+    const Bending& bending = surface.bending();
     Record out;
     out.time = s.time, out.mesh = mesh_number, out.kind = RecordKind::surface;
     out.numbers = {{"energy", m.bending.energy}};
@@ -46,20 +41,23 @@ Record motion_record(const MotionStepper& stepper, const MotionState& s, const M
     for (int i = 0; i < density_at.size(); ++i) density_at[i] = density(bending, m.fields.H[i], m.fields.K[i]).f;
     const Eigen::VectorXd u_n = m.velocity.cwiseProduct(m.fields.normal).colwise().sum().transpose();
     out.arrays = {array("points", s.X), array("normal", m.fields.normal), array("u", m.velocity), array("u_n", u_n)};
-    if (s.p.size() > 0) out.arrays.push_back(array("p", stepper.pressure_at_nodes(s)));
+    if (s.p.size() > 0) out.arrays.push_back(array("p", surface.pressure_at_nodes(s)));
     for (const Array& more : {array("H", m.fields.H), array("K", m.fields.K), array("energy_density", density_at)})
         out.arrays.push_back(more);
     state_fields(RecordWriter(out), s);
-    memory_fields(RecordWriter(out), memory);
+    RecordWriter writer(out);
+    if (s.memory) s.memory->save(writer, s);
+    memory_fields(writer, memory);
     return out;
 }
 
-MotionRestart motion_restart(const Record& record) {
+MotionRestart motion_restart(const Record& record, Scheme scheme) {
     MotionRestart out;
     const RecordReader reader(record, RecordKind::surface);
     out.state.time = record.time;
     reader.array("points", out.state.X);
     state_fields(reader, out.state);
+    if (out.state.step > 0) out.state.memory = restored_memory(scheme, reader, out.state);
     memory_fields(reader, out.memory);
     return out;
 }

@@ -25,15 +25,15 @@ struct MotionMemory {
 
 // Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest
 // of the state under names that begin with restart_.
-Record motion_record(const MotionStepper& stepper, const MotionState& state, const MotionMeasures& measures,
-                     const Bending& bending, const MotionMemory& memory, std::size_t mesh_number);
+Record motion_record(const MovingSurface& surface, const MotionState& state, const MotionMeasures& measures,
+                     const MotionMemory& memory, std::size_t mesh_number);
 
 struct MotionRestart {
     MotionState state;
     MotionMemory memory;
 };
 
-// Throws as RecordReader.
-MotionRestart motion_restart(const Record& record);
+// Of a run with this scheme. Throws as RecordReader.
+MotionRestart motion_restart(const Record& record, Scheme scheme);
 
 }  // namespace tubule::surface3d

@@ -56,7 +56,7 @@ public:
     Pairs(const Case& c, const Start& start, RunObserver& watch, const Restart* restart)
         : case_(c), start_(start), watch_(watch), restart_(restart), settings_(first_settings(c)) {
         if (restart) {
-            begun_ = motion_restart(restart->record).memory.settings;
+            begun_ = motion_restart(restart->record, time_scheme(c)).memory.settings;
             if (begun_->role == Role::reported) settings_ = *begun_, coarse_.trace = {restart->record, coarser_trace};
         }
     }
@@ -158,8 +158,8 @@ std::vector<std::string> motion_series_names(const Case&) {
     return motion_names();
 }
 
-void check_restart(const Record& record) {
-    motion_restart(record);
+void check_restart(const Case& c, const Record& record) {
+    motion_restart(record, time_scheme(c));
 }
 
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {

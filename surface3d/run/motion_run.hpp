@@ -14,7 +14,7 @@ namespace tubule::surface3d {
 std::vector<std::string> motion_series_names(const Case& c);
 
 // Throws std::runtime_error if the record does not hold what a run goes on from.
-void check_restart(const Record& record);
+void check_restart(const Case& c, const Record& record);
 
 // Each run is one of a pair: the energies of the coarser one, of fewer triangles and larger steps, tell the error of
 // the finer one, which is written. Pairs become finer until the energy is as accurate as asked at all times.

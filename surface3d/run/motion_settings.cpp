@@ -22,7 +22,7 @@ double tolerance_for(double accuracy) {
 }  // namespace
 
 Scheme time_scheme(const Case& c) {
-    return c.surface.scheme.value_or(motion_law(c.model).inertia != 0 ? Scheme::alpha : Scheme::bdf2);
+    return c.surface.scheme.value_or(default_scheme(motion_law(c.model).inertia != 0));
 }
 
 MotionSettings first_settings(const Case& c) {

@@ -19,7 +19,7 @@ struct MotionSettings {
     Role role = Role::reported;
 };
 
-// The case's, or alpha for fluids and bdf2 for what has no inertia.
+// The case's, or the default of its model.
 Scheme time_scheme(const Case& c);
 
 // What the case gives, or what its accuracy asks for.

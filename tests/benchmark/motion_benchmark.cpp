@@ -30,20 +30,20 @@ void add(const char* name, const Prepare& prepare) {
 }
 
 void add_all() {
-    add("step", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.stepper.step(s.state, tau)); }; });
-    add("fields", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.stepper.fields(s.mesh)); }; });
+    add("step", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.scheme->step(s.state, tau)); }; });
+    add("fields", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(s.surface.fields(s.mesh)); }; });
     add("assemble", [](Scene& s) {
-        return [&s] { assemble(s.stepper.space(), s.stepper.unknowns(), fluid, energy, s.base, s.system); };
+        return [&s] { assemble(s.surface.space(), s.solver.unknowns(), fluid, energy, s.base, s.system); };
     });
     add("lu", [](Scene& s) {
-        const MotionUnknowns& u = s.stepper.unknowns();
+        const MotionUnknowns& u = s.solver.unknowns();
         auto solver = std::make_shared<SparseLuLarge>(nested_dissection(u.pattern(), u.node_of_unknown()));
         return [&s, solver] {
             solver->factor(s.system.A);
             benchmark::DoNotOptimize(solver->solve(s.system.b, 1));
         };
     });
-    add("measure", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(measure(s.stepper, s.state, energy)); }; });
+    add("measure", [](Scene& s) { return [&s] { benchmark::DoNotOptimize(measure(s.surface, s.state)); }; });
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "surface3d/mesh/base_meshes.hpp"
-#include "surface3d/motion/motion_step.hpp"
+#include "surface3d/motion/schemes/one_stage.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
@@ -13,27 +13,31 @@ inline constexpr double tau = 1e-3;
 
 inline MotionControl control_of(const CurvedMesh& mesh) {
     const Extent e = extent(SurfaceSpace(mesh), mesh);
-    return {.area = e.area, .volume = e.volume, .scheme = Scheme::alpha};
+    return {.area = e.area, .volume = e.volume};
 }
 
 // The surface after a few steps, and the system of the next one.
 struct Scene {
     CurvedMesh mesh;
-    MotionStepper stepper;
-    MotionState state;
+    std::unique_ptr<TimeScheme> scheme;
+    MovingSurface& surface;
+    const StepSolver& solver;
+    MotionState state, before;
     MotionFields fields;
     StepBase base;
     StepSystem system;
 
     Scene(int n, int order)
         : mesh(mapped_mesh(icosphere(n), order, map_of(perturbed_sphere()))),
-          stepper(mesh, fluid, energy, control_of(mesh)),
-          state(stepper.start(mesh)) {
-        for (int i = 0; i < 3; ++i) state = stepper.step(state, tau).state;
-        mesh = stepper.mesh(state.X);
-        fields = stepper.fields(mesh);
-        base = {&mesh, fields, state.X - state.X_past, state.w, state.u, state.u, tau};
-        assemble(stepper.space(), stepper.unknowns(), fluid, energy, base, system);
+          scheme(make_scheme(scheme_named("alpha"), mesh, fluid, energy, control_of(mesh))),
+          surface(scheme->surface()),
+          solver(dynamic_cast<OneStageScheme&>(*scheme).solver()),
+          state(surface.start(mesh)) {
+        for (int i = 0; i < 3; ++i) before = std::exchange(state, scheme->step(state, tau).state);
+        mesh = surface.mesh(state.X);
+        fields = surface.fields(mesh);
+        base = {&mesh, fields, state.X - before.X, state.w, state.u, state.u, tau};
+        assemble(surface.space(), solver.unknowns(), fluid, energy, base, system);
     }
 };
 

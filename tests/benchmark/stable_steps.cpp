@@ -29,16 +29,14 @@ int main(int argc, char** argv) {
     fmt::print("scheme,model,k42,triangles,h,smoothing,step,steps,largest,last,stable\n");
     for (int i = 6; i < argc; ++i) {
         const double tau = std::atof(argv[i]);
-        const auto report = [&](auto&& stepper) {
-            const EnergyRun run = run_steps(stepper, mesh, bending, tau, 60, 10);
-            fmt::print("{},{},{},{},{:.3f},{},{},{},{:.4g},{:.4g},{}\n", scheme, model, k42, mesh.triangles(), h,
-                       smoothing, tau, run.steps, run.largest / run.first, run.last / run.first,
-                       run.largest < 1.1 * run.first ? "yes" : "no");
-            std::fflush(stdout);
-        };
-        if (scheme == "paper")
-            report(PaperStepper(mesh, law, bending, smoothing * h * h));
-        else
-            report(MotionStepper(mesh, law, bending, kept(mesh)));
+        MotionControl control = kept(mesh);
+        control.smoothing = smoothing * h * h;
+        const auto made =
+            make_scheme(scheme == "paper" ? scheme_named("paper") : scheme_named("bdf2"), mesh, law, bending, control);
+        const EnergyRun run = run_steps(*made, tau, 60, 10);
+        fmt::print("{},{},{},{},{:.3f},{},{},{},{:.4g},{:.4g},{}\n", scheme, model, k42, mesh.triangles(), h, smoothing,
+                   tau, run.steps, run.largest / run.first, run.last / run.first,
+                   run.largest < 1.1 * run.first ? "yes" : "no");
+        std::fflush(stdout);
     }
 }

@@ -196,18 +196,17 @@ Ordering curvatures(const MotionUnknowns& unknowns, const Ordering& by_nodes) {
 
 void solvers(Size size) {
     Scene scene(size.n, size.k);
-    MotionStepper& stepper = scene.stepper;
-    const MotionUnknowns& unknowns = stepper.unknowns();
+    const MotionUnknowns& unknowns = scene.solver.unknowns();
     const std::vector<int>& nodes = unknowns.node_of_unknown();
     const int repeats = 5;
     const auto add = [&](const Row& row) { print("solvers", size, row); };
     Row step{"a step"};
-    step.whole = least(repeats, cpu_milliseconds, [&] { stepper.step(scene.state, tau); });
+    step.whole = least(repeats, cpu_milliseconds, [&] { scene.scheme->step(scene.state, tau); });
     add(step);
-    const Matrix A = stepper.system().A;
-    const Vector b = stepper.system().b;
+    const Matrix A = scene.solver.system().A;
+    const Vector b = scene.solver.system().b;
     BorderedSolver bordered(unknowns.pattern(), nodes);
-    const Eigen::MatrixXd C = stepper.system().flux;
+    const Eigen::MatrixXd C = scene.solver.system().flux;
     bordered.solve(A, b, C, Vector::Zero(1));
     Row own{"its system, with border"};
     own.whole = least(repeats, cpu_milliseconds, [&] { bordered.solve(A, b, C, Vector::Zero(1)); });
@@ -262,20 +261,20 @@ void lagged(Size size) {
     constexpr int steps = 40;
     constexpr double asked = 1e-4, safety = 0.85, growth = 1.6;  // of motion_attempt.cpp
     Scene scene(size.n, size.k);
-    MotionStepper& stepper = scene.stepper;
-    const MotionUnknowns& unknowns = stepper.unknowns();
-    const double wanted = asked * std::sqrt(extent(stepper.space(), scene.mesh).area);
+    const MotionUnknowns& unknowns = scene.solver.unknowns();
+    const double wanted = asked * std::sqrt(extent(scene.surface.space(), scene.mesh).area);
     const Ordering by_nodes = nested_dissection(unknowns.pattern(), unknowns.node_of_unknown());
     const int repeats = size.n < 8 ? 2 : 1;
     std::vector<Lagged> all;
     for (const int lag : {1, 2, 4, 8})
         all.push_back({lag, SparseLdlt<float>(by_nodes, regularisation), {fmt::format("factors kept for {}", lag)}});
-    for (Lagged& l : all) l.factors.factor(stepper.system().A);  // analysis is not counted
+    for (Lagged& l : all) l.factors.factor(scene.solver.system().A);  // analysis is not counted
     Gmres gmres(unknowns.size());
     double length = tau;
     for (int i = 0; i < steps; ++i) {
-        MotionStep step = stepper.step(scene.state, length);
-        for (Lagged& l : all) solve_lagged(l, i % l.lag == 0, stepper.system().A, stepper.system().b, gmres, repeats);
+        MotionStep step = scene.scheme->step(scene.state, length);
+        for (Lagged& l : all)
+            solve_lagged(l, i % l.lag == 0, scene.solver.system().A, scene.solver.system().b, gmres, repeats);
         length *= std::clamp(safety * std::cbrt(wanted / step.error), 0.3, growth);
         if (step.error < 2 * wanted) scene.state = std::move(step.state);
     }
@@ -288,7 +287,7 @@ void lagged(Size size) {
 
 void threads(Size size) {
     Scene scene(size.n, size.k);
-    const MotionUnknowns& unknowns = scene.stepper.unknowns();
+    const MotionUnknowns& unknowns = scene.solver.unknowns();
     for (const int count : {1, 2}) {
         omp_set_num_threads(count);
         const auto add = [&](const char* what, const std::function<void()>& work) {
@@ -297,12 +296,12 @@ void threads(Size size) {
             row.whole = least(15, wall_milliseconds, work), row.clock = "wall", row.threads = count;
             print("threads", size, row);
         };
-        add("a step", [&] { scene.stepper.step(scene.state, tau); });
-        const StepSystem& system = scene.stepper.system();
+        add("a step", [&] { scene.scheme->step(scene.state, tau); });
+        const StepSystem& system = scene.solver.system();
         BorderedSolver bordered(unknowns.pattern(), unknowns.node_of_unknown());
         add("its system, with border", [&] { bordered.solve(system.A, system.b, system.flux, Vector::Zero(1)); });
         StepSystem again;
-        add("its assembly", [&] { assemble(scene.stepper.space(), unknowns, fluid, energy, scene.base, again); });
+        add("its assembly", [&] { assemble(scene.surface.space(), unknowns, fluid, energy, scene.base, again); });
     }
     omp_set_num_threads(1);
 }

@@ -123,7 +123,9 @@ TEST(Guards, SpeakWhereANumberIsNone) {
 
 TEST(Guards, AStateIsFiniteInAllItsParts) {
     const double none = std::numeric_limits<double>::quiet_NaN();
-    const MotionState well = at_rest(mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}})), 3, 4);
+    const CurvedMesh mesh = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}}));
+    const MotionLaw law = motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}});
+    const MotionState well = MovingSurface(mesh, law, {.k = {1}}, {}).start(mesh);
     EXPECT_TRUE(is_finite(well));
     MotionState s = well;
     s.X(1, 2) = none;
@@ -183,10 +185,10 @@ TEST(Guards, AdviseNothingThatACaseRefuses) {
 
 // How many steps of one length are taken from t = 1 until they are found to lead nowhere, at most `most`.
 int steps_taken(double step, double fall, int most) {
-    Crawl crawl;
+    StallDetector stall;
     double time = 1, energy = 1;
     for (int taken = 0; taken < most; ++taken) {
-        if (const auto stuck = crawl.look(time, step, 1e-4, energy, 1e-2)) {
+        if (const auto stuck = stall.look(time, step, 1e-4, energy, 1e-2)) {
             EXPECT_EQ(stuck->reason, Stop::solver_failed);
             EXPECT_NE(stuck->message.find("stuck with steps of"), std::string::npos);
             return taken;
@@ -196,19 +198,19 @@ int steps_taken(double step, double fall, int most) {
     return most;
 }
 
-TEST(Crawl, OnlyStepsThatLeadNowhere) {
+TEST(StallDetector, OnlyStepsThatLeadNowhere) {
     EXPECT_EQ(steps_taken(1e-6, 0, 1000), 101);      // the first look is where it begins
     EXPECT_EQ(steps_taken(2e-5, 0, 1000), 1000);     // a thousandth of the time in 50 steps
     EXPECT_EQ(steps_taken(1e-6, 2e-5, 1000), 1000);  // a tenth of the accuracy in 50 steps
     EXPECT_EQ(steps_taken(1e-6, 5e-6, 1000), 101);   // in 200
 }
 
-TEST(Crawl, FollowsASingularity) {
+TEST(StallDetector, FollowsASingularity) {
     // Steps of 1/125 of what is left until t = 1, as near a pinch-off asked for 1e-4; the energy falls with the root.
-    Crawl crawl;
+    StallDetector stall;
     for (int i = 0; i < 1500; ++i) {
         const double left = std::pow(1 - 1.0 / 125, i);
-        ASSERT_FALSE(crawl.look(1 - left, left / 125, 1e-3, std::sqrt(left), 1e-4)) << "left: " << left;
+        ASSERT_FALSE(stall.look(1 - left, left / 125, 1e-3, std::sqrt(left), 1e-4)) << "left: " << left;
     }
 }
 
@@ -227,16 +229,16 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
             control.least_variation =
                 std::max(1e-9, 4 * noise_of_H(space, mesh, motion_fields(space, mesh, Projection(space, mesh))));
             const MotionLaw law = motion_law({.kind = kind, .Re = 1, .gamma = 1, .keeps_volume = {}});
-            MotionStepper stepper(mesh, law, bending, control);
-            const MotionState start = stepper.start(mesh);
-            EXPECT_NEAR(extent(space, stepper.mesh(start.X)).area / *control.area, 1, 1e-12);
+            const auto scheme = make_scheme(scheme_named("bdf2"), mesh, law, bending, control);
+            const MotionState start = scheme->surface().start(mesh);
+            EXPECT_NEAR(extent(space, scheme->surface().mesh(start.X)).area / *control.area, 1, 1e-12);
             // A sphere's radius grows by half as much, relatively, a tube's by as much.
             const double most = (start.X - node_positions(mesh)).colwise().norm().maxCoeff();
             EXPECT_NEAR(most, tube ? 1e-6 : 0.5e-6, 2e-7);
             // Nor do steps correct the volume: they are those of a run without that defect.
             control.volume = now.volume;
-            MotionStepper other(mesh, law, bending, control);
-            EXPECT_EQ(stepper.step(start, 1e-6).state.X, other.step(other.start(mesh), 1e-6).state.X);
+            const auto other = make_scheme(scheme_named("bdf2"), mesh, law, bending, control);
+            EXPECT_EQ(scheme->step(start, 1e-6).state.X, other->step(other->surface().start(mesh), 1e-6).state.X);
         }
     }
 }

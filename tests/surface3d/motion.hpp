@@ -9,7 +9,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/motion/motion_measures.hpp"
-#include "surface3d/motion/motion_step.hpp"
+#include "surface3d/motion/schemes/time_scheme.hpp"
 
 namespace tubule::surface3d {
 
@@ -24,10 +24,12 @@ inline CurvedMesh tube_mesh(const Tube& tube, int n_z, int n_theta, int order) {
 
 // From rest, in steps of one size. Area and volume are held at those of the start, as in a run.
 struct Motion {
-    Motion(const CurvedMesh& mesh, const Model& model, const Bending& bending, MotionControl control = {})
+    Motion(const CurvedMesh& mesh, const Model& model, const Bending& bending, MotionControl control = {},
+           Scheme name = scheme_named("bdf2"))
         : bending(bending),
-          stepper(mesh, motion_law(model), bending, held(mesh, control)),
-          state(stepper.start(mesh)) {}
+          scheme(make_scheme(name, mesh, motion_law(model), bending, held(mesh, control))),
+          surface(scheme->surface()),
+          state(surface.start(mesh)) {}
 
     static MotionControl held(const CurvedMesh& mesh, MotionControl control) {
         const Extent e = extent(SurfaceSpace(mesh), mesh);
@@ -35,14 +37,15 @@ struct Motion {
         return control;
     }
     void steps(double tau, int n) {
-        for (int i = 0; i < n; ++i) state = stepper.step(state, tau).state;
+        for (int i = 0; i < n; ++i) state = scheme->step(state, tau).state;
     }
     void until(double end, int n) { steps(end / n, n); }
-    CurvedMesh mesh() const { return stepper.mesh(state.X); }
-    MotionMeasures measures() { return measure(stepper, state, bending); }
+    CurvedMesh mesh() const { return surface.mesh(state.X); }
+    MotionMeasures measures() { return measure(surface, state); }
 
     Bending bending;
-    MotionStepper stepper;
+    std::unique_ptr<TimeScheme> scheme;
+    MovingSurface& surface;
     MotionState state;
 };
 

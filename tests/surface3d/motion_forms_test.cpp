@@ -326,7 +326,7 @@ Eigen::VectorXd joined(const BorderedSolver::Answer& answer) {
     return all;
 }
 
-// As MotionStepper scales it.
+// As StepSolver scales it.
 void scale(AtRest& rest) {
     Eigen::VectorXd by = Eigen::VectorXd::Ones(rest.unknowns.size());
     const int n = rest.mesh.size();

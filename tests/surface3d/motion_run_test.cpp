@@ -168,10 +168,10 @@ TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
 }
 
 TEST(MotionRun, SchemeThatIsNotGivenIsThatOfTheModel) {
-    for (const auto& [kind, scheme] : {std::pair{"fluid", Scheme::alpha}, {"stokes", Scheme::bdf2}}) {
+    for (const auto& [kind, scheme] : {std::pair{"fluid", scheme_named("alpha")}, {"stokes", scheme_named("bdf2")}}) {
         const std::string model = std::string("model.kind=") + kind;
         EXPECT_EQ(time_scheme(begin(wavy, {model}).c), scheme);
-        EXPECT_EQ(time_scheme(begin(wavy, {model, "discretisation.scheme=euler"}).c), Scheme::euler);
+        EXPECT_EQ(time_scheme(begin(wavy, {model, "discretisation.scheme=euler"}).c), scheme_named("euler"));
     }
 }
 

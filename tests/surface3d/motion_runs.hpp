@@ -1,4 +1,4 @@
-// Short runs of either stepper, and their energies.
+// Short runs of time schemes, and their energies.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "surface3d/curvature/bending_force.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
-#include "surface3d/motion/paper_scheme.hpp"
+#include "surface3d/motion/schemes/paper.hpp"
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
@@ -25,17 +25,16 @@ inline MotionControl kept(const CurvedMesh& mesh) {
 }
 
 // Bending energy of the fields that drive the surface, and INT inertia u^2/2.
-template <class Stepper>
-double total_energy(const Stepper& stepper, const MotionState& state, const Bending& bending) {
-    const SurfaceSpace& space = stepper.space();
-    const CurvedMesh mesh = stepper.mesh(state.X);
+inline double total_energy(const MovingSurface& surface, const MotionState& state) {
+    const SurfaceSpace& space = surface.space();
+    const CurvedMesh mesh = surface.mesh(state.X);
     const MotionFields fields = motion_fields(space, mesh, Projection(space, mesh));
-    double energy = observe(space, mesh, {fields.normal, {}, fields.H, fields.K}, bending).energy;
-    if (stepper.law().inertia == 0) return energy;
+    double energy = observe(space, mesh, {fields.normal, {}, fields.H, fields.K}, surface.bending()).energy;
+    if (surface.law().inertia == 0) return energy;
     const Eigen::SparseMatrix<double> mass = mass_matrix(space, mesh);
     for (int d = 0; d < 3; ++d) {
         const Eigen::VectorXd u = state.u.segment(d * space.size(), space.size());
-        energy += stepper.law().inertia * u.dot(mass * u) / 2;
+        energy += surface.law().inertia * u.dot(mass * u) / 2;
     }
     return energy;
 }
@@ -47,16 +46,16 @@ struct EnergyRun {
 };
 
 // So many steps from rest, fewer where the energy exceeds `limit` times the first or a step fails.
-template <class Stepper>
-EnergyRun run_steps(Stepper& stepper, const CurvedMesh& mesh, const Bending& bending, double tau, int steps,
-                    double limit = std::numeric_limits<double>::infinity()) {
+inline EnergyRun run_steps(TimeScheme& scheme, double tau, int steps,
+                           double limit = std::numeric_limits<double>::infinity()) {
     EnergyRun out;
-    out.state = stepper.start(mesh);
-    out.first = out.largest = out.last = total_energy(stepper, out.state, bending);
+    const MovingSurface& surface = scheme.surface();
+    out.state = scheme.surface().start(surface.mesh());
+    out.first = out.largest = out.last = total_energy(surface, out.state);
     while (out.steps < steps && out.last <= limit * out.first) {
         try {
-            out.state = stepper.step(out.state, tau).state;
-            out.last = total_energy(stepper, out.state, bending);
+            out.state = scheme.step(out.state, tau).state;
+            out.last = total_energy(surface, out.state);
         } catch (const SolveError&) {
             out.last = std::numeric_limits<double>::infinity();
         }
@@ -71,9 +70,9 @@ EnergyRun run_steps(Stepper& stepper, const CurvedMesh& mesh, const Bending& ben
 inline double growth_by_the_paper(int n, double k42, double tau, int steps) {
     const CurvedMesh mesh = mapped_mesh(icosphere(n), 3, map_of(perturbed_sphere()));
     const Bending bending{.k = {0.125, 0, k42}, .H0 = 0};
-    PaperStepper stepper(mesh, motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}}), bending,
-                         0.01 * std::pow(longest_edge(mesh), 2));
-    const EnergyRun run = run_steps(stepper, mesh, bending, tau, steps, 10);
+    Paper paper(mesh, motion_law({.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}}), bending,
+                {.smoothing = 0.01 * std::pow(longest_edge(mesh), 2)});
+    const EnergyRun run = run_steps(paper, tau, steps, 10);
     return run.largest / run.first;
 }
 

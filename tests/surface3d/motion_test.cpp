@@ -8,7 +8,7 @@
 
 #include "common/theory/waves.hpp"
 #include "surface3d/meshing/remesh.hpp"
-#include "surface3d/motion/generalised_alpha.hpp"
+#include "surface3d/motion/schemes/alpha_numbers.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -107,18 +107,16 @@ TEST(SphereFlow, RadiusFollowsItsEquation) {
     EXPECT_NEAR(sphere_at(1, {.k = {0, 0.02, 0.1}}, 1).radius, std::pow(1 + 12 * 0.42, 1.0 / 6), 1e-12);
     const double end = 0.4, exact = sphere_at(end, all_terms, 1).radius;
     const auto error = [&](Scheme scheme, int steps, double uneven) {  // steps in turn short and so many times as long
-        MotionControl control;
-        control.scheme = scheme;
-        Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, control);
+        Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, {}, scheme);
         const double pair = 2 * end / steps, first = pair / (1 + uneven);
         for (int i = 0; i < steps; i += 2) motion.steps(first, 1), motion.steps(pair - first, 1);
         return std::abs(radius(motion.mesh()) - exact);
     };
-    for (const auto& [scheme, uneven, least, most] : {std::tuple{Scheme::alpha, 1.0, 3.3, 6e-4},
-                                                      {Scheme::alpha, 3.0, 3.3, 6e-4},
-                                                      {Scheme::bdf2, 1.0, 3.3, 5e-4},
-                                                      {Scheme::bdf2, 3.0, 3.3, 6e-4},
-                                                      {Scheme::euler, 1.0, 1.8, 1e-2}}) {
+    for (const auto& [scheme, uneven, least, most] : {std::tuple{scheme_named("alpha"), 1.0, 3.3, 6e-4},
+                                                      {scheme_named("alpha"), 3.0, 3.3, 6e-4},
+                                                      {scheme_named("bdf2"), 1.0, 3.3, 5e-4},
+                                                      {scheme_named("bdf2"), 3.0, 3.3, 6e-4},
+                                                      {scheme_named("euler"), 1.0, 1.8, 1e-2}}) {
         const double coarse = error(scheme, 10, uneven), fine = error(scheme, 20, uneven);
         EXPECT_GT(coarse / fine, least) << static_cast<int>(scheme) << ' ' << uneven;
         EXPECT_LT(fine, most) << static_cast<int>(scheme) << ' ' << uneven;
@@ -134,7 +132,7 @@ TEST(SphereFlow, VelocityConvergesWithTheMesh) {
             motion.steps(1e-8, 1);
             const CurvedMesh mesh = motion.mesh();
             const double rate =
-                motion.stepper.flux(motion.state.u, mesh, motion.stepper.fields(mesh)).sum() / (4 * pi * 1.5 * 1.5);
+                motion.surface.flux(motion.state.u, mesh, motion.surface.fields(mesh)).sum() / (4 * pi * 1.5 * 1.5);
             error[i] = std::abs(rate / exact - 1);
         }
         EXPECT_GT(std::log2(error[0] / error[1]), least) << order;
@@ -213,11 +211,9 @@ const Sphere wavy{.radius = 1, .modes = {{0.2, 2, 1}, {0.1, 3, 2}}};
 
 // Bending and kinetic energy and lambda at the end, in steps of one size; area and volume are kept.
 Eigen::Vector3d fluid_at(double end, int steps, Scheme scheme) {
-    MotionControl control;
-    control.scheme = scheme;
     Motion motion(mesh_of(wavy, icosphere(3), 4), {.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}},
-                  {.k = {0.125, 0, 0.05}, .H0 = 0}, control);
-    const Extent start = extent(motion.stepper.space(), motion.mesh());
+                  {.k = {0.125, 0, 0.05}, .H0 = 0}, {}, scheme);
+    const Extent start = extent(motion.surface.space(), motion.mesh());
     motion.until(end, steps);
     const MotionMeasures m = motion.measures();
     EXPECT_NEAR(m.bending.area / start.area, 1, 1e-8);
@@ -228,8 +224,9 @@ Eigen::Vector3d fluid_at(double end, int steps, Scheme scheme) {
 TEST(Models, FluidsByAlphaConvergeWithSecondOrder) {
     // Against itself on half the steps, and against backward differences, which have the same limit.
     const auto at = [](int steps, Scheme scheme) { return fluid_at(0.2, steps, scheme); };
-    const Eigen::Vector3d coarse = at(6, Scheme::alpha), fine = at(12, Scheme::alpha), finest = at(24, Scheme::alpha);
-    const Eigen::Vector3d other = at(24, Scheme::bdf2);
+    const Eigen::Vector3d coarse = at(6, scheme_named("alpha")), fine = at(12, scheme_named("alpha")),
+                          finest = at(24, scheme_named("alpha"));
+    const Eigen::Vector3d other = at(24, scheme_named("bdf2"));
     for (int i : {0, 1}) {
         EXPECT_GT((coarse[i] - fine[i]) / (fine[i] - finest[i]), 3) << i;
         EXPECT_LT(std::abs(fine[i] - finest[i]), 5e-5) << i;
@@ -244,10 +241,8 @@ TEST(Models, FluidsByAlphaConvergeWithSecondOrder) {
 // end.
 double change_left(const CurvedMesh& mesh, const Bending& energy, double omega, double tau, int steps) {
     constexpr double small = 1e-7;
-    MotionControl control;
-    control.scheme = Scheme::alpha;
     const Model model{.kind = ModelKind::fluid, .Re = 1, .gamma = 0.5, .keeps_volume = mesh.period == 0};
-    Motion one(mesh, model, energy, control), other(mesh, model, energy, control);
+    Motion one(mesh, model, energy, {}, scheme_named("alpha")), other(mesh, model, energy, {}, scheme_named("alpha"));
     const int n = mesh.size();
     for (Motion* motion : {&one, &other})
         for (int i = 0; i < n; ++i)
@@ -272,14 +267,13 @@ TEST(MeshWaves, DoNotGrowWhereTrianglesAreWideForTheCurvature) {
 TEST(Models, AlphaGoesOnFromAnotherScheme) {
     // A state without rates: an Euler step, no garbage.
     const Model model{.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}};
-    MotionControl control;
-    Motion motion(mesh_of(wavy, icosphere(2), 3), model, {.k = {0.125, 0, 0.05}, .H0 = 0}, control);
+    Motion motion(mesh_of(wavy, icosphere(2), 3), model, {.k = {0.125, 0, 0.05}, .H0 = 0});
     motion.steps(1e-3, 3);
-    control.scheme = Scheme::alpha;
-    MotionStepper alpha(motion.mesh(), motion_law(model), motion.bending, Motion::held(motion.mesh(), control));
-    const MotionState by_alpha = alpha.step(motion.state, 1e-3).state;
+    const auto alpha = make_scheme(scheme_named("alpha"), motion.mesh(), motion_law(model), motion.bending,
+                                   Motion::held(motion.mesh(), {}));
+    const MotionState by_alpha = alpha->step(motion.state, 1e-3).state;
     motion.steps(1e-3, 1);
-    EXPECT_EQ(by_alpha.u_rate.size(), by_alpha.u.size());
+    EXPECT_TRUE(by_alpha.memory);
     EXPECT_LT((by_alpha.u - motion.state.u).norm(), 0.3 * motion.state.u.norm());
 }
 
@@ -320,7 +314,7 @@ TEST(Models, AreaAndVolumeThatCannotBeKeptAreRefused) {
         MotionControl control{.area = e.area * area, .volume = e.volume * volume, .least_variation = 0.01};
         const Model model{.kind = kind, .Re = 1, .gamma = 1, .keeps_volume = true};
         try {
-            MotionStepper(mesh, motion_law(model), {.k = {1}}, control).start(mesh);
+            MovingSurface(mesh, motion_law(model), {.k = {1}}, control).start(mesh);
         } catch (const SolveError& refusal) {
             return refusal.what();
         }
@@ -350,12 +344,12 @@ TEST(Models, AFirstStepGoesOnWithTheVelocityOfTheStart) {
     Motion motion(mesh_of(wavy, icosphere(3), 3), {.kind = ModelKind::fluid, .Re = 1, .gamma = 0, .keeps_volume = {}},
                   {.k = {0.125, 0, 0.05}, .H0 = 0});
     const VectorField X = motion.state.X;
-    const MotionState start = motion.stepper.start(motion.mesh(), rigid(X, {0.1, 0.2, -0.3}, {1, 0.5, 2}));
-    const MotionFields fields = motion.stepper.fields(motion.mesh());
-    const Eigen::VectorXd flux = motion.stepper.flux(start.u, motion.mesh(), fields);
-    const Eigen::VectorXd flux_of_nodes = motion.stepper.flux(start.w.transpose().reshaped(), motion.mesh(), fields);
+    const MotionState start = motion.surface.start(motion.mesh(), rigid(X, {0.1, 0.2, -0.3}, {1, 0.5, 2}));
+    const MotionFields fields = motion.surface.fields(motion.mesh());
+    const Eigen::VectorXd flux = motion.surface.flux(start.u, motion.mesh(), fields);
+    const Eigen::VectorXd flux_of_nodes = motion.surface.flux(start.w.transpose().reshaped(), motion.mesh(), fields);
     EXPECT_LT((flux_of_nodes - flux).norm(), 1e-5 * flux.norm());
-    const double coarse = motion.stepper.step(start, 2e-2).error, fine = motion.stepper.step(start, 1e-2).error;
+    const double coarse = motion.scheme->step(start, 2e-2).error, fine = motion.scheme->step(start, 1e-2).error;
     EXPECT_GT(coarse / fine, 3);
     EXPECT_LT(coarse, 2e-3);
 }
@@ -365,19 +359,19 @@ TEST(Models, NewMeshesKeepMomenta) {
     // that.
     const Model model{.kind = ModelKind::fluid, .Re = 1, .gamma = 0.3, .keeps_volume = {}};
     Motion motion(mesh_of(wavy, icosphere(3), 3), model, {.k = {0.125, 0, 0.05}, .H0 = 0});
-    motion.state = motion.stepper.start(motion.mesh(), rigid(motion.state.X, {0.1, 0.2, -0.3}, {0.3, -0.2, 0.5}));
+    motion.state = motion.surface.start(motion.mesh(), rigid(motion.state.X, {0.1, 0.2, -0.3}, {0.3, -0.2, 0.5}));
     motion.until(0.02, 4);
     const int n = motion.mesh().size();
     const auto found = remesh(motion.mesh(), motion.state.u.reshaped(n, 3).transpose(), {.triangles = 400});
     ASSERT_TRUE(std::holds_alternative<Remeshed>(found));
     const Remeshed& other = std::get<Remeshed>(found);
     ASSERT_NE(other.mesh.size(), n);
-    MotionStepper stepper(other.mesh, motion_law(model), motion.bending, Motion::held(motion.mesh(), {}));
-    const Eigen::VectorXd u = other.fields.transpose().reshaped(), kept = motion.stepper.momenta(motion.state);
+    MovingSurface surface(other.mesh, motion_law(model), motion.bending, Motion::held(motion.mesh(), {}));
+    const Eigen::VectorXd u = other.fields.transpose().reshaped(), kept = motion.surface.momenta(motion.state);
     ASSERT_EQ(kept.size(), 6);
-    EXPECT_GT((stepper.momenta(stepper.start(other.mesh, u)) - kept).norm(), 1e-8 * kept.norm());
-    const MotionState state = stepper.start(other.mesh, u, kept);
-    EXPECT_LT((stepper.momenta(state) - kept).norm(), 1e-10 * kept.norm());
+    EXPECT_GT((surface.momenta(surface.start(other.mesh, u)) - kept).norm(), 1e-8 * kept.norm());
+    const MotionState state = surface.start(other.mesh, u, kept);
+    EXPECT_LT((surface.momenta(state) - kept).norm(), 1e-10 * kept.norm());
     EXPECT_LT((state.u - u).norm(), 1e-2 * u.norm());
 }
 
@@ -395,7 +389,6 @@ TEST(Models, MomentumDecaysByFriction) {
             const Eigen::Vector3d u = translation + omega.cross(motion.state.X.col(j));
             for (int d = 0; d < 3; ++d) motion.state.u[d * n + j] = u[d];
         }
-        motion.state.u_past = motion.state.u;
         const MotionMeasures start = motion.measures();
         motion.until(end, 16 << i);
         const MotionMeasures now = motion.measures();
@@ -420,7 +413,6 @@ TEST(Models, RotatingTubeStaysStraight) {
         motion.state.u[j] = -omega * motion.state.X(1, j);
         motion.state.u[n + j] = omega * motion.state.X(0, j);
     }
-    motion.state.u_past = motion.state.u;
     motion.until(0.5, 40);
     const MotionMeasures m = motion.measures();
     const double b0 = theory::radius_rate(theory::UniformTube{energy, R, 0});

@@ -1,13 +1,12 @@
 // The paper's scheme: its forces are those of the default scheme, it is of first order in time, and it has the limits
 // that the default is to be free of.
-#include "surface3d/motion/paper_scheme.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
 #include "surface3d/mesh/base_meshes.hpp"
+#include "surface3d/motion/schemes/paper.hpp"
 #include "tests/surface3d/motion_runs.hpp"
 
 namespace tubule::surface3d {
@@ -58,12 +57,13 @@ TEST(PaperScheme, FirstStepIsThatOfTheDefaultForEveryTerm) {
     for (const auto& [bending, difference] :
          {Term{{.k = {1, 0, 0}, .H0 = -1.5}, 0.005}, Term{{.k = {0, 0.02, 0}, .H0 = 1}, 0.005},
           Term{{.k = {0, 0, 1}, .H0 = 0}, 0.03}}) {
-        PaperStepper paper(mesh, law, bending, 0);
-        MotionStepper standard(mesh, law, bending, MotionControl{});
-        const MotionState a = paper.step(paper.start(mesh), tau).state,
-                          b = standard.step(standard.start(mesh), tau).state;
-        EXPECT_NEAR(along_stretching(paper.space(), mesh, a.u) / along_stretching(paper.space(), mesh, b.u), 1,
-                    difference);
+        const auto first = [&](Scheme name) {
+            const auto scheme = make_scheme(name, mesh, law, bending, {});
+            return scheme->step(scheme->surface().start(mesh), tau).state;
+        };
+        const MotionState a = first(scheme_named("paper")), b = first(scheme_named("bdf2"));
+        const SurfaceSpace space(mesh);
+        EXPECT_NEAR(along_stretching(space, mesh, a.u) / along_stretching(space, mesh, b.u), 1, difference);
         EXPECT_NEAR(a.lambda / b.lambda, 1, difference);
     }
 }
@@ -74,8 +74,8 @@ TEST(PaperScheme, OverdampedVelocityIsTheFluidsInitialAcceleration) {
     const Bending bending{.k = {1, 0, 0.1}, .H0 = 0};
     const double tau = 1e-11, gamma = 1e11;  // so short that nothing is implicit
     const auto first = [&](const MotionLaw& law) {
-        PaperStepper stepper(mesh, law, bending, 0);
-        return stepper.step(stepper.start(mesh), tau).state.u;
+        Paper paper(mesh, law, bending, {});
+        return paper.step(paper.surface().start(mesh), tau).state.u;
     };
     const SurfaceSpace space(mesh);
     const Eigen::VectorXd u = first(law_of(ModelKind::overdamped));
@@ -89,15 +89,16 @@ TEST(PaperScheme, IsOfFirstOrderInTimeAndLosesEnergyAtEveryStep) {
     const MotionLaw law = law_of(ModelKind::fluid, 0.1);
     const double end = 0.4;
     // Patches, since they are accurate on the meshes of both schemes.
-    const auto energy = [&](auto&& stepper, int steps) {
-        const EnergyRun run = run_steps(stepper, mesh, bending, end / steps, steps);
+    const auto energy = [&](Scheme name, int steps) {
+        const auto scheme = make_scheme(name, mesh, law, bending, kept(mesh));
+        const EnergyRun run = run_steps(*scheme, end / steps, steps);
         EXPECT_EQ(run.largest, run.first);
-        const CurvedMesh at = stepper.mesh(run.state.X);
-        return observe(stepper.space(), at, recover(stepper.space(), at), bending).energy +
-               std::pow(norm(stepper.space(), at, run.state.u), 2) / 2;
+        const SurfaceSpace& space = scheme->surface().space();
+        const CurvedMesh at = scheme->surface().mesh(run.state.X);
+        return observe(space, at, recover(space, at), bending).energy + std::pow(norm(space, at, run.state.u), 2) / 2;
     };
-    const auto standard = [&](int steps) { return energy(MotionStepper(mesh, law, bending, kept(mesh)), steps); };
-    const auto paper = [&](int steps) { return energy(PaperStepper(mesh, law, bending, 0), steps); };
+    const auto standard = [&](int steps) { return energy(scheme_named("bdf2"), steps); };
+    const auto paper = [&](int steps) { return energy(scheme_named("paper"), steps); };
     const double fine = standard(16), exact = fine + (fine - standard(8)) / 3;
     const double e4 = paper(4) - exact, e8 = paper(8) - exact, e16 = paper(16) - exact;
     // The energy falls by 1.0. Found: errors of 0.188, 0.109, 0.060.
@@ -111,9 +112,9 @@ TEST(PaperScheme, SmoothingLosesEnergy) {
     const CurvedMesh mesh = mapped_mesh(icosphere(4), 3, map_of(perturbed_sphere()));
     const Bending bending{.k = {0, 0, 0.12}, .H0 = 0};
     const auto energy = [&](double smoothing) {
-        PaperStepper stepper(mesh, law_of(ModelKind::fluid), bending, smoothing);
-        const PaperFields f = stepper.fields(mesh);
-        return observe(stepper.space(), mesh, {f.normal, {}, f.H, f.K}, bending).energy;
+        Paper paper(mesh, law_of(ModelKind::fluid), bending, {.smoothing = smoothing});
+        const PaperFields f = paper.fields(mesh);
+        return observe(paper.surface().space(), mesh, {f.normal, {}, f.H, f.K}, bending).energy;
     };
     EXPECT_NEAR(energy(0), 0.12 * perturbed_K2, 0.2);
     EXPECT_NEAR(energy(0.1 * std::pow(longest_edge(mesh), 2)), 7.9, 0.4);
@@ -137,9 +138,9 @@ TEST(PaperSchemeStudy, StableStepFallsAsTheSquareOfTheMeshWidth) {
 TEST(PaperScheme, RefusesWhatThePaperHasNot) {
     const CurvedMesh mesh = smooth_cell(2);
     const Bending bending{.k = {1, 0, 0}, .H0 = 0};
-    EXPECT_THROW(PaperStepper(mesh, law_of(ModelKind::gradient_flow), bending, 0), std::invalid_argument);
-    EXPECT_THROW(PaperStepper(mesh, law_of(ModelKind::stokes), bending, 0), std::invalid_argument);
-    EXPECT_THROW(PaperStepper(mesh, law_of(ModelKind::fluid), bending, -1), std::invalid_argument);
+    EXPECT_THROW(Paper(mesh, law_of(ModelKind::gradient_flow), bending, {}), std::invalid_argument);
+    EXPECT_THROW(Paper(mesh, law_of(ModelKind::stokes), bending, {}), std::invalid_argument);
+    EXPECT_THROW(Paper(mesh, law_of(ModelKind::fluid), bending, {.smoothing = -1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ public:
     explicit ThreeDimensions(const Case& c) : case_(c), start_(c) {}
     std::vector<std::string> series_names() const override { return surface3d::series_names(case_); }
     void check_restart(const Record& record) const override {
-        if (case_.moves()) surface3d::check_restart(record);
+        if (case_.moves()) surface3d::check_restart(case_, record);
     }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
@@ -58,7 +58,7 @@ public:
     std::vector<std::string> series_names() const override { return auto_series_names(case_, choice_); }
     void check_restart(const Record& record) const override {
         if (record.mesh)
-            surface3d::check_restart(record);
+            surface3d::check_restart(case_, record);
         else
             axisym::check_restart(record);
     }

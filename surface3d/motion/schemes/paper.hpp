@@ -1,16 +1,11 @@
 // The scheme of the paper (its appendix on the numerical method), as printed but for the misprints: the baseline that
-// the default stepper is compared with. Semi-implicit Euler on the surface of the last step, one system for
+// the default schemes are compared with. Semi-implicit Euler on the surface of the last step, one system for
 // (u, Y, H, p), where the displacement Y is that of Barrett, Garcke and Nuernberg and H is implicit; K is explicit.
 #pragma once
 
-#include <optional>
-
-#include "common/energy/bending.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/fem/field_unknowns.hpp"
-#include "surface3d/fem/projection.hpp"
-#include "surface3d/motion/motion_step.hpp"
-#include "surface3d/motion/surface_law.hpp"
+#include "surface3d/motion/schemes/time_scheme.hpp"
 
 namespace tubule::surface3d {
 
@@ -34,42 +29,29 @@ struct PaperFields {
     Eigen::VectorXd H, K;
 };
 
-class PaperStepper {
+class Paper : public TimeScheme {
 public:
-    // `smoothing`: the eps >= 0 of the paper's a - eps Lap a = a_h for K, grad K and the explicit H; a length squared.
-    // The paper chose it by experiment and gives no value; 0 leaves an L2 projection. std::invalid_argument for eps < 0
-    // and for what the scheme has no equations for: a gradient flow, other terms of the energy, and Stokes without
-    // friction, whose rigid motions nothing decides.
-    PaperStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, double smoothing);
+    // control.smoothing: the eps >= 0 of the paper's a - eps Lap a = a_h for K, grad K and the explicit H. The paper
+    // chose it by experiment and gives no value; 0 leaves an L2 projection. The velocity has three components in all
+    // models, the overdamped one, too. std::invalid_argument for eps < 0 and for what the scheme has no equations for:
+    // a gradient flow, other terms of the energy, and Stokes without friction, whose rigid motions are undetermined.
+    Paper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control);
 
     // Leaves `error` and `correction` of the answer 0: nothing is estimated, and area and volume drift.
-    // SolveError where the system cannot be solved.
-    MotionStep step(const MotionState& from, double tau);
-
-    // At rest. The velocity has three components in all models, the overdamped one, too.
-    MotionState start(const CurvedMesh& mesh) const;
-    CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
+    MotionStep step(const MotionState& from, double tau) override;
 
     // What is explicit in a step from this surface.
     PaperFields fields(const CurvedMesh& mesh);
 
-    const SurfaceSpace& space() const { return space_; }
-    const SurfaceLaw& law() const { return law_; }
-
 private:
     void assemble(const MotionState& from, double tau);
 
-    CurvedMesh mesh_;
-    SurfaceSpace space_;
-    SurfaceLaw law_;
     PaperModuli moduli_;
-    double smoothing_;
     PaperUnknowns unknowns_;
     Tabulation pressure_;
     Eigen::SparseMatrix<double> A_;
     Eigen::VectorXd b_, flux_;  // (u.nu, 1) = flux . unknowns: the column and the row of lambda
     SparseLuLarge solver_;
-    std::optional<Projection> projection_;
 };
 
 }  // namespace tubule::surface3d

@@ -1,4 +1,4 @@
-#include "surface3d/motion/paper_scheme.hpp"
+#include "surface3d/motion/schemes/paper.hpp"
 
 #include <fmt/core.h>
 
@@ -8,7 +8,6 @@
 
 #include "common/case/surface_choices.hpp"
 #include "surface3d/curvature/curvature.hpp"
-#include "surface3d/motion/motion_fields.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -20,6 +19,11 @@ PaperModuli paper_moduli(const Bending& bending) {
             .k40 = bending.k[term_number("k40")],
             .k42 = bending.k[term_number("k42")],
             .H0 = bending.H0};
+}
+
+SurfaceLaw with_all_components(SurfaceLaw law) {
+    law.flows = true;
+    return law;
 }
 
 using Frame = Eigen::Matrix<double, 3, 2>;
@@ -178,63 +182,53 @@ void add_mesh_motion(const Point& at, double tau, const CellColumns<3>& X, CellS
 
 }  // namespace
 
-PaperStepper::PaperStepper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, double smoothing)
-    : mesh_(mesh),
-      space_(mesh),
-      law_(law),
+Paper::Paper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control)
+    : TimeScheme(mesh, with_all_components(law), bending, control),
       moduli_(paper_moduli(bending)),
-      smoothing_(smoothing),
       unknowns_(mesh),
-      pressure_(space_.tabulation(mesh.order - 1)),
+      pressure_(surface().space().tabulation(mesh.order - 1)),
       A_(unknowns_.pattern()),
       solver_(nested_dissection(unknowns_.pattern(), unknowns_.node_of_unknown())) {
     if (!law.inextensible)
         throw std::invalid_argument("the paper's scheme has fluid, stokes and overdamped, no gradient flow");
     if (law.inertia == 0 && law.friction == 0)
-        throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: nothing decides rigid motions");
-    if (!(smoothing >= 0))
+        throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: rigid motions are undetermined");
+    if (!(control.smoothing >= 0))
         throw std::invalid_argument(
-            fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", smoothing));
+            fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", control.smoothing));
 }
 
-MotionState PaperStepper::start(const CurvedMesh& mesh) const {
-    return at_rest(mesh, 3, unknowns_.size() - unknowns_.p);
-}
-
-PaperFields PaperStepper::fields(const CurvedMesh& mesh) {
-    if (projection_)
-        projection_->update(space_, mesh);
-    else
-        projection_.emplace(space_, mesh);
-    MotionFields raw = motion_fields(space_, mesh, *projection_);
+PaperFields Paper::fields(const CurvedMesh& mesh) {
+    MotionFields raw = surface().fields(mesh);
     CurvatureField field{std::move(raw.normal), {}, std::move(raw.H), std::move(raw.K)};
-    VectorField grad_K = smooth(space_, mesh, smoothing_, field).K;
+    VectorField grad_K = smooth(surface().space(), mesh, surface().control().smoothing, field).K;
     return {std::move(field.normal), std::move(grad_K), std::move(field.H), std::move(field.K)};
 }
 
-void PaperStepper::assemble(const MotionState& from, double tau) {
+void Paper::assemble(const MotionState& from, double tau) {
     std::fill_n(A_.valuePtr(), A_.nonZeros(), 0.0);
     b_.setZero(unknowns_.size());
     flux_.setZero(unknowns_.size());
-    const CurvedMesh at = mesh(from.X);
+    const SurfaceSpace& space = surface().space();
+    const CurvedMesh at = surface().mesh(from.X);
     const PaperFields nodal = fields(at);
-    const int n = space_.width();
-    VectorField u_old(3, space_.size());
-    for (int d = 0; d < 3; ++d) u_old.row(d) = from.u.segment(d * space_.size(), space_.size());
+    const int n = space.width();
+    VectorField u_old(3, space.size());
+    for (int d = 0; d < 3; ++d) u_old.row(d) = from.u.segment(d * space.size(), space.size());
     const VectorField transport = u_old - from.w;
-    space_.for_each_cell([&](int cell) {
+    space.for_each_cell([&](int cell) {
         const CellFields here{cell_nodes(at, cell),
-                              space_.gather(u_old, cell),
-                              space_.gather(transport, cell),
-                              space_.gather(nodal.normal, cell),
-                              space_.gather(nodal.grad_K, cell),
-                              space_.gather(nodal.H, cell),
-                              space_.gather(nodal.K, cell)};
+                              space.gather(u_old, cell),
+                              space.gather(transport, cell),
+                              space.gather(nodal.normal, cell),
+                              space.gather(nodal.grad_K, cell),
+                              space.gather(nodal.H, cell),
+                              space.gather(nodal.K, cell)};
         CellSystem s(n, unknowns_.width());
-        for (int q = 0; q < space_.tabulation().points(); ++q) {
-            const Point p = point(here, space_.tabulation(), pressure_, q);
-            add_inertia(p, law_, tau, s);
-            add_viscosity(p, law_, s);
+        for (int q = 0; q < space.tabulation().points(); ++q) {
+            const Point p = point(here, space.tabulation(), pressure_, q);
+            add_inertia(p, surface().law(), tau, s);
+            add_viscosity(p, surface().law(), s);
             add_pressure(p, s);
             add_k20(p, moduli_, s);
             add_k40(p, moduli_, s);
@@ -248,25 +242,30 @@ void PaperStepper::assemble(const MotionState& from, double tau) {
     });
 }
 
-MotionStep PaperStepper::step(const MotionState& from, double tau) {
+MotionStep Paper::step(const MotionState& from, double tau) {
     assemble(from, tau);
     solver_.factor(A_);
     Eigen::MatrixXd rhs(b_.size(), 2);
     rhs << b_, flux_;
     const Eigen::MatrixXd both = solver_.solve(rhs, 1);
+    const int n = surface().nodes();
     MotionStep out;
     MotionState& to = out.state;
     // INT u.nu is linear in lambda, so that the paper's Newton iteration ends after one step.
-    if (law_.keeps_volume) to.lambda = flux_.dot(both.col(0)) / flux_.dot(both.col(1));
+    if (surface().law().keeps_volume) to.lambda = flux_.dot(both.col(0)) / flux_.dot(both.col(1));
     const Eigen::VectorXd x = both.col(0) - to.lambda * both.col(1);
     to.time = from.time + tau, to.step = tau;
     to.u = x.head(unknowns_.Y);
     to.p = x.tail(unknowns_.size() - unknowns_.p);
-    to.w.resize(3, space_.size());
-    for (int d = 0; d < 3; ++d) to.w.row(d) = x.segment(unknowns_.Y + d * space_.size(), space_.size()) / tau;
+    to.w.resize(3, n);
+    for (int d = 0; d < 3; ++d) to.w.row(d) = x.segment(unknowns_.Y + d * n, n) / tau;
     to.X = from.X + tau * to.w;
-    to.X_past = from.X, to.w_past = from.w, to.u_past = from.u;
     return out;
+}
+
+template <>
+SchemeType scheme_type<scheme_named("paper")>() {
+    return scheme_type_of<Paper>();
 }
 
 }  // namespace tubule::surface3d

@@ -1,0 +1,17 @@
+// Area and volume of a surface, and their change as its nodes move.
+#pragma once
+
+#include "surface3d/fem/surface_space.hpp"
+
+namespace tubule::surface3d {
+
+// Area and volume (of one period), or changes of them.
+struct Extent {
+    double area = 0, volume = 0;
+};
+
+Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh);
+// Its change with displacements d of the nodes: (div_P d, 1) and (d.nu, 1).
+Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d);
+
+}  // namespace tubule::surface3d

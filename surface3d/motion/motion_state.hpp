@@ -1,0 +1,48 @@
+// The state of a moving surface, and one step of it.
+#pragma once
+
+#include <cmath>
+#include <memory>
+
+#include "surface3d/fem/surface_space.hpp"
+
+namespace tubule {
+class RecordWriter;
+}
+
+namespace tubule::surface3d {
+
+struct MotionState;
+
+// What a time scheme remembers beside the state of the surface: its own history.
+class SchemeMemory {
+public:
+    virtual ~SchemeMemory() = default;
+    virtual void save(RecordWriter& out, const MotionState& state) const = 0;  // under names restart_...
+};
+
+// Nodal values at a time.
+struct MotionState {
+    double time = 0;
+    double step = 0;    // that led here; 0 at the start
+    VectorField X, w;   // positions, their velocity
+    Eigen::VectorXd u;  // velocity as in MotionUnknowns, component by component
+    Eigen::VectorXd p;  // pressure, at the nodes of its own order
+    double lambda = 0;  // multiplier of the volume
+    // Of the scheme that made the step; none at the start, and of schemes that need none. Steps share it: it is never
+    // changed, a step makes its own.
+    std::shared_ptr<const SchemeMemory> memory;
+};
+
+struct MotionStep {
+    MotionState state;
+    double error = 0;       // of the positions over this step along the normal, largest, estimated
+    double correction = 0;  // energy that keeping area and volume took
+};
+
+// Whether positions, velocities and multipliers are numbers.
+inline bool is_finite(const MotionState& s) {
+    return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda);
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,231 @@
+#include "surface3d/motion/moving_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/motion/motion_forms.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr int most_corrections = 5;
+constexpr double kept = 1e-12;            // area and volume, relative
+constexpr double still_kept = 1e-8;       // a step that is further off is refused
+constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
+
+}  // namespace
+
+MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending,
+                             const MotionControl& control)
+    : mesh_(mesh),
+      space_(mesh),
+      law_(law),
+      bending_(bending),
+      control_(control),
+      mesh_motion_(control.follow_curvature) {
+    if (const int order = pressure_order(law, mesh.order); order > 0)
+        pressure_mesh_ = order == mesh.order ? mesh : with_order(mesh, order);
+    if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
+    holds_rigid_motions_ = true;
+    law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
+}
+
+MotionState MovingSurface::start(const CurvedMesh& mesh) {
+    MotionState s;
+    s.X = node_positions(mesh);
+    s.w = VectorField::Zero(3, mesh.size());
+    s.u = Eigen::VectorXd::Zero(law_.components() * mesh.size());
+    s.p = Eigen::VectorXd::Zero(pressure_mesh_.size());
+    const MotionFields f = fields(mesh);
+    s.X += correction(s.X, f, law_.keeps_volume && !area_is_volume(mesh, f)).displacement;
+    return s;
+}
+
+MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta) {
+    MotionState s = start(at);
+    s.u = u;
+    keep_momenta(momenta, 0, s);
+    const CurvedMesh now = mesh(s.X);
+    const MotionFields f = fields(now);
+    s.w = mesh_velocity(now, f, flux(s.u, now, f), 0);
+    return s;
+}
+
+MotionFields MovingSurface::fields(const CurvedMesh& mesh) {
+    if (projection_)
+        projection_->update(space_, mesh);
+    else
+        projection_.emplace(space_, mesh);
+    return motion_fields(space_, mesh, *projection_);
+}
+
+VectorField MovingSurface::mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields,
+                                         const Eigen::VectorXd& flux, double te) {
+    return mesh_motion_.velocity(space_, mesh, fields, *projection_, flux, control_.relaxation, te);
+}
+
+Eigen::VectorXd MovingSurface::flux(const Eigen::VectorXd& u, const CurvedMesh& mesh,
+                                    const MotionFields& fields) const {
+    const Tabulation& table = space_.tabulation();
+    const auto out = load<1>(space_, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<1>& sum) {
+        const SurfacePoint<double> p = tangent_point(X, table, q);
+        const auto phi = table.value.col(q);
+        const Eigen::Vector3d normal = (space_.gather(fields.normal, cell) * phi).normalized();
+        double speed = 0;
+        for (int a = 0; a < space_.width(); ++a) {
+            const int i = space_.node(cell, a);
+            if (law_.flows)
+                for (int d = 0; d < 3; ++d) speed += phi[a] * normal[d] * u[d * nodes() + i];
+            else
+                speed += phi[a] * u[i];
+        }
+        sum += (table.weight[q] * p.area * speed) * phi.transpose();
+    });
+    return out.transpose();
+}
+
+VectorField MovingSurface::velocity(const MotionState& state, const MotionFields& fields) const {
+    const int n = nodes();
+    VectorField out(3, n);
+    if (law_.flows) {
+        for (int d = 0; d < 3; ++d) out.row(d) = state.u.segment(d * n, n).transpose();
+        return out;
+    }
+    for (int i = 0; i < n; ++i) out.col(i) = state.u[i] * fields.normal.col(i);
+    if (!law_.inextensible) return out;
+    const Tabulation& table = space_.tabulation();
+    return out - (*projection_)(
+                     load<3>(space_, mesh(state.X), [&](int cell, const CellColumns<3>& X, int q, CellColumns<3>& sum) {
+                         const SurfacePoint<double> p = tangent_point(X, table, q);
+                         const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
+                         sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
+                     }));
+}
+
+Eigen::VectorXd MovingSurface::pressure_at_nodes(const MotionState& state) const {
+    const CurvedMesh& own = pressure_mesh_;
+    if (own.order == mesh_.order) return state.p;
+    std::vector<QuadraturePoint> nodes;
+    for (const auto& [i, j, l] : lattice(mesh_.order))
+        nodes.push_back({static_cast<double>(j) / mesh_.order, static_cast<double>(l) / mesh_.order, 0});
+    const Tabulation table(own.order, nodes);
+    Eigen::VectorXd out(mesh_.size());
+    for (int cell = 0; cell < mesh_.triangles(); ++cell)
+        for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
+            double p = 0;
+            for (int b = 0; b < own.nodes_per_cell(); ++b) p += table.value(b, a) * state.p[own.node(cell, b)];
+            out[mesh_.node(cell, a)] = p;
+        }
+    return out;
+}
+
+// Velocities at the nodes, a column each, component by component: translations, and rotations that the
+// surface allows.
+Eigen::MatrixXd MovingSurface::rigid_motions(const CurvedMesh& mesh) const {
+    const int n = nodes();
+    const bool tube = mesh.period > 0;
+    const VectorField x = node_positions(mesh);
+    Eigen::MatrixXd out(3 * n, tube ? 4 : 6);
+    for (int motion = 0; motion < out.cols(); ++motion) {
+        const int axis = tube && motion == 3 ? 2 : motion % 3;
+        const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
+        for (int d = 0; d < 3; ++d) {
+            const int j = (d + 1) % 3, k = (d + 2) % 3;
+            out.col(motion).segment(d * n, n) = motion < 3 ? Eigen::VectorXd::Constant(n, e[d])
+                                                           : (e[j] * x.row(k) - e[k] * x.row(j)).transpose().eval();
+        }
+    }
+    return out;
+}
+
+// (r, v) of these motions r: momentum and angular momentum of a velocity v, but for the density.
+Eigen::MatrixXd MovingSurface::momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const {
+    const Eigen::SparseMatrix<double> mass = mass_matrix(space_, mesh);
+    const int n = nodes();
+    Eigen::MatrixXd out(motions.rows(), motions.cols());
+    for (int d = 0; d < 3; ++d) out.middleRows(d * n, n) = mass * motions.middleRows(d * n, n);
+    return out;
+}
+
+Eigen::MatrixXd MovingSurface::open_rigid_motions(const CurvedMesh& mesh) const {
+    return holds_rigid_motions_ ? momenta(mesh, rigid_motions(mesh)) : Eigen::MatrixXd(0, 0);
+}
+
+Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
+    if (!law_.flows || law_.inertia == 0) return {};
+    const CurvedMesh m = mesh(state.X);
+    return momenta(m, rigid_motions(m)).transpose() * state.u;
+}
+
+Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau) const {
+    const Eigen::VectorXd now = momenta(from);
+    return now.size() == 0 ? now : std::exp(-law_.friction / law_.inertia * tau) * now;
+}
+
+// Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,
+// which would move a surface at rest ever faster: a rigid motion takes it back. It changes no shape.
+void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
+    if (kept.size() == 0) return;
+    const CurvedMesh m = mesh(to.X);
+    const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m, motions);
+    const Eigen::VectorXd lack = kept - of.transpose() * to.u;
+    const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
+    to.u += back;
+    const VectorField nodal = back.reshaped(nodes(), 3).transpose();
+    to.w += nodal;
+    to.X += te * nodal;
+}
+
+bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f) const {
+    if (!law_.inextensible) return false;
+    const Extent rate = extent_rate(space_, mesh, f.normal);  // -INT H, A
+    const Extent by_H = extent_rate(space_, mesh, f.normal * f.H.asDiagonal());
+    return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
+}
+
+// Of what is kept; zero where nothing is.
+Extent MovingSurface::lack(const CurvedMesh& mesh) const {
+    const Extent now = extent(space_, mesh);
+    return {control_.area ? *control_.area - now.area : 0, control_.volume ? *control_.volume - now.volume : 0};
+}
+
+Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const VectorField& begin, const VectorField& end, double span,
+                                   const Extent& missed) const {
+    const Extent lacks = lack(mesh(end)), back = extent_rate(space_, at, end - begin);
+    return {(lacks.area + back.area + missed.area) / span, (lacks.volume + back.volume + missed.volume) / span};
+}
+
+// Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
+MovingSurface::Correction MovingSurface::correction(const VectorField& X, const MotionFields& f,
+                                                    bool with_volume) const {
+    const bool area = law_.inextensible && control_.area, volume = with_volume && control_.volume;
+    Correction out{VectorField::Zero(3, X.cols()), {}};
+    if (!area && !volume) return out;
+    VectorField& sum = out.displacement;
+    const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
+    for (int k = 0;; ++k) {
+        const CurvedMesh m = mesh(X + sum);
+        const Extent lacks = lack(m);
+        if (k == 0) out.lacking = lacks;
+        const Eigen::Vector2d missing(area ? lacks.area : 0, volume ? lacks.volume : 0);
+        const Eigen::Vector2d parts(area ? missing[0] / *control_.area : 0, volume ? missing[1] / *control_.volume : 0);
+        const double off = parts.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
+        if (off <= kept || (k == most_corrections && off <= still_kept)) return out;
+        if (k == most_corrections)
+            throw SolveError(fmt::format("area and volume are not kept: {:.2g} of them is missing after {} corrections",
+                                         off, most_corrections));
+        const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
+        if (area && volume) {
+            Eigen::Matrix2d J;
+            J << a.area, b.area, a.volume, b.volume;
+            const Eigen::Vector2d x = J.inverse() * missing;
+            sum += x[0] * by_normal + x[1] * by_H;
+        } else {
+            sum += volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
+        }
+    }
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,112 @@
+// The generalised alpha method, which hardly damps waves that its steps follow.
+#include <cmath>
+
+#include "surface3d/motion/schemes/alpha_numbers.hpp"
+#include "surface3d/motion/schemes/one_stage.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr double fastest_waves = 0.9;    // the factor by which a short step damps them
+constexpr double miss_relaxation = 0.5;  // of what steps are expected to miss of area and volume, towards the last miss
+
+// Pressure and the multiplier of the volume at the time where a step was solved.
+struct Multipliers {
+    double time = 0;
+    Eigen::VectorXd p;
+    double lambda = 0;
+};
+
+struct AlphaMemory : ListedMemory<AlphaMemory> {
+    PastState past;
+    VectorField X_rate;  // the rates that are carried on
+    Eigen::VectorXd u_rate;
+    double lag = 0;  // they are those of so much before the time of the state
+    Multipliers solved;
+    Extent missed;  // what the linear system of a step is expected to miss of area and volume
+
+    template <class Fields, class Own>
+    static void fields(Fields& f, Own& own, const MotionState& state) {
+        PastState::fields(f, own.past, state);
+        f.array("restart_X_rate", own.X_rate, state.X.cols());
+        f.array("restart_u_rate", own.u_rate, state.u.size());
+        f.number("restart_lag", own.lag);
+        f.number("restart_solved_time", own.solved.time);
+        f.optional_array("restart_solved_p", own.solved.p, state.p.size());
+        f.number("restart_solved_lambda", own.solved.lambda);
+        f.number("restart_missed_area", own.missed.area);
+        f.number("restart_missed_volume", own.missed.volume);
+    }
+};
+
+class Alpha : public OneStageScheme {
+public:
+    using OneStageScheme::OneStageScheme;
+
+    MotionStep step(const MotionState& from, double tau) override {
+        const auto* memory = memory_of<AlphaMemory>(from);
+        return memory ? next_step(from, *memory, tau) : first_step(from, tau);
+    }
+
+private:
+    MotionStep first_step(const MotionState& from, double tau) {
+        const OneStage stage = euler(from, tau);
+        const StageSolution solved = solve(from, nullptr, stage, tau);
+        auto next = std::make_shared<AlphaMemory>();
+        next->past = PastState(from);
+        next->X_rate = solved.w;
+        next->u_rate = (solved.u - stage.ubar) / stage.te;
+        next->solved = {from.time + tau, solved.p, solved.lambda};
+        MotionStep out = finish(from, nullptr, stage, solved, end_of(from, solved, stage, tau)).step;
+        out.state.memory = std::move(next);
+        return out;
+    }
+
+    MotionStep next_step(const MotionState& from, const AlphaMemory& memory, double tau) {
+        const AlphaNumbers a = alpha_numbers(tau, memory.lag, wave_factor(from, tau));
+        const OneStage stage{a.level, a.te, from.X + a.kept * memory.X_rate, from.u + a.kept * memory.u_rate, a.error};
+        const double again = std::pow(tau / from.step, 3);  // what a step misses is of third order in it
+        const Extent missed{again * memory.missed.area, again * memory.missed.volume};
+        const StageSolution solved = solve(from, &memory.past, stage, tau, missed);
+
+        auto next = std::make_shared<AlphaMemory>();
+        next->past = PastState(from);
+        next->X_rate = memory.X_rate + a.renewing * (solved.w - memory.X_rate);
+        next->u_rate = memory.u_rate + a.renewing * ((solved.u - stage.ubar) / stage.te - memory.u_rate);
+        next->lag = a.lag;
+        next->solved = {from.time + stage.level * tau, solved.p, solved.lambda};
+        MotionState to = end_of(from, solved, stage, tau);
+        if (stage.level < 1) {  // from there to the end, linearly
+            const double ahead = (to.time - next->solved.time) / (next->solved.time - memory.solved.time);
+            to.lambda += ahead * (to.lambda - memory.solved.lambda);
+            if (to.p.size() > 0) to.p += ahead * (to.p - memory.solved.p);
+        }
+        Finished done = finish(from, &memory.past, stage, solved, std::move(to));
+        next->missed = {missed.area + miss_relaxation * done.lacking.area,
+                        missed.volume + miss_relaxation * done.lacking.volume};
+        done.step.state.memory = std::move(next);
+        return std::move(done.step);
+    }
+
+    // A wave of bending, of no tangential flow but what its stretching takes, is damped by 2 viscosity k^2/inertia, k
+    // the curvature across it, and by half of the friction. So this is what a step may damp the fastest waves by, in
+    // addition: long steps, which do not follow them, need it.
+    double wave_factor(const MotionState& from, double tau) {
+        const SurfaceLaw& law = surface().law();
+        if (law.inertia == 0) return 0;
+        const CurvedMesh m = surface().mesh(from.X);
+        const Extent e = extent(surface().space(), m);
+        const double curvature = e.area / ((m.period > 0 ? 2 : 3) * e.volume);
+        const double rate = (2 * law.viscosity * curvature * curvature + law.friction / 2) / law.inertia;
+        return fastest_waves * std::exp(-rate * tau);
+    }
+};
+
+}  // namespace
+
+template <>
+SchemeType scheme_type<scheme_named("alpha")>() {
+    return scheme_type_of<Alpha, AlphaMemory>();
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,61 @@
+// The linearly implicit stages of which time schemes are made: each solved on the surface that is expected at its time.
+#pragma once
+
+#include "common/solve/bordered.hpp"
+#include "common/solve/gmres.hpp"
+#include "surface3d/motion/motion_forms.hpp"
+#include "surface3d/motion/moving_surface.hpp"
+
+namespace tubule::surface3d {
+
+// At the time of a stage X = Xbar + te w and u_t = (u - ubar)/te.
+struct Stage {
+    double te;
+    VectorField Xbar;
+    Eigen::VectorXd ubar;
+    VectorField X, w;   // expected positions, velocity of the nodes,
+    Eigen::VectorXd u;  // velocity
+};
+
+struct StageSolution {
+    VectorField X, w;
+    Eigen::VectorXd u, p;
+    double lambda = 0;
+    MotionFields fields;  // of the surface that was expected
+    bool keeps_volume = false;
+};
+
+// What keeping area and volume took: energy, to first order, and what was lacking of them.
+struct KeptExtent {
+    double energy = 0;
+    Extent lacking;
+};
+
+class StepSolver {
+public:
+    explicit StepSolver(MovingSurface& surface);  // which must outlive it
+
+    // With the given rates of area and volume, where they are kept (MovingSurface::rate_to_keep). SolveError.
+    StageSolution solve(const Stage& stage, const Extent& rate);
+
+    // Moves the end of a step, whose last stage was `solved`, to the area and volume that are kept. SolveError where
+    // they cannot be kept to 1e-8.
+    KeptExtent keep_extent(const StageSolution& solved, MotionState& to) const;
+
+    const MotionUnknowns& unknowns() const { return unknowns_; }
+    const StepSystem& system() const { return system_; }  // of the last stage, rows scaled to be almost symmetric
+
+private:
+    Eigen::VectorXd solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda);
+    Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
+    void make_symmetric(const StepBase& base);
+    double work(const VectorField& displacement, const MotionFields& fields) const;
+
+    MovingSurface& surface_;
+    MotionUnknowns unknowns_;
+    StepSystem system_;
+    BorderedSolver solver_;
+    Gmres gmres_;
+};
+
+}  // namespace tubule::surface3d
