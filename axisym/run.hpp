@@ -7,7 +7,7 @@
 #include "axisym/integration/flow.hpp"
 #include "common/case/case.hpp"
 #include "common/result/record.hpp"
-#include "common/result/run.hpp"
+#include "common/run/run.hpp"
 
 namespace tubule::axisym {
 

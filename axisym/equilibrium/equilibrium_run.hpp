@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "common/result/run.hpp"
+#include "common/run/run.hpp"
 
 namespace tubule::axisym {
 

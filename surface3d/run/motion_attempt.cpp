@@ -24,16 +24,6 @@ constexpr double shortest_step = 1e-9;         // of the relaxation time: shorte
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
 constexpr double unseen_move = 0.25;  // between looks for self-intersection, of the distance of nodes
-constexpr double seconds_between_checkpoints = 20;
-
-std::vector<double> output_times(const Case& c) {
-    std::vector<double> out = c.time.output;
-    out.push_back(c.time.end);
-    std::sort(out.begin(), out.end());
-    out.erase(std::unique(out.begin(), out.end()), out.end());
-    out.erase(out.begin(), std::upper_bound(out.begin(), out.end(), begin_time(c)));
-    return out;
-}
 
 // What dissipates in a step of length tau after one of length `before`: the parabola through three rates.
 double dissipated_in(double tau, double before, double rate, double now, double past) {
@@ -44,36 +34,23 @@ double dissipated_in(double tau, double before, double rate, double now, double 
 
 }  // namespace
 
-std::optional<StopReport> find_pause(const Case& c, RunObserver& watch, Clock::time_point started, double time) {
-    if (c.time.limit && std::chrono::duration<double>(Clock::now() - started).count() > *c.time.limit)
-        return StopReport{Stop::time_limit, time, fmt::format("used the {} s of time.limit", *c.time.limit),
-                          "go on with --resume"};
-    if (watch.interrupted())
-        return StopReport{Stop::interrupted, time, "interrupted by a signal", "go on with --resume"};
-    return std::nullopt;
-}
-
-MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, const MotionSettings& settings,
-                             const MotionTrace* coarser, Clock::time_point started)
-    : case_(c), watch_(watch), coarser_(coarser), started_(started), outputs_(output_times(c)) {
+MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
+                             const EndedRun* coarser)
+    : case_(c),
+      clock_(clock),
+      coarser_(coarser),
+      out_(watch, clock, settings.role == Role::reported),
+      outputs_(c, begin_time(c)) {
     memory_.settings = settings;
     memory_.error = settings.difference;
 }
 
-double MotionAttempt::seconds() const {
-    return std::chrono::duration<double>(Clock::now() - started_).count();
-}
-
-double MotionAttempt::length() const {
-    return std::sqrt(memory_.area);
-}
-
 void MotionAttempt::use_mesh(const CurvedMesh& mesh) {
-    const MotionControl control{.area = memory_.area,
-                                .volume = memory_.volume,
-                                .relaxation = memory_.relaxation,
+    const MotionControl control{.area = memory_.scale.area,
+                                .volume = memory_.scale.volume,
+                                .relaxation = memory_.scale.relaxation,
                                 .follow_curvature = case_.surface.follow_curvature,
-                                .least_variation = memory_.least_variation,
+                                .least_variation = memory_.scale.least_variation,
                                 .smoothing = case_.surface.smoothing};
     scheme_ = make_scheme(time_scheme(case_), mesh, motion_law(case_.model), case_.energy, control);
     summary.elements = mesh.triangles();
@@ -88,15 +65,15 @@ void MotionAttempt::begin(const Start& from) {
         return;
     }
     remember_start(case_, start, space, memory_);
-    memory_.next_step =
-        case_.surface.step.value_or(std::min(first_step * memory_.relaxation, case_.time.end - begin_time(case_)));
+    memory_.next_step = case_.surface.step.value_or(
+        std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time(case_)));
     use_mesh(start.mesh);
     const VectorField u = start_velocity(case_, start);
     state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped()) : surface().start(start.mesh);
     state_.time = begin_time(case_);
     if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
     look();
-    memory_.total_start = memory_.lowest_total = total();
+    memory_.balance.total_start = memory_.balance.lowest_total = total();
     trace.add(state_.time, now_.bending.energy);
     write_row();
     write_frame();
@@ -120,10 +97,10 @@ void MotionAttempt::resume(const Restart& restart) {
     use_mesh(curved_mesh(restart.cells.value(), array("points", state.X)));
     state_ = std::move(state);
     look();
-    next_output_ = std::upper_bound(outputs_.begin(), outputs_.end(), state_.time) - outputs_.begin();
-    last_row_ = last_frame_ = state_.time;
-    trace = MotionTrace(restart.record, own_trace);
-    if (next_output_ == outputs_.size()) early_ = StopReport{Stop::finished, state_.time, "reached time.end", ""};
+    outputs_.go_on_from(state_.time);
+    out_.go_on_from(state_.time);
+    trace = pair_memory(restart.record).own;
+    if (outputs_.done()) early_ = StopReport{Stop::finished, state_.time, "reached time.end", ""};
 }
 
 void MotionAttempt::look() {
@@ -132,11 +109,11 @@ void MotionAttempt::look() {
 
 // A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
 std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const VectorField& X) const {
-    return find_impossible_motion(o, surface().mesh(X), reported() ? 0.01 : 0.05, state_.time);
+    return find_impossible_motion(o, surface().mesh(X), out_.reported() ? 0.01 : 0.05, state_.time);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
-    const double t = state_.time, rise = (m.bending.energy + m.kinetic - total()) / memory_.reference_energy;
+    const double t = state_.time, rise = (m.bending.energy + m.kinetic - total()) / memory_.scale.reference_energy;
     if (const auto spurious = impossible(m.bending, next.state.X))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
     if (const auto rises = find_rise_in_step(rise, case_.accuracy.energy, t, next.state.step))
@@ -152,7 +129,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     try {
         const MotionStep next = scheme_->step(state_, tau);
         if (!is_finite(next.state)) return failed("the step overflows");
-        const double error = next.error / (memory_.settings.tolerance * length());
+        const double error = next.error / (memory_.settings.tolerance * memory_.scale.length());
         if (!case_.surface.step && error > 2)
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
@@ -173,15 +150,15 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
 }
 
 void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
-    memory_.dissipated +=
-        dissipated_in(next.state.step, state_.step, m.dissipation, now_.dissipation, memory_.dissipation_past);
-    memory_.dissipation_past = now_.dissipation;
-    memory_.corrected += std::abs(next.correction);
+    memory_.balance.dissipated +=
+        dissipated_in(next.state.step, state_.step, m.dissipation, now_.dissipation, memory_.balance.dissipation_past);
+    memory_.balance.dissipation_past = now_.dissipation;
+    memory_.balance.corrected += std::abs(next.correction);
     state_ = next.state;
     now_ = m;
-    memory_.lowest_total = std::min(memory_.lowest_total, total());
-    memory_.defect = std::max(memory_.defect, std::abs(defect_now()));
-    ++memory_.steps;
+    memory_.balance.lowest_total = std::min(memory_.balance.lowest_total, total());
+    memory_.balance.defect = std::max(memory_.balance.defect, std::abs(memory_.balance.defect_at(total())));
+    ++memory_.count.steps;
 }
 
 // A step that was cut short by an output says little about how long the next one may be.
@@ -192,8 +169,8 @@ void MotionAttempt::set_next_step(double tau, double asked, double error) {
 }
 
 bool MotionAttempt::wants_new_mesh() const {
-    if (!traits().controls_mesh || memory_.steps < memory_.mesh_since + steps_between_meshes) return false;
-    const double most = turn_to_remesh * (reported() ? 1 : farther_apart);
+    if (!traits().controls_mesh || memory_.count.steps < memory_.count.mesh_since + steps_between_meshes) return false;
+    const double most = turn_to_remesh * (out_.reported() ? 1 : farther_apart);
     return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > most);
 }
 
@@ -201,7 +178,7 @@ bool MotionAttempt::wants_new_mesh() const {
 // What the energy jumps counts as an error. Where no better mesh can be made, the old one is kept: check_state() tells
 // when it will do no longer.
 void MotionAttempt::make_new_mesh() {
-    memory_.mesh_since = memory_.steps;
+    memory_.count.mesh_since = memory_.count.steps;
     const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
     const auto found = remesh(surface().mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
@@ -217,39 +194,39 @@ void MotionAttempt::make_new_mesh() {
         scheme_ = std::move(old), summary.elements = old_elements;
         return;
     }
-    ++memory_.meshes;
+    ++memory_.count.meshes;
     state_.time = time;
     look();
     memory_.error += std::abs(now_.bending.energy - energy);
-    memory_.lowest_total += std::max(total() - before, 0.0);
-    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.relaxation);
+    memory_.balance.lowest_total += std::max(total() - before, 0.0);
+    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
 }
 
 std::optional<StopReport> MotionAttempt::step() {
     const double left = left_until_output();
     const auto tau = [&] { return left / std::ceil(left / memory_.next_step * (1 - 1e-9)); };  // no short last step
     while (const auto refusal = attempt(tau())) {
-        ++memory_.rejected;
+        ++memory_.count.rejected;
         memory_.next_step = refusal->shrink * tau();
-        if (case_.surface.step || memory_.next_step < shortest_step * memory_.relaxation) return refusal->report;
-        if (watch_.interrupted()) break;
+        if (case_.surface.step || memory_.next_step < shortest_step * memory_.scale.relaxation) return refusal->report;
+        if (clock_.interrupted()) break;
     }
     trace.add(state_.time, now_.bending.energy);
     compare();
     write_row();
-    if (reported()) watch_.progress(state_.time, now_.bending.energy, state_.step);
+    out_.progress(state_.time, now_.bending.energy, state_.step);
     const bool at_output = left_until_output() <= 1e-12 * case_.time.end;
     auto stop = check_state();
     if (!stop) stop = check_crossing(at_output);
     if (at_output) {
-        state_.time = outputs_[next_output_++];
+        state_.time = outputs_.pass();
         if (stop) return stop;
         write_frame();
-        if (next_output_ == outputs_.size()) return StopReport{Stop::finished, state_.time, "reached time.end", ""};
+        if (outputs_.done()) return StopReport{Stop::finished, state_.time, "reached time.end", ""};
     }
     if (!stop) stop = check_progress();
     if (stop) return stop;
-    if (seconds() > last_checkpoint_ + seconds_between_checkpoints) write_checkpoint();
+    out_.safeguard([this] { return record(); });
     if (wants_new_mesh()) make_new_mesh();
     return std::nullopt;
 }
@@ -268,16 +245,17 @@ void MotionAttempt::go() {
 std::optional<StopReport> MotionAttempt::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
     if (auto bad = find_bad_shape(now_, case_.accuracy.r_min, t)) return bad;
-    if (auto rise = find_slow_rise((total() - memory_.lowest_total) / memory_.reference_energy, asked, t)) return rise;
+    if (auto rise = find_slow_rise((total() - memory_.balance.lowest_total) / memory_.scale.reference_energy, asked, t))
+        return rise;
     if (traits().controls_mesh && surface().law().keeps_volume)
-        if (auto drift = find_drift(now_.bending.volume / memory_.volume - 1, asked, t)) return drift;
+        if (auto drift = find_drift(now_.bending.volume / memory_.scale.volume - 1, asked, t)) return drift;
     return std::nullopt;
 }
 
 // Looked for at outputs, and when nodes have moved so far since the last look: what crosses and parts again in between
 // is no deeper than that.
 std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
-    const double spacing = length() / std::sqrt(summary.elements) / element_order(case_);
+    const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / element_order(case_);
     memory_.moved += state_.step * now_.speed;
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
     memory_.moved = 0;
@@ -289,11 +267,11 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
 // Whether it is worth while, and allowed, to go on.
 std::optional<StopReport> MotionAttempt::check_progress() {
     const double t = state_.time;
-    if (auto pause = find_pause(case_, watch_, started_, t)) return pause;
-    if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.reference_energy)
+    if (auto pause = clock_.find_pause(t)) return pause;
+    if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
         return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
-    return stall_.look(t, state_.step, first_step * memory_.relaxation, memory_.lowest_total / memory_.reference_energy,
-                       case_.accuracy.energy);
+    return stall_.look(t, state_.step, first_step * memory_.scale.relaxation,
+                       memory_.balance.lowest_total / memory_.scale.reference_energy, case_.accuracy.energy);
 }
 
 // By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
@@ -303,62 +281,51 @@ double MotionAttempt::what_may_change() const {
 }
 
 void MotionAttempt::compare() {
-    const double t = state_.time;
-    error_now_ = memory_.reference_energy;  // nothing is known
-    if (!coarser_ || t > coarser_->end()) return;
-    error_now_ = std::abs(now_.bending.energy - (*coarser_)(t));
-    memory_.error = std::max(memory_.error, error_now_);
+    const auto difference =
+        coarser_ ? coarser_->trace.difference(state_.time, now_.bending.energy) : std::optional<double>();
+    error_now_ = difference.value_or(memory_.scale.reference_energy);  // nothing is known
+    if (difference) memory_.error = std::max(memory_.error, *difference);
 }
 
 void MotionAttempt::write_row() {
-    if (!reported() || last_row_ == state_.time) return;
-    last_row_ = state_.time;
-    watch_.row(motion_values({state_, now_, defect_now(), memory_.corrected, error_now_, summary.elements, seconds()}));
+    if (!out_.wants_row(state_.time)) return;
+    out_.row(state_.time, motion_values({state_, now_, memory_.balance.defect_at(total()), memory_.balance.corrected,
+                                         error_now_, summary.elements, out_.seconds()}));
 }
 
 void MotionAttempt::write_frame() {
-    if (!reported() || state_.time == last_frame_) return;
-    last_frame_ = state_.time;
-    watch_.frame([&] { return record(); });
+    out_.frame(state_.time, [this] { return record(); });
 }
 
-void MotionAttempt::write_checkpoint() {
-    last_checkpoint_ = seconds();
-    watch_.checkpoint(record());
-}
-
-Record MotionAttempt::record() const {
-    const std::size_t mesh = watch_.mesh(cells_of(surface().mesh(state_.X)));
+Record MotionAttempt::record() {
+    const std::size_t mesh = out_.mesh(cells_of(surface().mesh(state_.X)));
     Record out = motion_record(surface(), state_, now_, memory_, mesh);
-    out.arrays.push_back(trace.array(own_trace));
-    if (coarser_) out.arrays.push_back(coarser_->array(coarser_trace));
+    add_to_record(out, trace, coarser_);
     return out;
 }
 
 void MotionAttempt::summarise(const StopReport& stop) {
     summary.stop = stop;
     summary.energy = now_.bending.energy;
-    summary.reference_energy = memory_.reference_energy;
+    summary.reference_energy = memory_.scale.reference_energy;
+    summary.details = {{"pairs", std::int64_t{memory_.settings.pair}}};
     if (!scheme_) return;
     write_row();
-    if (!can_go_on(stop.reason))
-        write_frame();
-    else
-        write_checkpoint();  // what a resumed run goes on from is no frame of its own
+    out_.end(stop, state_.time, [this] { return record(); });
     const int nodes = static_cast<int>(state_.X.cols());
-    summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", memory_.steps,
-                                 memory_.rejected, summary.elements, element_order(case_), nodes);
-    summary.details = {{"elements", std::int64_t{summary.elements}},
-                       {"nodes", std::int64_t{nodes}},
-                       {"order", std::int64_t{element_order(case_)}},
-                       {"steps", std::int64_t{memory_.steps}},
-                       {"rejected_steps", std::int64_t{memory_.rejected}},
-                       {"time_tolerance", memory_.settings.tolerance},
-                       {"meshes", std::int64_t{memory_.meshes}},
-                       {"relaxation", memory_.relaxation},
-                       {"dissipated", memory_.dissipated},
-                       {"identity_defect", defect_now()},
-                       {"correction_energy", memory_.corrected}};
+    summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", memory_.count.steps,
+                                 memory_.count.rejected, summary.elements, element_order(case_), nodes);
+    summary.details.insert(summary.details.begin(), {{"elements", std::int64_t{summary.elements}},
+                                                     {"nodes", std::int64_t{nodes}},
+                                                     {"order", std::int64_t{element_order(case_)}},
+                                                     {"steps", std::int64_t{memory_.count.steps}},
+                                                     {"rejected_steps", std::int64_t{memory_.count.rejected}},
+                                                     {"time_tolerance", memory_.settings.tolerance},
+                                                     {"meshes", std::int64_t{memory_.count.meshes}},
+                                                     {"relaxation", memory_.scale.relaxation},
+                                                     {"dissipated", memory_.balance.dissipated},
+                                                     {"identity_defect", memory_.balance.defect_at(total())},
+                                                     {"correction_energy", memory_.balance.corrected}});
 }
 
 }  // namespace tubule::surface3d

@@ -2,34 +2,28 @@
 // and the reason why it ends.
 #pragma once
 
-#include <chrono>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "common/result/run.hpp"
+#include "common/run/output_times.hpp"
+#include "common/run/run_output.hpp"
+#include "common/run/run_pairs.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
 #include "surface3d/run/motion_checks.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_run.hpp"
 #include "surface3d/run/motion_settings.hpp"
-#include "surface3d/run/motion_trace.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 
-using Clock = std::chrono::steady_clock;
-
-// Whether a run is to stop here and go on another time.
-std::optional<StopReport> find_pause(const Case& c, RunObserver& watch, Clock::time_point started, double time);
-
 class MotionAttempt {
 public:
-    // Of a run for comparison nothing is written but checkpoints. Of the time limit, what has gone by since `started`
-    // is used. All references must outlive the attempt.
-    MotionAttempt(const Case& c, RunObserver& watch, const MotionSettings& settings, const MotionTrace* coarser,
-                  Clock::time_point started);
+    // All references must outlive the attempt.
+    MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
+                  const EndedRun* coarser);
 
     // One of the first two, then go().
     void begin(const Start& start);
@@ -37,11 +31,11 @@ public:
     void go();
 
     RunSummary summary;
-    MotionTrace trace;
+    EnergyTrace trace;
     // Largest ones, absolute: of the energy from the coarser run; of the balance with what dissipates, which shows what
     // both runs of a pair lose alike.
     double difference() const { return memory_.error; }
-    double defect() const { return memory_.defect; }
+    double defect() const { return memory_.balance.defect; }
 
 private:
     // What became of a trial step: nothing to say if it is taken.
@@ -75,32 +69,26 @@ private:
     void compare();
     void write_row();
     void write_frame();
-    void write_checkpoint();
     void summarise(const StopReport& stop);
-    Record record() const;
+    Record record();
 
     const SchemeEntry& traits() const { return entry(time_scheme(case_)); }
     MovingSurface& surface() const { return scheme_->surface(); }
-    bool reported() const { return memory_.settings.role == Role::reported; }
-    double seconds() const;
-    double length() const;
     double total() const { return now_.bending.energy + now_.kinetic; }
-    double defect_now() const { return total() - memory_.total_start + memory_.dissipated; }
-    double left_until_output() const { return outputs_[next_output_] - state_.time; }
+    double left_until_output() const { return outputs_.next() - state_.time; }
 
     const Case& case_;
-    RunObserver& watch_;
-    const MotionTrace* coarser_;
-    Clock::time_point started_;
+    const RunClock& clock_;
+    const EndedRun* coarser_;
+    RunOutput out_;
+    OutputTimes outputs_;
     std::unique_ptr<TimeScheme> scheme_;
     MotionState state_;
     MotionMeasures now_;
     MotionMemory memory_;
     StallDetector stall_;
     std::optional<StopReport> early_;  // nothing can be begun, or nothing is left to do
-    std::vector<double> outputs_;
-    std::size_t next_output_ = 0;
-    double error_now_ = 0, last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
+    double error_now_ = 0;
 };
 
 }  // namespace tubule::surface3d

@@ -25,10 +25,6 @@ std::string where(const Eigen::Vector3d& x) {
 
 }  // namespace
 
-bool can_go_on(Stop reason) {
-    return reason == Stop::interrupted || reason == Stop::time_limit;
-}
-
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
     if (!(m.symbol > 0))
         return StopReport{Stop::ill_posed, time,

@@ -10,9 +10,6 @@
 
 namespace tubule::surface3d {
 
-// Whether the run was stopped from outside, and can be resumed as if it had not been.
-bool can_go_on(Stop reason);
-
 // What lies in the shape and its triangles, so that no shorter step would help: an energy that does not resist short
 // waves, a neck thinner than r_min, normals that turn too far from node to node, a degenerate triangle.
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time);

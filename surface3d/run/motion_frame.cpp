@@ -15,18 +15,19 @@ void state_fields(Fields&& f, State& s) {
 }
 template <class Fields, class Memory>
 void memory_fields(Fields&& f, Memory& m) {
-    f.number("restart_next_step", m.next_step), f.number("restart_relaxation", m.relaxation);
+    f.number("restart_next_step", m.next_step), f.number("restart_relaxation", m.scale.relaxation);
     f.number("restart_elements", m.settings.elements), f.number("restart_tolerance", m.settings.tolerance);
     f.number("restart_difference", m.settings.difference), f.number("restart_pair", m.settings.pair);
     f.number("restart_role", m.settings.role);
-    f.number("restart_area", m.area), f.number("restart_volume", m.volume);
-    f.number("restart_least_variation", m.least_variation), f.number("restart_lowest_total", m.lowest_total);
-    f.number("restart_total_start", m.total_start), f.number("restart_dissipated", m.dissipated);
-    f.number("restart_corrected", m.corrected), f.number("restart_error", m.error);
-    f.number("restart_reference_energy", m.reference_energy), f.number("restart_defect", m.defect);
-    f.number("restart_dissipation_past", m.dissipation_past), f.number("restart_moved", m.moved);
-    f.number("restart_steps", m.steps), f.number("restart_rejected", m.rejected);
-    f.number("restart_mesh_since", m.mesh_since), f.number("restart_meshes", m.meshes);
+    f.number("restart_area", m.scale.area), f.number("restart_volume", m.scale.volume);
+    f.number("restart_least_variation", m.scale.least_variation),
+        f.number("restart_lowest_total", m.balance.lowest_total);
+    f.number("restart_total_start", m.balance.total_start), f.number("restart_dissipated", m.balance.dissipated);
+    f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
+    f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);
+    f.number("restart_dissipation_past", m.balance.dissipation_past), f.number("restart_moved", m.moved);
+    f.number("restart_steps", m.count.steps), f.number("restart_rejected", m.count.rejected);
+    f.number("restart_mesh_since", m.count.mesh_since), f.number("restart_meshes", m.count.meshes);
 }
 
 }  // namespace

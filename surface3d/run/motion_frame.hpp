@@ -1,6 +1,8 @@
 // Moving surfaces as records of the result file, and as what a run goes on from.
 #pragma once
 
+#include <cmath>
+
 #include "common/result/result.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/run/mesh_record.hpp"
@@ -8,19 +10,39 @@
 
 namespace tubule::surface3d {
 
+// What the start of a run determines.
+struct MotionScale {
+    double area = 0, volume = 0;
+    double relaxation = 0;       // the time in which the mesh relaxes
+    double least_variation = 0;  // of H, see MotionControl
+    double reference_energy = 0;
+
+    double length() const { return std::sqrt(area); }
+};
+
+// The energy with kinetic energy, and what has become of it.
+struct MotionBalance {
+    double total_start = 0, lowest_total = 0;  // then and since
+    double dissipated = 0, corrected = 0;
+    double dissipation_past = 0;  // rate at the step before
+    double defect = 0;            // largest defect of the dissipation identity
+
+    double defect_at(double total) const { return total - total_start + dissipated; }
+};
+
+struct MotionCounters {
+    int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
+};
+
 // Beside the state of the surface, what a run has to remember.
 struct MotionMemory {
     MotionSettings settings;
-    double next_step = 0, relaxation = 0;
-    double least_variation = 0;                // of H, see MotionControl
-    double area = 0, volume = 0;               // at the start
-    double total_start = 0, lowest_total = 0;  // energy with kinetic energy, then and since
-    double dissipated = 0, corrected = 0, reference_energy = 0;
-    double dissipation_past = 0;  // rate at the step before
-    double error = 0;             // largest difference from the coarser run
-    double defect = 0;            // largest defect of the dissipation identity
-    double moved = 0;             // the nodes, at most, since the last look for self-intersection
-    int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
+    MotionScale scale;
+    MotionBalance balance;
+    MotionCounters count;
+    double next_step = 0;
+    double error = 0;  // largest difference from the coarser run
+    double moved = 0;  // the nodes, at most, since the last look for self-intersection
 };
 
 // Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
+#include <utility>
 
 #include "surface3d/run/motion_attempt.hpp"
 #include "surface3d/run/motion_series.hpp"
@@ -12,144 +13,106 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr int most_pairs = 6;
-
-// What the finer run of a pair is compared with, and why that ended.
-struct Coarse {
-    MotionTrace trace;
-    StopReport stop;
-    bool known_until(double time) const {
-        return !trace.empty() && trace.end() > 0 && trace.end() >= time * (1 - 1e-3);
-    }
-};
-
-void describe(RunSummary& s, const Case& c, double error, int pairs) {
-    s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
-    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    s.details.emplace_back("pairs", std::int64_t{pairs});
-}
-
 // Nothing of it is cured by a finer run.
 bool ended_by_physics(const StopReport& stop) {
     return exit_code(stop.reason) == exit_code(Stop::pinch_off);
 }
 
-// The last run: less accurate than asked although nothing is left to refine, or compared with nothing.
-void accept(RunSummary& s, const Case& c, bool chosen, const Coarse& coarse) {
-    if (!coarse.known_until(s.stop.time)) {
-        const std::string why = coarse.stop.message.empty() ? "" : fmt::format(" ({})", coarse.stop.message);
-        s.warnings.push_back(
-            fmt::format("the coarser run of the pair came to t = {:.6g} only: the error after that is not known{}",
-                        coarse.trace.empty() ? 0 : coarse.trace.end(), why));
-    }
-    if (s.as_accurate_as_asked || can_go_on(s.stop.reason)) return;
-    s.warnings.push_back(fmt::format("the energy is off by {:.2g} of E_ref (estimated), {:.2g} was asked for",
-                                     s.estimated_error, c.accuracy.energy));
-    if (chosen || s.stop.reason != Stop::finished) return;
-    s.stop = {Stop::resolution_lost, s.stop.time, s.warnings.back(), "ask for less accuracy"};
-    s.warnings.pop_back();
+bool known_until(const EnergyTrace& trace, double time) {
+    return !trace.empty() && trace.end() > 0 && trace.end() >= time * (1 - 1e-3);
 }
 
-// The runs of a case: in pairs, each finer than the one before.
-class Pairs {
+class MotionRuns : public PairedRuns {
 public:
-    Pairs(const Case& c, const Start& start, RunObserver& watch, const Restart* restart)
-        : case_(c), start_(start), watch_(watch), restart_(restart), settings_(first_settings(c)) {
-        if (restart) {
-            begun_ = motion_restart(restart->record, time_scheme(c)).memory.settings;
-            if (begun_->role == Role::reported) settings_ = *begun_, coarse_.trace = {restart->record, coarser_trace};
-        }
+    MotionRuns(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const Restart* restart)
+        : case_(c), start_(start), watch_(watch), clock_(clock), restart_(restart), settings_(first_settings(c)) {
+        if (!restart) return;
+        begun_ = motion_restart(restart->record, time_scheme(c)).memory.settings;
+        if (begun_->role == Role::reported) settings_ = *begun_;
     }
 
-    RunSummary run() {
-        if (coarse_.trace.empty()) {
-            // The result shows the start, whatever ends the coarser run.
-            if (!restart_) MotionAttempt(case_, watch_, settings_, nullptr, started_).begin(start_);
-            RunSummary other = run_coarse();
-            if (can_go_on(other.stop.reason)) return unfinished(std::move(other));
-            watch_.discard();  // the start, and what the other was saved with
-            restart_ = nullptr;
-        }
-        const bool given = settings_given(case_) || !start_.resizable();
-        for (;;) {
-            MotionAttempt fine = attempt(case_, settings_, coarse_.trace.empty() ? nullptr : &coarse_.trace);
-            RunSummary& s = fine.summary;
-            const bool together = ended_by_physics(s.stop) && s.stop.reason == coarse_.stop.reason;
-            const bool known = together || coarse_.known_until(s.stop.time);
-            const double difference = known ? fine.difference() : s.reference_energy;
-            describe(s, case_, std::max(difference, fine.defect()), settings_.pair);
-            const bool enough = s.as_accurate_as_asked || s.stop.reason == Stop::ill_posed || can_go_on(s.stop.reason);
-            const bool most = given || settings_.pair >= most_pairs || !can_be_finer(settings_);
-            const auto pause = enough || most ? std::nullopt : find_pause(case_, watch_, started_, s.stop.time);
-            if (pause) s.stop = *pause, s.stop.message += ", before a finer run";
-            if (enough || most || pause) {
-                accept(s, case_, given, coarse_);
-                return s;
-            }
-            settings_ = finer(settings_, case_.accuracy.energy * s.reference_energy, difference, fine.defect());
-            watch_.discard();
-            coarse_ = {std::move(fine.trace), s.stop};
-        }
+    void show_start() override { MotionAttempt(case_, watch_, clock_, settings_, nullptr).begin(start_); }
+
+    // With too few triangles, or when their number is not ours to choose, the other run has elements of another order.
+    // So it has where fewer triangles lose the surface on the way.
+    RunSummary& run_coarser() override {
+        const bool begun = begun_ && begun_->role == Role::other_order;
+        const bool fewer = start_.resizable() && coarser(settings_, Role::fewer_triangles).elements >= least_triangles;
+        if (begun || !fewer) return run_coarser(Role::other_order);
+        const Stop first = run_coarser(Role::fewer_triangles).stop.reason;
+        if (first != Stop::resolution_lost && first != Stop::pinch_off) return ended_.summary;
+        Ended before = std::move(ended_);
+        const Stop second = run_coarser(Role::other_order).stop.reason;
+        if (!can_go_on(second) && !known_until(ended_.trace, before.summary.stop.time)) ended_ = std::move(before);
+        return ended_.summary;
+    }
+
+    RunSummary& run_reported(const EndedRun& coarser) override { return run(case_, settings_, &coarser); }
+    EndedRun ended() override { return {ended_.trace, ended_.summary.stop}; }
+
+    // Where the coarser run ended earlier, all of the energy, but not if the same happened to both.
+    double error(const EndedRun& other) override {
+        RunSummary& s = ended_.summary;
+        const bool known = known_until(other.trace, s.stop.time);
+        if (!known)
+            s.warnings.push_back(fmt::format(
+                "the coarser run of the pair ended at t = {:.6g} with {}: the error after that is not known",
+                other.stop.time, name(other.stop.reason)));
+        const bool together = ended_by_physics(s.stop) && s.stop.reason == other.stop.reason;
+        if (!known && !together) ended_.difference = s.reference_energy;
+        return std::max(ended_.difference, ended_.defect);
+    }
+
+    bool refine(const RunSummary& last) override {
+        if (last.as_accurate_as_asked || last.stop.reason == Stop::ill_posed) return false;
+        if (!fixed_by().empty() || !can_be_finer(settings_)) return false;
+        settings_ = finer(settings_, case_.accuracy.energy * last.reference_energy, ended_.difference, ended_.defect);
+        return true;
+    }
+
+    std::string fixed_by() const override {
+        if (!start_.resizable()) return "the triangles are given";
+        return settings_given(case_) ? "discretisation.elements, time_tolerance or step are given" : "";
     }
 
 private:
-    // Goes on with the run that was interrupted, if it is that one.
-    MotionAttempt attempt(const Case& c, const MotionSettings& settings, const MotionTrace* coarser) {
-        MotionAttempt out(c, watch_, settings, coarser, started_);
-        const bool again = restart_ && begun_->role == settings.role;
-        if (again) {
-            out.summary.warnings = start_.notes();
-            out.resume(*restart_);
-            restart_ = nullptr;
-        } else {
-            out.begin(start_);
-        }
-        out.go();
-        return out;
-    }
+    // What is left of the last run.
+    struct Ended {
+        RunSummary summary;
+        EnergyTrace trace;
+        double difference = 0, defect = 0;
+    };
 
-    RunSummary run_coarse(Role role) {
+    RunSummary& run_coarser(Role role) {
         Case other = case_;
         const int order = element_order(case_);
         if (role == Role::other_order) other.surface.order = order > 2 ? order - 1 : 3;
         if (case_.surface.step) other.surface.step = 2 * *case_.surface.step;
-        MotionAttempt run = attempt(other, coarser(settings_, role), nullptr);
-        coarse_ = {std::move(run.trace), run.summary.stop};
-        return run.summary;
+        return run(other, coarser(settings_, role), nullptr);
     }
 
-    // With too few triangles, or when their number is not ours to choose, the other run has elements of another order.
-    // So it has where fewer triangles lose the surface on the way.
-    RunSummary run_coarse() {
-        const bool begun = begun_ && begun_->role == Role::other_order;
-        const bool fewer = start_.resizable() && coarser(settings_, Role::fewer_triangles).elements >= least_triangles;
-        if (begun || !fewer) return run_coarse(Role::other_order);
-        RunSummary first = run_coarse(Role::fewer_triangles);
-        if (first.stop.reason != Stop::resolution_lost && first.stop.reason != Stop::pinch_off) return first;
-        Coarse before = std::move(coarse_);
-        RunSummary second = run_coarse(Role::other_order);
-        if (can_go_on(second.stop.reason) || coarse_.known_until(before.stop.time)) return second;
-        coarse_ = std::move(before);
-        return first;
-    }
-
-    // The coarser run has been saved, to go on with.
-    RunSummary unfinished(RunSummary s) {
-        describe(s, case_, s.reference_energy, settings_.pair);  // nothing is known of the error yet
-        s.stop.message +=
-            fmt::format(", at t = {:.6g} of the coarser run, which tells the error of the other", s.stop.time);
-        s.stop.time = begin_time(case_);
-        return s;
+    // Goes on with the run that was interrupted, if it is that one.
+    RunSummary& run(const Case& c, const MotionSettings& settings, const EndedRun* coarser) {
+        MotionAttempt run(c, watch_, clock_, settings, coarser);
+        if (restart_ && begun_->role == settings.role) {
+            run.summary.warnings = start_.notes();
+            run.resume(*std::exchange(restart_, nullptr));
+        } else {
+            run.begin(start_);
+        }
+        run.go();
+        ended_ = {std::move(run.summary), std::move(run.trace), run.difference(), run.defect()};
+        return ended_.summary;
     }
 
     const Case& case_;
     const Start& start_;
     RunObserver& watch_;
-    const Restart* restart_;
-    const Clock::time_point started_ = Clock::now();
+    const RunClock& clock_;
+    const Restart* restart_;               // until the run goes on from it
     std::optional<MotionSettings> begun_;  // of the run that was interrupted
     MotionSettings settings_;              // of the run to be reported
-    Coarse coarse_;
+    Ended ended_;
 };
 
 }  // namespace
@@ -163,7 +126,10 @@ void check_restart(const Case& c, const Record& record) {
 }
 
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
-    return Pairs(c, start, observer, restart).run();
+    const RunClock clock(c, observer);
+    MotionRuns runs(c, start, observer, clock, restart);
+    RunPairs pairs(runs, c, observer, begin_time(c), restart ? &restart->record : nullptr);
+    return drive(c, observer, clock, pairs);
 }
 
 }  // namespace tubule::surface3d

@@ -6,7 +6,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/record.hpp"
-#include "common/result/run.hpp"
+#include "common/run/run.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {

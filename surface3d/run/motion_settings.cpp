@@ -7,6 +7,7 @@ namespace tubule::surface3d {
 namespace {
 
 // Measured choices: docs/decisions.md, "Surfaces in motion".
+constexpr int most_pairs = 6;
 constexpr int first_triangles = 180, most_triangles = 40000;    // of the finer run of a pair
 constexpr double fewer_triangles = 2.25, longer_tolerance = 8;  // of the coarser one
 constexpr double least_growth = 1.6, most_growth = 4;           // of the number of triangles, from pair to pair
@@ -53,7 +54,7 @@ MotionSettings finer(const MotionSettings& s, double asked, double difference, d
 }
 
 bool can_be_finer(const MotionSettings& s) {
-    return s.elements * least_growth <= most_triangles;
+    return s.pair < most_pairs && s.elements * least_growth <= most_triangles;
 }
 
 }  // namespace tubule::surface3d

@@ -37,11 +37,12 @@ VectorField start_velocity(const Case& c, const StartMesh& start) {
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
-    memory.area = o.area, memory.volume = o.volume;
-    memory.reference_energy = c.handover ? c.handover->reference_energy : std::max(std::abs(o.energy), o.magnitude);
-    memory.relaxation =
+    memory.scale.area = o.area, memory.scale.volume = o.volume;
+    memory.scale.reference_energy =
+        c.handover ? c.handover->reference_energy : std::max(std::abs(o.energy), o.magnitude);
+    memory.scale.relaxation =
         c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0));
-    memory.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
+    memory.scale.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
 }
 
 }  // namespace tubule::surface3d

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
 
 #include "common/result/record.hpp"
+#include "common/run/driver.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/guards.hpp"
@@ -63,89 +66,145 @@ double estimated_error(const std::vector<double>& energies, double least_fall = 
     return change * fall / (1 - fall);
 }
 
-struct Answer {
-    Measured measured;
-    double error = 0;  // of the energy, estimated, absolute
-    int meshes = 1;
-};
-
-// A mesh that is given: compared with the same triangles one order lower, or at the lowest with another recovery.
-Answer on_given_mesh(const Case& c, StartMesh start) {
-    const int order = start.mesh.order;
-    const Measured other = order > 2 ? measure(c, {with_order(start.mesh, order - 1), {}, {}}, c.surface.recovery)
-                                     : measure(c, start, Recovery::normal);
-    Answer answer{measure(c, std::move(start), c.surface.recovery), 0, 1};
-    answer.error = given_mesh_margin * std::abs(answer.measured.o.energy - other.o.energy);
-    return answer;
-}
-
 double reference_energy(const Observables& o) {
     return std::max(std::abs(o.energy), o.magnitude);
 }
 
-// An estimate, or if there is none as yet, all of the energy.
-double error_or_all(double error, const Observables& o) {
-    return std::isfinite(error) ? error : reference_energy(o);
-}
+// A shape on one mesh after the other, whose energies tell the error: of the last one, which is kept for the result.
+class MeshSequence : public EstimatedRuns {
+public:
+    MeshSequence(const Case& c, const Start& start) : case_(c), start_(start) {}
 
-StopReport interruption() {
-    return {Stop::interrupted, 0, "interrupted by a signal", ""};
-}
-
-// So many triangles, compared with a quarter and a sixteenth of them. No other mesh is compared,
-// so that cancellation may understate the error.
-Answer on_elements(const Case& c, const Start& start, int elements, RunObserver& observer) {
-    std::vector<double> energies;
-    for (int part = 16;; part /= 4) {
-        if (part > 1 && elements / part < fewest_triangles) continue;
-        Answer answer{measure(c, start.mesh(elements / part, element_order(c)), c.surface.recovery), 0,
-                      static_cast<int>(energies.size()) + 1};
-        energies.push_back(answer.measured.o.energy);
-        answer.error = error_or_all(estimated_error(energies, 1.0 / 4), answer.measured.o);
-        if (part == 1) return answer;
-        if (observer.interrupted()) {
-            answer.measured.stop = interruption();
-            return answer;
-        }
+    RunSummary& next() override {
+        const double error = measure_next();
+        const Observables& o = measured_->o;
+        ++meshes_;
+        error_ = std::isfinite(error) ? error : reference_energy(o);  // all of it where nothing is known as yet
+        summary_ = {};
+        summary_.stop = measured_->stop.value_or(
+            StopReport{Stop::finished, 0, "geometry, curvature and energies of the shape", ""});
+        summary_.energy = o.energy;
+        summary_.reference_energy = reference_energy(o);
+        summary_.estimated_error = summary_.reference_energy > 0 ? error_ / summary_.reference_energy : 0;
+        summary_.warnings = start_.notes();
+        describe_effort();
+        return summary_;
     }
-}
+
+    const Measured& measured() const { return *measured_; }
+    double error() const { return error_; }  // of the energy, absolute
+
+protected:
+    // Measures the shape on the next mesh; the error of its energy, infinite where that is not known.
+    virtual double measure_next() = 0;
+
+    double measure_on(int triangles) {
+        measured_ = measure(case_, start_.mesh(triangles, element_order(case_)), case_.surface.recovery);
+        return measured_->o.energy;
+    }
+
+    const Case& case_;
+    const Start& start_;
+    std::optional<Measured> measured_;
+    int meshes_ = 0;
+
+private:
+    void describe_effort() {
+        const CurvedMesh& mesh = measured_->start.mesh;
+        summary_.elements = mesh.triangles();
+        summary_.effort = fmt::format("{} triangles of order {}, {} nodes", mesh.triangles(), mesh.order, mesh.size());
+        summary_.details = {{"elements", std::int64_t{mesh.triangles()}},
+                            {"nodes", std::int64_t{mesh.size()}},
+                            {"order", std::int64_t{mesh.order}},
+                            {"meshes", std::int64_t{meshes_}}};
+    }
+
+    RunSummary summary_;
+    double error_ = 0;
+};
+
+// A mesh that is given: compared with the same triangles one order lower, or at the lowest with another recovery.
+class GivenMesh : public MeshSequence {
+public:
+    using MeshSequence::MeshSequence;
+    bool refine(const RunSummary&) override { return false; }
+    std::string fixed_by() const override { return "the triangles are given"; }
+
+private:
+    double measure_next() override {
+        StartMesh start = start_.mesh(0, element_order(case_));
+        const int order = start.mesh.order;
+        const Measured other = order > 2
+                                   ? measure(case_, {with_order(start.mesh, order - 1), {}, {}}, case_.surface.recovery)
+                                   : measure(case_, start, Recovery::normal);
+        measured_ = measure(case_, std::move(start), case_.surface.recovery);
+        return given_mesh_margin * std::abs(measured_->o.energy - other.o.energy);
+    }
+};
+
+// So many triangles, compared with a quarter and a sixteenth of them. No other mesh is compared, so that cancellation
+// may understate the error.
+class GivenElements : public MeshSequence {
+public:
+    GivenElements(const Case& c, const Start& start, int elements) : MeshSequence(c, start), elements_(elements) {
+        while (part_ > 1 && elements_ / part_ < fewest_triangles) part_ /= 4;
+    }
+    bool refine(const RunSummary&) override {
+        if (part_ == 1) return false;
+        part_ /= 4;
+        return true;
+    }
+    std::string fixed_by() const override { return "the triangles are given"; }
+
+private:
+    double measure_next() override {
+        energies_.push_back(measure_on(elements_ / part_));
+        return estimated_error(energies_, 1.0 / 4);
+    }
+
+    int elements_, part_ = 16;
+    std::vector<double> energies_;
+};
 
 // Twice as many triangles again and again, until the energy is as accurate as asked. Every other mesh has half the
 // width; those in between have their own say, so that two energies which agree by chance do not end it.
-Answer as_accurate_as_asked(const Case& c, const Start& start, RunObserver& observer) {
-    std::vector<double> energies[2];
-    double before = std::numeric_limits<double>::infinity();
-    for (int count = 0, triangles = fewest_triangles;; ++count, triangles *= 2) {
-        Answer answer{measure(c, start.mesh(triangles, element_order(c)), c.surface.recovery), 0, count + 1};
-        std::vector<double>& same = energies[count % 2];
-        same.push_back(answer.measured.o.energy);
-        const double error = estimated_error(same);
-        answer.error = error_or_all(std::max(error, std::sqrt(fastest_fall) * before), answer.measured.o);
-        before = error;
-        if (observer.interrupted()) {
-            answer.measured.stop = interruption();
-            return answer;
-        }
-        const bool enough = answer.error <= c.accuracy.energy * reference_energy(answer.measured.o);
-        if ((enough && !answer.measured.stop) || 2 * triangles > most_triangles) return answer;
+class MoreAndMore : public MeshSequence {
+public:
+    using MeshSequence::MeshSequence;
+    bool refine(const RunSummary& last) override {
+        if ((last.as_accurate_as_asked && !measured_->stop) || 2 * triangles_ > most_triangles) return false;
+        triangles_ *= 2;
+        return true;
     }
+    std::string fixed_by() const override { return ""; }
+
+private:
+    double measure_next() override {
+        std::vector<double>& same = energies_[meshes_ % 2];
+        same.push_back(measure_on(triangles_));
+        const double before = std::exchange(before_, estimated_error(same));
+        return std::max(before_, std::sqrt(fastest_fall) * before);
+    }
+
+    int triangles_ = fewest_triangles;
+    std::vector<double> energies_[2];
+    double before_ = std::numeric_limits<double>::infinity();
+};
+
+std::unique_ptr<MeshSequence> meshes_of(const Case& c, const Start& start) {
+    if (!start.resizable()) return std::make_unique<GivenMesh>(c, start);
+    if (c.surface.elements) return std::make_unique<GivenElements>(c, start, *c.surface.elements);
+    return std::make_unique<MoreAndMore>(c, start);
 }
 
-Answer answer_to(const Case& c, const Start& start, RunObserver& observer) {
-    if (!start.resizable()) return on_given_mesh(c, start.mesh(0, element_order(c)));
-    return c.surface.elements ? on_elements(c, start, *c.surface.elements, observer)
-                              : as_accurate_as_asked(c, start, observer);
-}
-
-std::vector<double> row(const Answer& answer, double seconds) {
-    const Observables& o = answer.measured.o;
-    const CurvedMesh& mesh = answer.measured.start.mesh;
+std::vector<double> row(const Measured& m, double error, double seconds) {
+    const Observables& o = m.o;
+    const CurvedMesh& mesh = m.start.mesh;
     std::vector<double> out{0, o.energy};
     out.insert(out.end(), o.energy_term.begin(), o.energy_term.end());
     const double width = std::sqrt(o.area / mesh.triangles() * 4 / std::sqrt(3.0));
-    for (const double value :
-         {o.area, o.volume, o.integral_H2, o.integral_K, gauss_bonnet_defect(o, mesh), answer.measured.quality.worst,
-          answer.error, static_cast<double>(mesh.triangles()), width, seconds})
+    for (const double value : {o.area, o.volume, o.integral_H2, o.integral_K, gauss_bonnet_defect(o, mesh),
+                               m.quality.worst, error, static_cast<double>(mesh.triangles()), width, seconds})
         out.push_back(value);
     return out;
 }
@@ -166,21 +225,6 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
     return out;
 }
 
-// What the run came to, in the end.
-StopReport stop_of(const Case& c, const Start& start, const Answer& answer, RunSummary& summary) {
-    if (answer.measured.stop) return *answer.measured.stop;
-    const StopReport done{Stop::finished, 0, "geometry, curvature and energies of the shape", ""};
-    if (summary.as_accurate_as_asked) return done;
-    const std::string missed = fmt::format("the energy is off by {:.2g} of E_ref (estimated), {:.2g} was asked for",
-                                           summary.estimated_error, c.accuracy.energy);
-    if (c.surface.elements || !start.resizable()) {
-        summary.warnings.push_back(missed + ": the triangles are given");
-        return done;
-    }
-    return {Stop::resolution_lost, 0, fmt::format("{}, even with {} triangles", missed, summary.elements),
-            "ask for less accuracy: this shape, or this recovery, converges slowly"};
-}
-
 }  // namespace
 
 std::vector<std::string> series_names(const Case& c) {
@@ -199,24 +243,11 @@ RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
 
 RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
     if (c.moves()) return run_motion(c, start, observer, restart);
-    const auto started = std::chrono::steady_clock::now();
-    const Answer answer = answer_to(c, start, observer);
-    const Measured& m = answer.measured;
-    RunSummary s;
-    s.energy = m.o.energy;
-    s.reference_energy = reference_energy(m.o);
-    s.estimated_error = s.reference_energy > 0 ? answer.error / s.reference_energy : 0;
-    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    s.elements = m.start.mesh.triangles();
-    s.warnings = start.notes();
-    s.effort = fmt::format("{} triangles of order {}, {} nodes", s.elements, m.start.mesh.order, m.start.mesh.size());
-    s.details = {{"elements", std::int64_t{s.elements}},
-                 {"nodes", std::int64_t{m.start.mesh.size()}},
-                 {"order", std::int64_t{m.start.mesh.order}},
-                 {"meshes", std::int64_t{answer.meshes}}};
-    s.stop = stop_of(c, start, answer, s);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    if (m.has_curvature()) observer.row(row(answer, seconds));
+    const RunClock clock(c, observer);
+    const auto meshes = meshes_of(c, start);
+    RunSummary s = drive(c, observer, clock, *meshes);
+    const Measured& m = meshes->measured();
+    if (m.has_curvature()) observer.row(row(m, meshes->error(), clock.seconds()));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });
     return s;

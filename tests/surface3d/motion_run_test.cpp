@@ -12,7 +12,7 @@
 #include "common/case/read.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
-#include "surface3d/run/motion_trace.hpp"
+#include "common/run/energy_trace.hpp"
 #include "surface3d/run/run.hpp"
 
 namespace tubule::surface3d {
@@ -125,8 +125,8 @@ TEST(MotionSettings, TheCoarserRunIsLooserButNotTooLoose) {
     EXPECT_EQ(coarser(fine, Role::other_order).elements, fine.elements);
 }
 
-TEST(MotionTrace, InterpolatesStepsOfAnyLength) {
-    MotionTrace trace;
+TEST(EnergyTrace, InterpolatesStepsOfAnyLength) {
+    EnergyTrace trace;
     for (const double t : {0.0, 1.0, 2.5, 3.0}) trace.add(t, t * t * t);
     EXPECT_NEAR(trace(2), 8, 1e-12);  // a cubic is its own
     EXPECT_NEAR(trace(2.5), 2.5 * 2.5 * 2.5, 1e-12);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "common/result/run.hpp"
+#include "common/run/run.hpp"
 #include "tools/auto/joined_file.hpp"
 #include "tools/auto/noise_growth.hpp"
 

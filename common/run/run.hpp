@@ -24,6 +24,11 @@ struct RunObserver {
     virtual void note(const std::string& /*words*/) {}  // what is worth telling at once
 };
 
+// Whether the run was stopped from outside, and can be resumed as if it had not been.
+inline bool can_go_on(Stop reason) {
+    return reason == Stop::interrupted || reason == Stop::time_limit;
+}
+
 struct RunSummary {
     StopReport stop;
     double energy = 0;            // at the stop

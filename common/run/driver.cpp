@@ -1,0 +1,39 @@
+#include "common/run/driver.hpp"
+
+#include <fmt/format.h>
+
+namespace tubule {
+namespace {
+
+// Of a run that is not refined any more, although it may be less accurate than asked.
+void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
+    if (s.as_accurate_as_asked || can_go_on(s.stop.reason)) return;
+    const std::string missed = fmt::format("the energy is off by {:.2g} of E_ref (estimated), {:.2g} was asked for",
+                                           s.estimated_error, c.accuracy.energy);
+    if (fixed_by.empty() && s.stop.reason == Stop::finished)
+        s.stop = {Stop::resolution_lost, s.stop.time, missed, "ask for less accuracy"};
+    else
+        s.warnings.push_back(fixed_by.empty() ? missed : fmt::format("{}: {}", missed, fixed_by));
+}
+
+}  // namespace
+
+RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
+    for (;;) {
+        RunSummary& s = runs.next();
+        s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
+        if (can_go_on(s.stop.reason)) return s;
+        if (!runs.refine(s)) {
+            judge(s, c, runs.fixed_by());
+            return s;
+        }
+        if (const auto pause = clock.find_pause(s.stop.time)) {
+            s.stop = *pause;
+            s.stop.message += ", before a finer run";
+            return s;
+        }
+        watch.discard();
+    }
+}
+
+}  // namespace tubule

@@ -1,0 +1,41 @@
+// The energy along a run, for another run to be compared with.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+class EnergyTrace {
+public:
+    EnergyTrace() = default;
+    // What array() put into a record under this name; empty where it has none.
+    EnergyTrace(const Record& record, const std::string& name);
+
+    // A point later than all before; else it is left out. All points of a trace have a slope, or none has.
+    void add(double t, double energy) { add(t, energy, {}); }
+    void add(double t, double energy, std::optional<double> slope);
+    // A run goes on from here: forgets what is later.
+    void cut_after(double t);
+    bool empty() const { return time_.empty(); }
+    double end() const { return time_.back(); }
+
+    // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
+    // too near to them.
+    double operator()(double t) const;
+    // How far another run's energy is from this one's, absolute; nothing after the end.
+    std::optional<double> difference(double t, double energy) const;
+
+    // One row a point: time, energy, and slope if there are slopes.
+    Array array(const std::string& name) const;
+
+private:
+    double through_neighbours(double t, int after) const;
+
+    std::vector<double> time_, energy_, slope_;
+};
+
+}  // namespace tubule

@@ -1,0 +1,123 @@
+// The driver of runs that estimate their error, and the energies that two runs are compared by. What is expected
+// follows from the fake runs: each is ten times as accurate as the one before.
+#include "common/run/driver.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/run/energy_trace.hpp"
+#include "common/run/output_times.hpp"
+#include "common/run/run_pairs.hpp"
+
+namespace tubule {
+namespace {
+
+struct Watch : RunObserver {
+    int discards = 0;
+    bool stop = false;
+    void discard() override { ++discards; }
+    bool interrupted() override { return stop; }
+};
+
+class FakeRuns : public EstimatedRuns {
+public:
+    RunSummary& next() override {
+        summary_ = {};
+        summary_.stop = {Stop::finished, 2, "reached time.end", ""};
+        summary_.estimated_error = error;
+        return summary_;
+    }
+    bool refine(const RunSummary& last) override {
+        if (last.as_accurate_as_asked || error < least) return false;
+        error /= 10;
+        return true;
+    }
+    std::string fixed_by() const override { return fixed; }
+
+    double error = 1, least = 0;
+    std::string fixed;
+
+private:
+    RunSummary summary_;
+};
+
+RunSummary driven(FakeRuns& runs, Watch& watch) {
+    Case c;
+    c.accuracy.energy = 2e-3;
+    const RunClock clock(c, watch);
+    return drive(c, watch, clock, runs);
+}
+
+TEST(Driver, RefinesUntilTheRunIsAsAccurateAsAsked) {
+    FakeRuns runs;
+    Watch watch;
+    const RunSummary s = driven(runs, watch);
+    EXPECT_EQ(s.stop.reason, Stop::finished);
+    EXPECT_DOUBLE_EQ(s.estimated_error, 1e-3);
+    EXPECT_TRUE(s.as_accurate_as_asked);
+    EXPECT_EQ(watch.discards, 3);
+}
+
+TEST(Driver, SaysWhatIsMissed) {
+    FakeRuns runs;
+    runs.least = 0.5;  // one refinement
+    Watch watch;
+    const RunSummary lost = driven(runs, watch);
+    EXPECT_EQ(lost.stop.reason, Stop::resolution_lost);
+    EXPECT_EQ(lost.stop.message, "the energy is off by 0.1 of E_ref (estimated), 0.002 was asked for");
+    EXPECT_TRUE(lost.warnings.empty());
+
+    FakeRuns given;
+    given.least = 2, given.fixed = "the triangles are given";
+    const RunSummary warned = driven(given, watch);
+    EXPECT_EQ(warned.stop.reason, Stop::finished);
+    ASSERT_EQ(warned.warnings.size(), 1u);
+    EXPECT_EQ(warned.warnings[0],
+              "the energy is off by 1 of E_ref (estimated), 0.002 was asked for: the triangles are given");
+}
+
+TEST(Driver, PausesBeforeAFinerRun) {
+    FakeRuns runs;
+    Watch watch;
+    watch.stop = true;
+    const RunSummary s = driven(runs, watch);
+    EXPECT_EQ(s.stop.reason, Stop::interrupted);
+    EXPECT_EQ(s.stop.message, "interrupted by a signal, before a finer run");
+    EXPECT_EQ(s.stop.time, 2);
+    EXPECT_EQ(watch.discards, 0);
+}
+
+TEST(OutputTimes, AreThoseAfterTheBeginInOrder) {
+    Case c;
+    c.time.end = 3, c.time.output = {2, 1, 0, 2};
+    OutputTimes times(c);
+    EXPECT_EQ(times.pass(), 1);
+    EXPECT_TRUE(times.due(2));
+    EXPECT_FALSE(times.due(1.9));
+    times.go_on_from(2);
+    EXPECT_EQ(times.pass(), 3);
+    EXPECT_TRUE(times.done());
+}
+
+TEST(EnergyTrace, IsTheSameFromARecord) {
+    // A cubic and its slope: what is interpolated is exact.
+    EnergyTrace trace;
+    for (const double t : {0.0, 1.0, 2.5, 3.0}) trace.add(t, t * t * t, 3 * t * t);
+    trace.add(2.0, 7, 7);  // not later than all before
+    EXPECT_NEAR(trace(2), 8, 1e-14);
+    EXPECT_NEAR(trace.difference(2, 9.0).value(), 1, 1e-14);
+    EXPECT_FALSE(trace.difference(3.1, 0));
+
+    Record record;
+    record.time = 2.5;
+    const EndedRun coarser{trace, {Stop::pinch_off, 3, "", ""}};
+    add_to_record(record, trace, &coarser);
+    const PairMemory memory = pair_memory(record);
+    EXPECT_EQ(memory.own.end(), 2.5);  // the run goes on from the record
+    ASSERT_TRUE(memory.coarser);
+    EXPECT_EQ(memory.coarser->trace(2.75), trace(2.75));
+    EXPECT_EQ(memory.coarser->stop.reason, Stop::pinch_off);
+    EXPECT_EQ(memory.coarser->stop.time, 3);
+}
+
+}  // namespace
+}  // namespace tubule
