@@ -1,9 +1,5 @@
 #include "axisym/run.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_run.hpp"
 #include "axisym/graph/graph_frame.hpp"
@@ -19,21 +15,6 @@ bool begins_as_graph(const Case& c) {
 }
 
 }  // namespace
-
-void describe_effort(RunSummary& s) {
-    const FlowCounters& n = s.counters;
-    s.effort = fmt::format("{} steps, {} elements", n.steps, s.elements);
-    s.details = {{"attempts", std::int64_t{s.attempts}},
-                 {"meshes", std::int64_t{s.meshes}},
-                 {"elements", std::int64_t{s.elements}},
-                 {"time_tolerance", s.time_tolerance},
-                 {"steps", std::int64_t{n.steps}},
-                 {"residuals", std::int64_t{n.residuals}},
-                 {"jacobians", std::int64_t{n.jacobians}},
-                 {"newton_iterations", std::int64_t{n.newton_iterations}},
-                 {"error_test_failures", std::int64_t{n.error_failures}},
-                 {"newton_failures", std::int64_t{n.newton_failures}}};
-}
 
 std::vector<std::string> series_names(const Case& c) {
     return begins_as_graph(c) ? graph_series_names(c) : curve_series_names(c);

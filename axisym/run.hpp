@@ -4,22 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/run_summary.hpp"
 #include "common/case/case.hpp"
 #include "common/result/record.hpp"
-#include "common/run/run.hpp"
 
 namespace tubule::axisym {
-
-struct RunSummary : tubule::RunSummary {
-    int attempts = 1;  // how often the run began again with finer settings, plus one
-    int meshes = 1;    // of the last attempt
-    double time_tolerance = 0;
-    FlowCounters counters;  // of the last attempt
-};
-
-// Sets `effort` and `details`.
-void describe_effort(RunSummary& summary);
 
 // Names of the series a run of this case writes, "time" first.
 std::vector<std::string> series_names(const Case& c);

@@ -1,16 +1,13 @@
 // A case of tier "axisym" whose profile is a graph r(z): the gradient flow of tubes, at its quickest.
 #pragma once
 
-#include <string>
-#include <vector>
-
-#include "axisym/run.hpp"
+#include "axisym/graph/graph_series.hpp"
+#include "axisym/integration/run_summary.hpp"
 
 namespace tubule::axisym {
 
-std::vector<std::string> graph_series_names(const Case& c);
-
-// As run(); stops with `overhang` where the profile gets a vertical tangent.
+// As run(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
+// (graph_error_transport.hpp); where that exceeds what was asked, it begins again with finer settings.
 RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart = nullptr);
 
 }  // namespace tubule::axisym

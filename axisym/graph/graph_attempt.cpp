@@ -1,0 +1,354 @@
+#include "axisym/graph/graph_attempt.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "axisym/graph/graph_derivatives.hpp"
+#include "axisym/graph/graph_series.hpp"
+#include "axisym/graph/graph_start.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// Measured choices: docs/decisions.md, "Ask for accuracy".
+constexpr double first_remesh_margin = 1.0 / 10;  // defect after a remesh / defect before
+constexpr int few_steps = 50;                     // between two remeshes of a shape that keeps sharpening
+constexpr int damping_steps = 3;                  // after a remesh
+constexpr int most_failures = 3;                  // of the integrator at one state
+constexpr double hopeless_error = 0.1;            // of E_ref: explicit settings that lose the shape
+
+// Linearly implicit Euler steps of length dt: the state after them, and its rate.
+struct Damped {
+    Eigen::VectorXd x, rate;
+};
+Damped damp(const Forms& forms, const Eigen::VectorXd& x, double dt) {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    Eigen::SparseMatrix<double> matrix = forms.pattern();
+    SparseLu lu;
+    Damped out{x, {}};
+    for (int k = 0; k < damping_steps; ++k) {
+        forms.jacobian(out.x.data(), rest.data(), 1 / dt, matrix.valuePtr());
+        lu.factor(matrix);
+        out.rate = -lu.solve(forms.gradient(out.x)) / dt;
+        out.x += dt * out.rate;
+    }
+    return out;
+}
+
+}  // namespace
+
+GraphAttempt::GraphAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const GraphSettings& settings)
+    : case_(c),
+      clock_(clock),
+      settings_(settings),
+      out_(watch, clock, true),
+      outputs_(c),
+      remesh_margin_(first_remesh_margin) {}
+
+double GraphAttempt::Now::lost() const {
+    return std::accumulate(defect.begin(), defect.end(), 0.0);
+}
+
+const Observation& GraphAttempt::observe(double t, const double* x, const double* v) {
+    if (t != now_.time) {
+        now_.o = stage_->look(x, v, &now_.defect);
+        now_.time = t;
+    }
+    return now_.o;
+}
+
+void GraphAttempt::use_stage(std::unique_ptr<GraphStage> stage) {
+    stage_ = std::move(stage);
+    summary.elements = stage_->space.elements() * stage_->space.cell().images();
+}
+
+FlowSystem GraphAttempt::system() {
+    const Forms& forms = stage_->forms;
+    FlowSystem system;
+    system.residual = [&forms](const double* at, const double* rate, double* F) { return forms.residual(at, rate, F); };
+    system.jacobian = [&forms](const double* at, const double* rate, double cj, double* values) {
+        forms.jacobian(at, rate, cj, values);
+    };
+    system.pattern = &forms.pattern();
+    system.banded = stage_->space.cell().mirror;
+    system.dissipation = [this](double when, const double* at, const double* rate) {
+        return observe(when, at, rate).dissipation;
+    };
+    system.guards = [this](double when, const double* at, const double* rate) {
+        const Observation& o = observe(when, at, rate);
+        Guards values;
+        for (const GraphGuard& guard : graph_guards()) values.push_back(guard.value(o, limits()));
+        return values;
+    };
+    system.n_guards = graph_guards().size();
+    return system;
+}
+
+void GraphAttempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step) {
+    if (flow_) {
+        past_.dissipated += flow_->dissipated(flow_->time());
+        past_.counters += flow_->counters();
+    }
+    TimeControl control;
+    control.relative = settings_.time_tolerance;
+    control.absolute =
+        1e-3 * settings_.time_tolerance * std::min(std::get<Tube>(case_.shape).radius, 1e3 * case_.accuracy.r_min);
+    control.max_order = case_.discretisation.time_order;
+    control.first_step = first_step;
+    now_.time = std::numeric_limits<double>::quiet_NaN();
+    flow_ = std::make_unique<Flow>(system(), x, v, t, control);
+    stage_->transport.begin(flow_->x(), flow_->v());
+    error_.begin(observe(t, flow_->x(), flow_->v()));
+    if (!least_symbol_) least_symbol_ = least_symbol_of(case_.energy, now_.o);
+    good_.x = x;
+    good_.time = t;
+}
+
+void GraphAttempt::begin() {
+    const Tube& tube = std::get<Tube>(case_.shape);
+    const Cell cell = cell_of(tube, case_.discretisation.symmetry);
+    const auto start = [&](double z) { return radius_at(tube, z); };
+    FirstMesh mesh = first_mesh(case_, settings_, cell, start);
+    summary.reference_energy = mesh.reference_energy;
+    settings_.defect *= mesh.reference_energy;
+    use_stage(std::make_unique<GraphStage>(cell, std::move(mesh.breaks), case_));
+    const Eigen::VectorXd x = stage_->space.project(start);
+    ErrorTransport& transport = stage_->transport;
+    transport.total = transport.spatial =
+        transport.space().project(start) - transport.space().prolong(stage_->space, x);
+    make_flow(x, stage_->forms.rate(x), 0, 0);
+    past_.energy_start = now_.o.energy;
+    write(0, now_.o, flow_->x(), flow_->v());
+}
+
+void GraphAttempt::resume(const Record& restart) {
+    const RestartState state = restart_state(restart);
+    use_stage(std::make_unique<GraphStage>(state.cell, state.breaks, case_));
+    stage_->transport.total = state.error_total;
+    stage_->transport.spatial = state.error_spatial;
+    summary.reference_energy = state.reference_energy;
+    settings_.time_tolerance = state.time_tolerance;
+    settings_.defect = state.defect;
+    past_.energy_start = state.energy_start;
+    past_.dissipated = state.dissipated;
+    error_.largest = state.error_max;
+    least_symbol_ = state.least_symbol;
+    outputs_.go_on_from(restart.time);
+    out_.go_on_from(restart.time);
+    make_flow(state.coefficients, stage_->forms.rate(state.coefficients), restart.time, 0);
+}
+
+GraphLimits GraphAttempt::limits() const {
+    return {case_.accuracy.r_min, least_symbol_.value_or(0)};
+}
+
+// Carries the error on. True if it is beyond what was asked and something can be done about it.
+bool GraphAttempt::must_give_up(const Observation& o) {
+    error_.carry_on(*stage_, o);
+    const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
+    gave_up = error_.is_curable(settings_, allowed);
+    return gave_up;
+}
+
+std::optional<StopReport> GraphAttempt::find_lost_accuracy(double t) const {
+    if (error_.now() <= hopeless_error * summary.reference_energy) return std::nullopt;
+    const bool asked = !settings_.free_mesh || !settings_.free_time;
+    return StopReport{
+        Stop::resolution_lost, t,
+        fmt::format("the error of the energy reached {:.2g} of E_ref{}", error_.now() / summary.reference_energy,
+                    asked ? " with the discretisation asked for" : ""),
+        asked ? "leave discretisation.elements and discretisation.time_tolerance to the program, or refine them"
+              : "ask for more accuracy: errors of this start are amplified on the way"};
+}
+
+std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Observation& o) {
+    const double t = flow_->time();
+    if (outcome == Flow::Outcome::guard) return graph_guards()[flow_->tripped()].report(o, *stage_, flow_->x(), t);
+    if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
+    if (case_.time.stationary &&
+        o.dissipation * (case_.time.end - t) < *case_.time.stationary * summary.reference_energy)
+        return StopReport{Stop::stationary, t, fmt::format("the energy dissipates at {:.3g} only", o.dissipation), ""};
+    if (auto pause = clock_.find_pause(t)) return pause;
+    if (auto lost = find_lost_accuracy(t)) return lost;
+    if (o.symbol_3d <= 0 && summary.warnings.empty())
+        summary.warnings.push_back(
+            fmt::format("from t = {:.6g} on, the flow of the full surface is ill-posed in directions that axisymmetric "
+                        "motion does not excite",
+                        t));
+    return std::nullopt;
+}
+
+// A shape that keeps sharpening gets more room each time, as every remesh restarts the integrator. Afterwards the
+// profile is the same, but on the new mesh its knots want to move, little and fast. Linearly implicit Euler damps that,
+// where the integrator would chase it with steps of next to nothing.
+std::optional<StopReport> GraphAttempt::remesh() {
+    const bool soon = flow_->counters().steps < few_steps && summary.meshes > 1;
+    remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
+    const double t = flow_->time();
+    const Observation o = now_.o;
+    auto breaks = refined_breaks(stage_->space, now_.defect, settings_.defect * remesh_margin_);
+    if (static_cast<int>(breaks.size()) > most_graph_elements + 1) {
+        if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
+        return StopReport{Stop::resolution_lost, t,
+                          fmt::format("the profile needs more than {} elements per cell near z = {:.6g}",
+                                      most_graph_elements, stage_->place(o.z_steep)),
+                          "ask for less accuracy"};
+    }
+    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
+    auto next = std::make_unique<GraphStage>(stage_->space.cell(), std::move(breaks), case_);
+    const Eigen::VectorXd projected = next->space.prolong(stage_->space, x);
+    next->transport.inherit(stage_->transport, x, projected);
+    const double dt = first_step_after(x);
+    const Eigen::VectorXd rate =
+        next->space.prolong(stage_->space, Eigen::Map<const Eigen::VectorXd>(flow_->v(), stage_->space.size()));
+    use_stage(std::move(next));
+    const Damped after = damp(stage_->forms, projected, dt);
+    make_flow(after.x, after.rate, t + damping_steps * dt, dt);
+    past_.dissipated += damping_steps * dt * o.dissipation;
+    stage_->transport.begin(projected.data(), rate.data());
+    stage_->transport.add_step(damping_steps * dt, after.x.data(), after.rate.data());
+    error_.begin(now_.o, 1);
+    ++summary.meshes;
+    return std::nullopt;
+}
+
+// Such that backward Euler, with which the integration begins again, has the asked local error from x on, and does
+// not pass an output.
+double GraphAttempt::first_step_after(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd acceleration = flow_->acceleration();
+    double norm = 0;
+    for (int i = 0; i < x.size(); ++i)
+        norm += std::pow(acceleration[i] / (settings_.time_tolerance * std::abs(x[i])), 2);
+    const double step = std::min(0.3 * std::sqrt(2 / std::sqrt(norm / x.size())), flow_->step_size());
+    // Not beyond the next output, and not so small that the time would not notice.
+    return std::max(std::min(step, 0.3 * (outputs_.next() - flow_->time())), 1e-12 * flow_->time());
+}
+
+// Names the terms whose derivatives are wrong at the last good state, if any.
+std::string GraphAttempt::suspects() const {
+    std::string keys;
+    for (const TermCheck& term : check_terms(stage_->forms, good_.x))
+        if (!term.check.pass()) keys += (keys.empty() ? "" : ", ") + term.key;
+    return keys.empty() ? "the derivatives of all terms are right" : "wrong derivatives: " + keys;
+}
+
+StopReport GraphAttempt::failure(const std::string& what) const {
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(good_.x.size());
+    const Observation o = stage_->look(good_.x.data(), rest.data(), nullptr);
+    if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
+    return {Stop::solver_failed, good_.time, fmt::format("{} ({})", what, suspects()),
+            "ask for more accuracy, or lower discretisation.time_order"};
+}
+
+std::optional<StopReport> GraphAttempt::recover() {
+    const std::string said = flow_->failure();
+    if (++good_.failures > most_failures) return failure("the time integrator gave up: " + said);
+    const Eigen::VectorXd x = good_.x;
+    make_flow(x, stage_->forms.rate(x), good_.time, 0);
+    return std::nullopt;
+}
+
+// A start beyond a limit stops at once: the integrator only sees limits being crossed.
+std::optional<StopReport> GraphAttempt::check_start() const {
+    if (outputs_.done()) return StopReport{Stop::finished, flow_->time(), "reached time.end", ""};
+    for (const GraphGuard& guard : graph_guards())
+        if (guard.value(now_.o, limits()) <= 0) return guard.report(now_.o, *stage_, flow_->x(), flow_->time());
+    return std::nullopt;
+}
+
+void GraphAttempt::go() {
+    std::optional<StopReport> stop = check_start();
+    try {
+        while (!stop) stop = step();
+    } catch (const SolveError& error) {
+        stop = failure(error.what());
+    }
+    end_with(*stop);
+}
+
+// One step of the integrator, and all that is due after it.
+std::optional<StopReport> GraphAttempt::step() {
+    const double before = flow_->time();
+    const Flow::Outcome outcome = flow_->advance(case_.time.end);
+    if (outcome == Flow::Outcome::failed) return recover();
+    const double t = flow_->time();
+    const StopReport given_up{Stop::resolution_lost, t, "the error exceeds what was asked", ""};
+    if (outcome == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
+    const Observation o = observe(t, flow_->x(), flow_->v());
+    stage_->transport.add_step(t - before, flow_->x(), flow_->v());
+    const bool due = error_.due(o);
+    if ((due || outcome != Flow::Outcome::step) && must_give_up(o)) return given_up;
+    write_outputs(t, o);
+    write_row(t, o, flow_->x());
+    out_.progress(t, o.energy, flow_->step_size());
+    good_.x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
+    good_.time = t;
+    good_.failures = 0;
+    if (const auto stop = check(outcome, o)) return stop;
+    out_.safeguard([&] { return record(t, o, flow_->x(), flow_->v()); });
+    const bool output_is_near = outputs_.next() - t < 1e-9 * t;
+    if (!settings_.free_mesh || output_is_near || now_.lost() <= settings_.defect) return std::nullopt;
+    if (must_give_up(o)) return given_up;
+    return remesh();
+}
+
+// Saves the state of a run that ended before its time, and sums up.
+void GraphAttempt::end_with(const StopReport& stop) {
+    const double t = flow_->time();
+    if (!gave_up) out_.end(stop, t, [&] { return record(t, now_.o, flow_->x(), flow_->v()); });
+    summary.stop = stop;
+    summary.energy = now_.o.energy;
+    summary.estimated_error = stated_over_computed * error_.largest / summary.reference_energy;
+    summary.time_tolerance = settings_.time_tolerance;
+    summary.counters = past_.counters;
+    summary.counters += flow_->counters();
+}
+
+// At the output times up to the end of the last step.
+void GraphAttempt::write_outputs(double until, const Observation& o) {
+    while (outputs_.due(until)) {
+        const double t = outputs_.pass();
+        if (t == until) {
+            write(t, o, flow_->x(), flow_->v());
+        } else {
+            Eigen::VectorXd x(stage_->space.size()), v(stage_->space.size());
+            flow_->interpolate(t, x.data(), v.data());
+            write(t, stage_->look(x.data(), v.data(), nullptr), x.data(), v.data());
+        }
+    }
+}
+
+void GraphAttempt::write(double t, const Observation& o, const double* x, const double* v) {
+    write_row(t, o, x);
+    out_.frame(t, [&] { return record(t, o, x, v); });
+}
+
+void GraphAttempt::write_row(double t, const Observation& o, const double* x) {
+    if (!out_.wants_row(t)) return;
+    const long iterations = flow_->counters().newton_iterations + past_.counters.newton_iterations;
+    out_.row(t, graph_values(*stage_, {t, o, x, *flow_, iterations, o.energy - past_.energy_start + dissipated(t),
+                                       stated_over_computed * error_.now(), summary.elements, out_.seconds()}));
+}
+
+Record GraphAttempt::record(double t, const Observation& o, const double* x, const double* v) const {
+    RestartState state;
+    state.cell = stage_->space.cell();
+    state.breaks = stage_->space.breaks();
+    state.coefficients = Eigen::Map<const Eigen::VectorXd>(x, stage_->space.size());
+    state.error_total = stage_->transport.total;
+    state.error_spatial = stage_->transport.spatial;
+    state.reference_energy = summary.reference_energy;
+    state.time_tolerance = settings_.time_tolerance;
+    state.defect = settings_.defect;
+    state.energy_start = past_.energy_start;
+    state.dissipated = dissipated(t);
+    state.error_max = error_.largest;
+    state.least_symbol = least_symbol_.value_or(0);
+    return frame_record(t, stage_->space, state, Eigen::Map<const Eigen::VectorXd>(v, stage_->space.size()), o.energy);
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,33 @@
+// The error of the energy along a run of a graph, as the error transport computes it now and then.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "axisym/graph/graph_settings.hpp"
+#include "axisym/graph/graph_stage.hpp"
+
+namespace tubule::axisym {
+
+class GraphError {
+public:
+    // The transport begins anew with this observation, after so many steps that it has not carried the error over.
+    void begin(const Observation& o, int steps = 0) { dissipation_last_ = o.dissipation, steps_since_ = steps; }
+    // Whether it is time, after a step, to carry the error on.
+    bool due(const Observation& o);
+    void carry_on(GraphStage& stage, const Observation& o);
+    // Beyond what is allowed, by a cause that finer settings cure.
+    bool is_curable(const GraphSettings& settings, double allowed) const;
+
+    double now() const { return std::abs(latest.total); }
+
+    ErrorTransport::EnergyError latest;
+    double largest = 0;
+
+private:
+    double dissipation_last_ = 0;
+    int steps_since_ = 0;
+};
+
+}  // namespace tubule::axisym

@@ -1,0 +1,55 @@
+#include "axisym/graph/graph_guards.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tubule::axisym {
+namespace {
+
+constexpr double overhang_steepness = 30;  // see Observation::steepness
+constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
+
+}  // namespace
+
+std::span<const GraphGuard> graph_guards() {
+    static const GraphGuard list[]{
+        {[](const Observation& o, const GraphLimits& limits) { return o.r_min - limits.r_min; },
+         [](const Observation& o, const GraphStage& stage, const double*, double time) {
+             return StopReport{
+                 Stop::pinch_off, time,
+                 fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, stage.place(o.z_min)),
+                 "lower accuracy.r_min to follow the neck further"};
+         }},
+        {[](const Observation& o, const GraphLimits&) { return overhang_steepness - o.steepness; }, overhang},
+        {[](const Observation& o, const GraphLimits& limits) { return o.symbol - limits.least_symbol; },
+         [](const Observation& o, const GraphStage& stage, const double*, double time) {
+             return StopReport{
+                 Stop::ill_posed, time,
+                 fmt::format("the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to "
+                             "{:.3g} at x = kappa_theta",
+                             stage.place(o.z_symbol), o.symbol),
+                 "no refinement helps; k40 or k42 is too negative for the curvatures of this shape"};
+         }}};
+    return list;
+}
+
+StopReport overhang(const Observation& o, const GraphStage& stage, const double* x, double time) {
+    const double steepness = std::abs(stage.space.evaluate(x, stage.space.element_at(o.z_steep), o.z_steep)[1]);
+    return {Stop::overhang, time,
+            fmt::format("the profile r(z) turned vertical at z = {:.6g} (|r'| = {:.3g} away from a neck)",
+                        stage.place(o.z_steep), steepness),
+            "the shape is about to overhang, which a graph r(z) cannot follow; the results until here are valid"};
+}
+
+bool is_about_to_overhang(const Observation& o) {
+    return o.steepness > overhang_steepness / 4;
+}
+
+// A symbol that cannot change its sign may come as close to 0 as it likes.
+double least_symbol_of(const Bending& energy, const Observation& o) {
+    return std::ranges::any_of(energy.k, [](double k) { return k < 0; }) ? symbol_lost * o.symbol : 0;
+}
+
+}  // namespace tubule::axisym

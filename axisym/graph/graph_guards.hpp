@@ -1,0 +1,32 @@
+// Why a run of a graph ends before its time.
+#pragma once
+
+#include <span>
+
+#include "axisym/graph/graph_stage.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule::axisym {
+
+// What is watched: a state, in a run with these limits.
+struct GraphLimits {
+    double r_min = 0;
+    double least_symbol = 0;  // below it the flow is all but ill-posed
+};
+
+// Positive while all is well; what to report once it is not.
+struct GraphGuard {
+    double (*value)(const Observation& o, const GraphLimits& limits);
+    StopReport (*report)(const Observation& o, const GraphStage& stage, const double* x, double time);
+};
+std::span<const GraphGuard> graph_guards();
+
+StopReport overhang(const Observation& o, const GraphStage& stage, const double* x, double time);
+
+// Whether the profile is so steep that what fails there fails by an overhang.
+bool is_about_to_overhang(const Observation& o);
+
+// Of the first observation of a run.
+double least_symbol_of(const Bending& energy, const Observation& o);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,72 @@
+#include "axisym/graph/graph_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "axisym/graph/graph_start.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// Measured choices: docs/decisions.md, "Ask for accuracy".
+constexpr double start_margin = 1.0 / 4;  // defect of the start / defect at which to remesh
+constexpr int fewest_elements = 3;
+
+ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Case& c) {
+    const int order = c.discretisation.order;
+    return ProfileSpace(cell, std::move(breaks), order, c.discretisation.smoothness.value_or(order - 1));
+}
+
+}  // namespace
+
+std::vector<int> tracked_graph_modes(const Case& c) {
+    std::set<int> waves;
+    for (const TubeMode& mode : std::get<Tube>(c.shape).modes)
+        if (mode.n > 0) waves.insert(mode.n);
+    return {waves.begin(), waves.end()};
+}
+
+GraphStage::GraphStage(const Cell& cell, std::vector<double> breaks, const Case& c)
+    : space(space_of(cell, std::move(breaks), c)), forms(space, c.energy), transport(forms) {
+    for (int n : tracked_graph_modes(c)) modes.push_back(forms.mode(n));
+}
+
+double GraphStage::place(double z) const {
+    const double length = space.cell().period();
+    return z - std::floor(z / length) * length;
+}
+
+Observation GraphStage::look(const double* x, const double* v, std::vector<double>* defect) const {
+    Observation o = forms.observe(x, v, defect);
+    for (auto [z, r] : {std::pair{&o.z_min, &o.r_min}, std::pair{&o.z_max, &o.r_max}}) {
+        *z = space.extremum_near(x, *z);
+        *r = space.evaluate(x, space.element_at(*z), *z)[0];
+    }
+    return o;
+}
+
+FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
+                     const std::function<double(double)>& start) {
+    const Discretisation& d = c.discretisation;
+    int most_waves = 0;
+    for (const TubeMode& mode : std::get<Tube>(c.shape).modes) most_waves = std::max(most_waves, mode.n);
+    const int first = d.elements ? std::max(2, (*d.elements + cell.images() - 1) / cell.images())
+                                 : std::max(fewest_elements, 8 * most_waves / cell.images());
+    FirstMesh out{uniform_breaks(cell, first)};
+    for (int pass = 0;; ++pass) {
+        const ProfileSpace space = space_of(cell, out.breaks, c);
+        const Forms forms(space, c.energy);
+        const Eigen::VectorXd x = space.project(start);
+        out.reference_energy = forms.reference_energy(x);
+        const double allowed = settings.defect * out.reference_energy;
+        if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return out;
+        const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
+        const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
+        if (lost < allowed * start_margin) return out;
+        out.breaks = adapted_breaks(space, defect, allowed * start_margin / 2, fewest_elements);
+    }
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,39 @@
+// Everything that belongs to one mesh of a graph.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "axisym/graph/graph_error_transport.hpp"
+#include "axisym/graph/graph_settings.hpp"
+
+namespace tubule::axisym {
+
+constexpr int most_graph_elements = 4000;  // of one cell
+
+// Numbers n > 0 of the modes of the start, each once.
+std::vector<int> tracked_graph_modes(const Case& c);
+
+struct GraphStage {
+    GraphStage(const Cell& cell, std::vector<double> breaks, const Case& c);
+
+    ProfileSpace space;
+    Forms forms;
+    ErrorTransport transport;
+    std::vector<std::array<Eigen::VectorXd, 2>> modes;  // functionals of those that are tracked
+
+    double place(double z) const;  // in [0, length)
+    // At coefficients x with rates v, radii refined between quadrature points; `defect` as Forms::observe.
+    Observation look(const double* x, const double* v, std::vector<double>* defect) const;
+};
+
+struct FirstMesh {
+    std::vector<double> breaks;
+    double reference_energy = 0;
+};
+// Breaks that will do for the start and, as far as that can be foreseen, for what the flow makes of it.
+FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
+                     const std::function<double(double)>& start);
+
+}  // namespace tubule::axisym
