@@ -20,7 +20,8 @@ template <class Fields, class State>
 void restart_fields(Fields&& f, State& s) {
     f.array("restart_breaks", s.breaks);
     f.array("restart_y", s.y), f.array("restart_rate", s.rate, s.y.size());
-    f.number("restart_elements", s.elements), f.number("restart_tolerance", s.tolerance);
+    f.number("restart_elements", s.settings.elements), f.number("restart_tolerance", s.settings.tolerance);
+    f.number("restart_pair", s.settings.pair), f.number("restart_role", s.settings.is_coarser);
     f.number("restart_total_start", s.total_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "common/case/case.hpp"
 #include "common/result/result.hpp"
@@ -12,8 +13,8 @@ namespace tubule::axisym {
 struct CurveRestart {
     std::vector<double> breaks;
     Eigen::VectorXd y, rate;
-    int elements = 0;  // asked for, of one cell; there are more at seams
-    double tolerance = 0, total_start = 0, dissipated = 0, error = 0, reference_energy = 0;
+    CurveSettings settings;
+    double total_start = 0, dissipated = 0, error = 0, reference_energy = 0;
 };
 
 // Numbers energy, length (of a period, or 0); sampled from pole to pole or over a period, in order along the profile:

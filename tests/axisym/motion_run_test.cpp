@@ -7,6 +7,7 @@
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_run.hpp"
 #include "axisym/curve/curve_start.hpp"
+#include "axisym/run.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 struct Watch : RunObserver {
     std::vector<std::vector<double>> rows;
-    std::vector<Record> frames;
+    std::vector<Record> frames, checkpoints;
     std::optional<double> interrupt_at;  // time
     bool stop_now = false;
     void row(std::span<const double> values) override {
@@ -25,7 +26,8 @@ struct Watch : RunObserver {
         if (interrupt_at && values[0] >= *interrupt_at) stop_now = true;
     }
     void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
-    void discard() override { rows.clear(), frames.clear(), stop_now = false; }
+    void checkpoint(const Record& state) override { checkpoints.push_back(state); }
+    void discard() override { rows.clear(), frames.clear(), checkpoints.clear(), stop_now = false; }
     bool interrupted() override { return stop_now; }
 };
 
@@ -252,11 +254,12 @@ TEST(CurveRun, goesOnAfterAnInterruption) {
         const RunSummary half = run(c, first);
         ASSERT_EQ(half.stop.reason, Stop::interrupted);
         ASSERT_LT(half.stop.time, 0.2);
-        const Restart from{first.frames.back()};
+        const Restart from{first.checkpoints.at(0)};
         const RunSummary rest = run(c, second, &from);
         EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
         EXPECT_EQ(rest.elements, expected.elements);
         EXPECT_GE(second.rows.front()[0], half.stop.time);
+        EXPECT_EQ(rest.attempts, expected.attempts);
         EXPECT_NEAR(rest.energy, expected.energy, 1e-5 * expected.reference_energy);
     }
 }
@@ -270,7 +273,7 @@ TEST(CurveRun, goesOnWithElementsGradedAtSeams) {
     const RunSummary expected = run(c, whole);
     first.interrupt_at = 0.01;
     ASSERT_EQ(run(c, first).stop.reason, Stop::interrupted);
-    const Restart from{first.frames.back()};
+    const Restart from{first.checkpoints.at(0)};
     const RunSummary rest = run(c, second, &from);
     EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
     EXPECT_EQ(rest.elements, expected.elements);
@@ -328,8 +331,13 @@ TEST(CurveRun, theFluidStartsAsTheOverdampedModelMoves) {
     const Eigen::VectorXd x = fit(space, m);
     const CurveObservation o = CurveForms(space, {}).observe(x);
     const Bending bending{{1, 0, 0.05}, -0.5};
-    const CurveMotion fluid(space, bending, {.inertia = 1, .viscosity = 1, .lagrangian = true}, 1, o.area, o.volume);
-    const CurveMotion overdamped(space, bending, {.friction = 1, .lagrangian = true}, 1, o.area, o.volume);
+    const auto lagrangian = [](const MotionLaw& law) {
+        CurveLaw out = law;
+        out.lagrangian = true;
+        return out;
+    };
+    const CurveMotion fluid(space, bending, lagrangian({.inertia = 1, .viscosity = 1}), 1, o.area, o.volume);
+    const CurveMotion overdamped(space, bending, lagrangian({.friction = 1}), 1, o.area, o.volume);
     Eigen::VectorXd y = Eigen::VectorXd::Zero(fluid.layout().size);
     y.head(x.size()) = x;
     const int n = space.size(), u = fluid.layout().u_r;

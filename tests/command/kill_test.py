@@ -224,6 +224,71 @@ class Surface(ProgramTest):
             self.assertEqual(len(file["meshes"]), 1)
 
 
+# A closed cell in Stokes flow, as a curve: a second or so, and two pairs of runs at least.
+CURVE = """tier = "axisym"
+[energy]
+k20 = 1.0
+k42 = 0.05
+H0 = -0.5
+[model]
+kind = "stokes"
+[shape]
+kind = "ellipsoid"
+a = 0.35
+b = 0.35
+c = 1.2
+[accuracy]
+energy = 1e-4
+[time]
+end = 0.05
+output = [0.02]
+"""
+
+
+class Curve(ProgramTest):
+    """The same of curves, whose runs come in pairs."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("case.toml", CURVE)
+        self.tubule("run", self.case, "-o", "whole.hdf")
+        self.whole = about(self.folder / "whole.hdf")
+
+    def assert_ends_like_the_undisturbed_run(self):
+        end = about(self.result)
+        self.assertEqual(end["stop"], "finished")
+        for name in ("attempts", "elements"):
+            self.assertEqual(end[name], self.whole[name], name)
+        self.assertLess(end["estimated_error"], 1e-4)
+        whole, mine = series(self.folder / "whole.hdf"), series(self.result)
+        self.assertAlmostEqual(mine["energy"][-1], whole["energy"][-1], delta=1e-4 * self.whole["E_ref"])
+        with h5py.File(self.result) as file:
+            times = [file["frames"][name].attrs["time"] for name in sorted(file["frames"])]
+        self.assertEqual(times, [0, 0.02, 0.05])
+
+    def test_stopped_in_its_coarser_run_it_goes_on_there(self):
+        limit = CURVE.replace("[time]", "[time]\nlimit = 1e-3")
+        self.write("case.toml", limit)
+        self.assertIn("of the coarser run", self.tubule("run", self.case, status=5)[0])
+        with h5py.File(self.result) as file:
+            first = file["checkpoint"].attrs["time"]
+            self.assertEqual(list(file["series/time"]), [0])
+            self.assertEqual(len(file["frames"]), 1)
+        self.tubule("run", self.case, "--resume", status=5)
+        with h5py.File(self.result) as file:
+            self.assertGreater(file["checkpoint"].attrs["time"], first)
+
+    def test_signals_and_kills_lose_nothing(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGINT):
+            process = self.start("run", self.case, "--resume", "--quiet")
+            self.addCleanup(process.kill)
+            time.sleep(0.2)
+            process.send_signal(number)
+            process.communicate()
+        self.tubule("run", self.case, "--resume", "--quiet")
+        self.assert_ends_like_the_undisturbed_run()
+
+
 class Resume(ProgramTest):
     def test_a_complete_result_is_left_alone(self):
         self.tubule("run", self.case)

@@ -1,0 +1,176 @@
+#include "axisym/curve/curve_attempt.hpp"
+
+#include <algorithm>
+
+#include "axisym/curve/curve_series.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+constexpr int steps_between_looks = 10;
+
+}  // namespace
+
+CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const Beginning& start,
+                           const CurveSettings& settings, const EndedRun* coarser)
+    : setup_(c, start, settings),
+      clock_(clock),
+      coarser_(coarser),
+      out_(watch, clock, !settings.is_coarser),
+      outputs_(c) {
+    summary.reference_energy = setup_.reference_energy;
+    summary.elements = setup_.elements();
+    summary.time_tolerance = settings.tolerance;
+    summary.attempts = settings.pair;
+}
+
+const Snapshot& CurveAttempt::observe(double t, const double* y, const double* rate) {
+    if (t != observed_at_) {
+        now_ = measure(*setup_.motion, y, rate);
+        observed_at_ = t;
+    }
+    return now_;
+}
+
+void CurveAttempt::begin() {
+    const CurveBegin at = begin_state(setup_);
+    make_flow(at.y, at.rate, 0, at.first_step);
+    const Snapshot s = measure(*setup_.motion, at.shown.data(), at.rate.data());
+    total_start_ = s.total();
+    trace.add(0, s.o.energy, 0);
+    write_row(0, s, at.shown.data());
+    write_frame(0, s, at.shown.data(), at.rate.data());
+}
+
+void CurveAttempt::resume(const Record& restart) {
+    const CurveRestart state = curve_restart(restart);
+    total_start_ = state.total_start, dissipated_before_ = state.dissipated, error = state.error;
+    summary.reference_energy = state.reference_energy;
+    trace = pair_memory(restart).own;
+    outputs_.go_on_from(restart.time);
+    out_.go_on_from(restart.time);
+    make_flow(state.y, state.rate, restart.time, 0);
+    add_to_trace(restart.time);
+}
+
+void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step) {
+    FlowSystem system = setup_.system();
+    system.dissipation = [this](double t, const double* at, const double* v) {
+        return observe(t, at, v).balance.dissipation;
+    };
+    system.guards = [this](double t, const double* at, const double* v) {
+        const Snapshot& s = observe(t, at, v);
+        Guards values;
+        for (const CurveGuard& guard : curve_guards()) values.push_back(guard.value(s, setup_.c.accuracy.r_min));
+        return values;
+    };
+    system.n_guards = curve_guards().size();
+    observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    flow_ = std::make_unique<Flow>(std::move(system), y, rate, time, setup_.control(first_step));
+    observe(time, flow_->x(), flow_->v());
+}
+
+void CurveAttempt::add_to_trace(double t) {
+    const Eigen::VectorXd gradient = setup_.motion->forms().gradient({.energy = 1}, setup_.curve(flow_->x()));
+    trace.add(t, now_.o.energy, gradient.dot(setup_.curve(flow_->v())));
+}
+
+// By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
+double CurveAttempt::what_may_change(double t) const {
+    const double left = setup_.c.time.end - t;
+    return std::max({now_.balance.dissipation * left, now_.balance.kinetic, now_.balance.acceleration * left * left});
+}
+
+std::optional<StopReport> CurveAttempt::check(double t) {
+    const std::optional<double> stationary = setup_.c.time.stationary;
+    if (auto pause = clock_.find_pause(t)) return pause;
+    if (stationary && what_may_change(t) < *stationary * summary.reference_energy)
+        return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
+    if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
+    return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
+}
+
+std::optional<StopReport> CurveAttempt::step() {
+    const double end = setup_.c.time.end;
+    const Flow::Outcome outcome = flow_->advance(end);
+    const double t = flow_->time();
+    if (auto stall = stall_.after_step(t, flow_->step_size(), end)) return stall;
+    if (outcome == Flow::Outcome::failed)
+        return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
+                          "try another accuracy, discretisation.elements or parametrisation"};
+    if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    const Snapshot s = observe(t, flow_->x(), flow_->v());
+    add_to_trace(t);
+    if (const auto difference = coarser_ ? coarser_->trace.difference(t, s.o.energy) : std::nullopt)
+        error = std::max(error, error_now_ = *difference);
+    write_outputs(t);
+    write_row(t, s, flow_->x());
+    out_.progress(t, s.o.energy, flow_->step_size());
+    if (outcome == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(s, t);
+    if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
+    out_.safeguard([this] { return record(); });
+    return check(t);
+}
+
+// IDA sees only guards that change their sign later.
+std::optional<StopReport> CurveAttempt::check_start() const {
+    const double t = flow_->time();
+    if (outputs_.done()) return StopReport{Stop::finished, t, "reached time.end", ""};
+    for (const CurveGuard& guard : curve_guards())
+        if (!(guard.value(now_, setup_.c.accuracy.r_min) > 0)) return guard.report(now_, t);
+    return std::nullopt;
+}
+
+void CurveAttempt::go() {
+    std::optional<StopReport> stop = check_start();
+    while (!stop) stop = step();
+    summary.stop = *stop;
+    summary.energy = now_.o.energy;
+    summary.counters = flow_->counters();
+    out_.end(*stop, flow_->time(), [this] { return record(); });
+    describe_effort(summary);
+}
+
+void CurveAttempt::write_outputs(double until) {
+    while (outputs_.due(until)) {
+        const double t = outputs_.pass();
+        if (t == until) {
+            write_row(t, now_, flow_->x());
+            write_frame(t, now_, flow_->x(), flow_->v());
+        } else if (out_.reported()) {
+            Eigen::VectorXd y(setup_.motion->layout().size), rate(y.size());
+            flow_->interpolate(t, y.data(), rate.data());
+            const Snapshot between = measure(*setup_.motion, y.data(), rate.data());
+            write_row(t, between, y.data());
+            write_frame(t, between, y.data(), rate.data());
+        }
+    }
+}
+
+void CurveAttempt::write_row(double t, const Snapshot& s, const double* y) {
+    if (!out_.wants_row(t)) return;
+    const double defect = s.total() - total_start_ + dissipated(t);
+    out_.row(t, curve_values(setup_.c, *setup_.motion,
+                             {t, s, y, *flow_, defect, error_now_, summary.elements, out_.seconds()}));
+}
+
+void CurveAttempt::write_frame(double t, const Snapshot& s, const double* y, const double* rate) {
+    out_.frame(t, [&] { return record(t, s, y, rate); });
+}
+
+Record CurveAttempt::record(double t, const Snapshot& s, const double* y, const double* rate) const {
+    const int n = setup_.motion->layout().size;
+    const CurveRestart state{setup_.space->splines().breaks(),
+                             Eigen::Map<const Eigen::VectorXd>(y, n),
+                             Eigen::Map<const Eigen::VectorXd>(rate, n),
+                             setup_.settings,
+                             total_start_,
+                             dissipated(t),
+                             error,
+                             summary.reference_energy};
+    Record out = curve_record(t, *setup_.motion, state, s.o.energy);
+    add_to_record(out, trace, coarser_);
+    return out;
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,62 @@
+// One run of a curve with settings as given, and the reason why it ends.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_guards.hpp"
+#include "axisym/curve/curve_setup.hpp"
+#include "axisym/integration/run_summary.hpp"
+#include "common/run/output_times.hpp"
+#include "common/run/run_output.hpp"
+#include "common/run/run_pairs.hpp"
+
+namespace tubule::axisym {
+
+class CurveAttempt {
+public:
+    // All references must outlive the attempt.
+    CurveAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const Beginning& start,
+                 const CurveSettings& settings, const EndedRun* coarser);
+
+    // One of the first two, then go().
+    void begin();
+    void resume(const Record& restart);
+    void go();
+
+    RunSummary summary;
+    EnergyTrace trace;
+    double error = 0;  // largest difference of the energy from the coarser run's, absolute
+
+private:
+    const Snapshot& observe(double t, const double* y, const double* rate);
+    void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
+    std::optional<StopReport> check_start() const;
+    std::optional<StopReport> step();
+    std::optional<StopReport> check(double t);
+    double what_may_change(double t) const;
+    void add_to_trace(double t);
+
+    void write_outputs(double until);
+    void write_row(double t, const Snapshot& s, const double* y);
+    void write_frame(double t, const Snapshot& s, const double* y, const double* rate);
+    Record record(double t, const Snapshot& s, const double* y, const double* rate) const;
+    Record record() const { return record(flow_->time(), now_, flow_->x(), flow_->v()); }
+    double dissipated(double t) const { return dissipated_before_ + flow_->dissipated(t); }
+
+    CurveSetup setup_;
+    const RunClock& clock_;
+    const EndedRun* coarser_;
+    RunOutput out_;
+    OutputTimes outputs_;
+    std::unique_ptr<Flow> flow_;
+    double observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    Snapshot now_;
+    CurveStall stall_;
+    double total_start_ = 0, dissipated_before_ = 0;  // before this flow began
+    double error_now_ = 0;
+};
+
+}  // namespace tubule::axisym

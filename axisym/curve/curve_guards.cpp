@@ -1,0 +1,69 @@
+#include "axisym/curve/curve_guards.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "axisym/curve/curve_measures.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+constexpr double steepest = 3;       // curvature times length of an element: beyond that nothing is resolved
+constexpr double stretched = 1e-3;   // least over largest |X_s|
+constexpr int most_crawling = 2000;  // steps by which the time has not grown by a thousandth
+constexpr double crawling = 1.001, tiny_step = 1e-9;  // of the time reached; of the end
+
+}  // namespace
+
+std::span<const CurveGuard> curve_guards() {
+    static const CurveGuard list[]{
+        {[](const Snapshot& s, double r_min) { return std::isfinite(s.neck.radius) ? s.neck.radius - r_min : 1; },
+         [](const Snapshot& s, double time) {
+             return StopReport{Stop::pinch_off, time,
+                               fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", s.neck.radius, s.neck.z),
+                               "lower accuracy.r_min to follow the neck further"};
+         }},
+        {[](const Snapshot& s, double) { return s.o.symbol; },
+         [](const Snapshot& s, double time) {
+             return StopReport{Stop::ill_posed, time,
+                               fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
+                                           s.o.s_symbol),
+                               "no resolution helps: the energy does not resist short waves there"};
+         }},
+        {[](const Snapshot& s, double) { return s.o.g_min / s.o.g_max - stretched; },
+         [](const Snapshot& s, double time) {
+             return StopReport{Stop::mesh_lost, time,
+                               fmt::format("the parametrisation speed varies by a factor {:.3g} along the profile",
+                                           s.o.g_max / s.o.g_min),
+                               "set discretisation.parametrisation = \"even\""};
+         }}};
+    return list;
+}
+
+std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen::VectorXd& x, const Snapshot& s,
+                                           double time) {
+    if (const auto crossing = self_intersection(space, x)) {
+        const CurvePoint p = space.evaluate(x, (*crossing)[0]);
+        return StopReport{Stop::self_intersection, time,
+                          fmt::format("the profile meets itself or the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
+                          "contact is not modelled: later results are invalid"};
+    }
+    const std::vector<double>& breaks = space.splines().breaks();
+    const int e = space.splines().element_at(s.o.s_curvature);
+    const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);
+    if (turn <= steepest) return std::nullopt;
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the tangent rotates across one element by {:.2g} radians near s = {:.4g}", turn, s.o.s_curvature),
+        "ask for more accuracy, or set discretisation.elements"};
+}
+
+std::optional<StopReport> CurveStall::after_step(double time, double step, double end) {
+    if (time > crawling * since_) since_ = time, steps_ = 0;
+    if (++steps_ <= most_crawling || step >= tiny_step * end) return std::nullopt;
+    return StopReport{Stop::solver_failed, time, fmt::format("the time integrator is stuck with steps of {:.2g}", step),
+                      "try another accuracy, discretisation.elements or parametrisation"};
+}
+
+}  // namespace tubule::axisym

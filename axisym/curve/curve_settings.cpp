@@ -1,0 +1,45 @@
+#include "axisym/curve/curve_settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tubule::axisym {
+namespace {
+
+// Measured choices: docs/decisions.md, "Curves in motion".
+constexpr double finer_mesh = 1.5;  // elements of a pair of runs
+constexpr double finer_time = 0.1;  // tolerances of a pair of runs
+// Of the first run; the waves of a fluid, weakly damped, cost steps.
+constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;
+constexpr int most_pairs = 8, most_elements = 2000;
+
+}  // namespace
+
+CurveSettings first_settings(const Case& c, int images) {
+    const bool waves = motion_law(c.model).inertia != 0;
+    const double tolerance = (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy;
+    CurveSettings s = finer({first_curve_elements, tolerance, 0}, 1);
+    if (c.discretisation.elements) s.elements = (*c.discretisation.elements + images - 1) / images;
+    if (c.discretisation.time_tolerance) s.tolerance = *c.discretisation.time_tolerance;
+    return s;
+}
+
+bool settings_given(const Case& c) {
+    return c.discretisation.elements || c.discretisation.time_tolerance;
+}
+
+CurveSettings coarser(const CurveSettings& s) {
+    return {std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time, s.pair, true};
+}
+
+// The error of the mesh falls at least with the sixth power of its width, unless the shape is not smooth.
+CurveSettings finer(const CurveSettings& s, double excess) {
+    const double mesh = std::clamp(finer_mesh * std::pow(excess, 1.0 / 6), finer_mesh, 2.5);
+    return {static_cast<int>(std::ceil(mesh * s.elements)), std::max(finer_time * s.tolerance, 1e-13), s.pair + 1};
+}
+
+bool can_be_finer(const CurveSettings& s) {
+    return s.pair < most_pairs && s.elements <= most_elements;
+}
+
+}  // namespace tubule::axisym

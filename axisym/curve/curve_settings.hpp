@@ -1,0 +1,31 @@
+// How fine a run of a curve is, and the pairs of runs that tell its error.
+#pragma once
+
+#include "common/case/case.hpp"
+
+namespace tubule::axisym {
+
+constexpr int first_curve_elements = 12;  // of one cell
+
+struct CurveSettings {
+    int elements = 0;         // asked for, of one cell; there are more at seams
+    double tolerance = 0;     // of the time integrator
+    int pair = 1;             // its number
+    bool is_coarser = false;  // of its pair; else it is the run that is reported
+};
+
+// The finer run of the first pair: what the case gives, or what its accuracy asks for. The case's elements are those of
+// all `images` of the cell.
+CurveSettings first_settings(const Case& c, int images);
+bool settings_given(const Case& c);
+
+// Of the other run of a pair.
+CurveSettings coarser(const CurveSettings& s);
+
+// Of the next pair, after one whose runs differed `excess` times more than asked.
+CurveSettings finer(const CurveSettings& s, double excess);
+
+// Whether another pair is worth a try.
+bool can_be_finer(const CurveSettings& s);
+
+}  // namespace tubule::axisym

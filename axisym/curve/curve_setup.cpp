@@ -1,0 +1,144 @@
+#include "axisym/curve/curve_setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "axisym/curve/curve_frame.hpp"
+#include "common/solve/sparse.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// Measured choices: docs/decisions.md, "Curves in motion".
+// Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
+// smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
+constexpr double seam_size = 0.15, seam_per_accuracy = 5;
+constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
+// 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
+constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
+
+// 1 - (INT H dS)^2/(A INT H^2 dS): zero where H is the same everywhere.
+double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
+    const auto squares = [&](double H0) {
+        Bending bending{{}, H0};
+        bending.k[term_number("k20")] = 1;
+        return CurveForms(space, bending).observe(x);
+    };
+    const CurveObservation o = squares(0);
+    const double sum = (o.energy + o.area - squares(1).energy) / 2;
+    return 1 - sum * sum / (o.area * o.energy);
+}
+
+// How strongly the parameter is kept even: in the scale of the rows that it is added to (curve_motion.hpp).
+double gauge_of(const Case& c, double energy, double area) {
+    const MotionLaw law = motion_law(c.model);
+    if (law.inertia != 0) return std::sqrt(energy * area);
+    return law.viscosity != 0 ? energy * c.model.Re : energy;
+}
+
+// Elements of the asked size, small ones at seams.
+std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, double accuracy) {
+    const double size = 1.0 / settings.elements;
+    const std::vector<double> seams = arc.seams();
+    const double shrunk = std::pow(first_curve_elements * size, 2);  // faster than the rest, of lower order
+    const double at_seam = std::min(seam_size * size, seam_per_accuracy * accuracy * shrunk);
+    return seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam);
+}
+
+}  // namespace
+
+CurveLaw law_of(const Case& c) {
+    CurveLaw law = motion_law(c.model);
+    law.lagrangian = law.inextensible && c.discretisation.parametrisation != Parametrisation::even;
+    law.swirls = c.velocity.rotates;
+    return law;
+}
+
+Beginning beginning_of(const Case& c) {
+    Meridian whole = start_meridian(c);
+    if (c.discretisation.symmetry && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
+        try {
+            whole = half(whole);
+        } catch (const std::invalid_argument&) {  // it does not mirror itself
+        }
+    }
+    const auto [area, volume] = area_and_volume(whole);
+    return {std::move(whole), area, volume};
+}
+
+int Beginning::images() const {
+    return meridian.topology == Topology::half_cell || meridian.topology == Topology::half_tube ? 2 : 1;
+}
+
+CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSettings& with)
+    : c(of), start(from), settings(with) {
+    const ArcLength arc(start.meridian);
+    const int degree = c.discretisation.order;
+    space =
+        std::make_unique<CurveSpace>(start.meridian.topology, first_breaks(arc, settings, c.accuracy.energy), degree,
+                                     c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
+    const CurveForms forms(*space, c.energy);
+    const Eigen::VectorXd x = fit(*space, arc);
+    reference_energy = forms.reference_energy(x);
+    CurveLaw law = law_of(c);
+    const double variation = variation_of_H(*space, x);
+    law.holds_area = variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
+    if (law.inextensible && variation <= same_everywhere) law.keeps_volume = false;
+    motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, reference_energy, start.area), start.area,
+                                           start.volume);
+}
+
+FlowSystem CurveSetup::system() const {
+    const CurveMotion& motion = *this->motion;
+    const MotionLayout& at = motion.layout();
+    FlowSystem system;
+    system.residual = [&motion](const double* y, const double* v, double* F) { return motion.residual(y, v, F); };
+    system.jacobian = [&motion](const double* y, const double* v, double cj, double* J) {
+        motion.jacobian(y, v, cj, J);
+    };
+    system.pattern = &motion.pattern();
+    system.differential = motion.differential();
+    // Velocities without inertia, pressures and numbers follow from the curve; their own errors do not count. Over
+    // a very short step rounding alone moves them more than the curve: they have no say in when the iteration ends
+    // either.
+    const double length = std::sqrt(start.area);
+    system.scale = Eigen::VectorXd::Constant(at.size, 1e12 * length / settings.tolerance);
+    system.scale.head(space->size()).setConstant(length);
+    if (motion.law().inertia != 0)
+        for (int i = space->size(); i < at.p; ++i) system.scale[i] = std::sqrt(reference_energy / start.area);
+    return system;
+}
+
+TimeControl CurveSetup::control(double first_step) const {
+    TimeControl control;
+    control.relative = settings.tolerance;
+    control.absolute = 0.1 * settings.tolerance;
+    control.max_order = c.discretisation.time_order;
+    control.first_step = first_step;
+    control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);
+    control.two_iterations = true;
+    return control;
+}
+
+CurveBegin begin_state(const CurveSetup& setup) {
+    const CurveSpace& space = *setup.space;
+    const MotionLayout& at = setup.motion->layout();
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(at.size);
+    y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
+    if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
+    std::optional<CurveMotion::Start> consistent;
+    // As short as the linear algebra bears, for a start that is not smooth may be far from where it was soon.
+    double h = 1e-10 * std::min(setup.c.time.end, 1.0);
+    for (int tries = 0; !consistent; ++tries) try {
+            consistent = setup.motion->consistent(y, h);
+        } catch (const SolveError&) {
+            if (tries == 4) throw;
+            h *= 10;
+        }
+    CurveBegin out{consistent->y, consistent->rate, consistent->y, h};
+    out.shown.head(space.size()) = y.head(space.size());
+    return out;
+}
+
+}  // namespace tubule::axisym

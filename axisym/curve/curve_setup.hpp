@@ -1,0 +1,51 @@
+// From a case to the system of equations of one run: mesh, law of motion, start.
+#pragma once
+
+#include <memory>
+
+#include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_settings.hpp"
+#include "axisym/curve/curve_start.hpp"
+#include "axisym/integration/flow.hpp"
+#include "common/case/case.hpp"
+
+namespace tubule::axisym {
+
+CurveLaw law_of(const Case& c);
+
+// What all runs of a case begin with: half of the profile where it mirrors itself and the case allows that.
+struct Beginning {
+    Meridian meridian;
+    double area = 0, volume = 0;
+
+    int images() const;  // of the meridian in the whole
+};
+Beginning beginning_of(const Case& c);
+
+// The system of one run. Case and beginning must outlive it.
+struct CurveSetup {
+    CurveSetup(const Case& c, const Beginning& start, const CurveSettings& settings);
+
+    const Case& c;
+    const Beginning& start;
+    CurveSettings settings;
+    std::unique_ptr<CurveSpace> space;
+    std::unique_ptr<CurveMotion> motion;
+    double reference_energy = 0;
+
+    int elements() const { return space->splines().elements() * space->images(); }
+    Eigen::VectorXd curve(const double* y) const { return Eigen::Map<const Eigen::VectorXd>(y, space->size()); }
+    // Without what is watched: dissipation and guards.
+    FlowSystem system() const;
+    TimeControl control(double first_step) const;
+};
+
+// Unknowns and rates at the start: those to compute from, and what of them is shown, whose curve is the exact one.
+struct CurveBegin {
+    Eigen::VectorXd y, rate, shown;
+    double first_step = 0;
+};
+// Throws SolveError where the equations have no solution.
+CurveBegin begin_state(const CurveSetup& setup);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,60 @@
+#include "axisym/curve/curve_snapshot.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "axisym/curve/curve_measures.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// The narrowest place that is no pole: a minimum of r between two higher places, over the ends of elements and their
+// middles. Radius infinity where there is none.
+Neck narrowest(const CurveSpace& space, const double* y) {
+    const std::vector<double>& breaks = space.splines().breaks();
+    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
+    std::vector<double> r, z;
+    for (std::size_t i = 0; i < 2 * breaks.size() - 1; ++i) {
+        const double s = i % 2 ? (breaks[i / 2] + breaks[i / 2 + 1]) / 2 : breaks[i / 2];
+        const CurvePoint p = space.evaluate(x, s);
+        r.push_back(p.r), z.push_back(p.z);
+    }
+    const int n = static_cast<int>(r.size());
+    const bool closed = space.closed();
+    Neck neck{0, std::numeric_limits<double>::infinity()};
+    for (int i = closed ? 1 : 0; i < n; ++i) {
+        if (space.topology() == Topology::cell && i == n - 1) continue;
+        const double before = i > 0 ? r[i - 1] : r[1], after = i + 1 < n ? r[i + 1] : r[n - 2];
+        if (r[i] <= before && r[i] <= after && r[i] < neck.radius) neck = {z[i], r[i]};
+    }
+    return neck;
+}
+
+}  // namespace
+
+Snapshot measure(const CurveMotion& motion, const double* y, const double* rate) {
+    const CurveSpace& space = motion.space();
+    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
+    Snapshot out{motion.forms().observe(x), motion.balance(y, rate), narrowest(space, y)};
+    out.o.r_max = measures(space, x).r_max;
+    return out;
+}
+
+double mode_amplitude(const CurveSpace& space, const double* y, int n) {
+    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
+    const ProfileSpace& splines = space.splines();
+    double re = 0, im = 0;
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g)
+            for (int q = 0; q < ProfileSpace::lanes; ++q) {
+                const auto& basis = splines.basis(e, g);
+                const CurvePoint p = space.evaluate(x, basis.z[q]);
+                const double angle = 2 * pi * n * p.z / space.length(), part = basis.weight[q] * p.r * p.z1;
+                re += part * std::cos(angle), im += part * std::sin(angle);
+            }
+    const bool whole = space.images() == 1;
+    return 2 / space.length() * (whole ? std::hypot(re, im) : 2 * std::abs(re));
+}
+
+}  // namespace tubule::axisym

@@ -1,0 +1,23 @@
+// What is measured of a curve at one time.
+#pragma once
+
+#include "axisym/curve/curve_motion.hpp"
+#include "common/shapes/tube.hpp"
+
+namespace tubule::axisym {
+
+struct Snapshot {
+    CurveObservation o;
+    CurveMotion::Balance balance;
+    Neck neck;  // the narrowest; of infinite radius where there is none
+
+    double total() const { return o.energy + balance.kinetic; }
+};
+
+// Of the unknowns and their rates.
+Snapshot measure(const CurveMotion& motion, const double* y, const double* rate);
+
+// Amplitude of the wave of number n in r(z), also where that has several values.
+double mode_amplitude(const CurveSpace& space, const double* y, int n);
+
+}  // namespace tubule::axisym

@@ -1,0 +1,109 @@
+// Runs of curves that are interrupted, in either run of a pair, end as if nothing had happened: the same number of
+// pairs, and a stated error as that of an undisturbed run. What such a run leaves is a checkpoint.
+#include <gtest/gtest.h>
+
+#include "common/case/read.hpp"
+#include "tests/axisym/runs.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// A prolate spheroid with sharp poles: three pairs of runs for 1e-4, where every pair is left by its error alone.
+Case sharp(const std::string& model) {
+    return parse_case("tier = \"axisym\"\n[energy]\nk20 = 1.0\nk42 = 0.05\nH0 = -0.5\n[model]\nkind = \"" + model +
+                          "\"\n[shape]\nkind = \"ellipsoid\"\na = 0.35\nb = 0.35\nc = 1.2\n[accuracy]\nenergy = 1e-4\n"
+                          "[time]\nend = 0.05\noutput = [0.02]\n",
+                      {}, "case.toml");
+}
+
+// Keeps what a result file would, and interrupts after so many looks at whether it should.
+struct Watch : Recorder {
+    int looks = 0, most_looks = 1000000;
+    bool interrupted() override { return ++looks > most_looks; }
+
+    // As a result file is rewound: to the checkpoint, or to the last frame.
+    Restart rewound() {
+        const bool saved = !checkpoints.empty() && (frames.empty() || checkpoints.back().time >= frames.back().time);
+        const Record record = saved ? checkpoints.back() : frames.back();
+        std::erase_if(rows, [&](const auto& row) { return row[0] > record.time; });
+        return {record};
+    }
+};
+
+TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
+    for (const char* model : {"gradient-flow", "stokes"}) {
+        SCOPED_TRACE(model);
+        const Case c = sharp(model);
+        Watch undisturbed;
+        const RunSummary whole = run(c, undisturbed);
+        ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
+        ASSERT_EQ(whole.attempts, 3);
+        Watch watch;
+        std::optional<Restart> restart;
+        int coarser = 0, later_pairs = 0;
+        RunSummary s;
+        for (int times = 0;; ++times) {
+            ASSERT_LT(times, 100);
+            watch.looks = 0, watch.most_looks = whole.counters.steps / 5;
+            s = run(c, watch, restart ? &*restart : nullptr);
+            if (s.stop.reason != Stop::interrupted) break;
+            coarser += s.stop.message.find("of the coarser run") != std::string::npos;
+            later_pairs += s.attempts > 1;
+            restart = watch.rewound();
+        }
+        EXPECT_GT(coarser, 0);
+        EXPECT_GT(later_pairs, 0);
+        EXPECT_EQ(s.stop.reason, Stop::finished) << s.stop.message;
+        EXPECT_EQ(s.attempts, whole.attempts);
+        EXPECT_EQ(s.elements, whole.elements);
+        // Each resumed run has other steps, as the integrator begins again: its error is another one of that size.
+        EXPECT_LT(s.estimated_error, 5 * whole.estimated_error);
+        EXPECT_GT(s.estimated_error, whole.estimated_error / 5);
+        EXPECT_NEAR(s.energy, whole.energy, 1e-5 * whole.reference_energy);
+        EXPECT_EQ(watch.frames.size(), undisturbed.frames.size());
+    }
+}
+
+TEST(CurveResume, aRunThatIsInterruptedLeavesACheckpointAndNoFrameThatNobodyAskedFor) {
+    const Case c = sharp("gradient-flow");
+    Watch whole;
+    run(c, whole);
+    ASSERT_EQ(whole.frames.size(), 3u);  // the start, one output, the end
+    struct InReportedRun : Watch {
+        bool interrupted() override { return rows.size() > 20; }
+    } late;
+    const RunSummary s = run(c, late);
+    ASSERT_EQ(s.stop.reason, Stop::interrupted);
+    ASSERT_EQ(late.checkpoints.size(), 1u);
+    EXPECT_EQ(late.checkpoints[0].time, s.stop.time);
+    EXPECT_EQ(late.frames.size(), 1u + (s.stop.time >= 0.02));
+}
+
+TEST(CurveResume, theCoarserRunIsSavedAndGoesOn) {
+    Case c = sharp("stokes");
+    for (const bool by_signal : {true, false}) {
+        Watch watch;
+        if (by_signal)
+            watch.most_looks = 30;
+        else
+            c.time.limit = 1e-9;
+        const RunSummary s = run(c, watch);
+        EXPECT_EQ(s.stop.reason, by_signal ? Stop::interrupted : Stop::time_limit);
+        EXPECT_EQ(s.stop.time, 0);  // of the run that is reported
+        EXPECT_EQ(s.estimated_error, 1);
+        EXPECT_EQ(watch.rows.size(), 1u);  // the result shows the start
+        EXPECT_EQ(watch.frames.size(), 1u);
+        ASSERT_EQ(watch.checkpoints.size(), 1u);
+        EXPECT_GT(watch.checkpoints[0].time, 0);
+        // Not computed again: the time of the next interruption is later.
+        const Restart restart = watch.rewound();
+        Watch next;
+        next.most_looks = 1;
+        run(c, next, &restart);
+        ASSERT_EQ(next.checkpoints.size(), 1u);
+        EXPECT_GT(next.checkpoints[0].time, restart.record.time);
+    }
+}
+
+}  // namespace
+}  // namespace tubule::axisym
