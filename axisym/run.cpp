@@ -17,7 +17,7 @@ bool begins_as_graph(const Case& c) {
 }  // namespace
 
 std::vector<std::string> series_names(const Case& c) {
-    return begins_as_graph(c) ? graph_series_names(c) : curve_series_names(c);
+    return begins_as_graph(c) ? graph_series(c).names() : curve_series(c).names();
 }
 
 void check_restart(const Record& record) {

@@ -150,8 +150,8 @@ void CurveAttempt::write_outputs(double until) {
 void CurveAttempt::write_row(double t, const Snapshot& s, const double* y) {
     if (!out_.wants_row(t)) return;
     const double defect = s.total() - total_start_ + dissipated(t);
-    out_.row(t, curve_values(setup_.c, *setup_.motion,
-                             {t, s, y, *flow_, defect, error_now_, summary.elements, out_.seconds()}));
+    out_.row(t, setup_.series.values(
+                    {t, s, y, *setup_.motion, *flow_, defect, error_now_, summary.elements, out_.seconds()}));
 }
 
 void CurveAttempt::write_frame(double t, const Snapshot& s, const double* y, const double* rate) {

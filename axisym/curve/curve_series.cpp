@@ -1,53 +1,59 @@
 #include "axisym/curve/curve_series.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <set>
-
-#include "axisym/curve/curve_setup.hpp"
 
 namespace tubule::axisym {
 namespace {
 
-std::set<int> tracked_modes(const Case& c) {
+// Numbers n > 0 of the modes of the start, each once.
+std::vector<int> tracked_modes(const Case& c) {
     std::set<int> waves;
     if (const Tube* tube = std::get_if<Tube>(&c.shape))
         for (const TubeMode& mode : tube->modes)
             if (mode.n > 0) waves.insert(mode.n);
-    return waves;
+    return {waves.begin(), waves.end()};
+}
+
+double lambda(const CurveRow& r) {
+    const int at = r.motion.layout().lambda;
+    return at < 0 ? 0 : r.y[at];
 }
 
 }  // namespace
 
-std::vector<std::string> curve_series_names(const Case& c) {
-    std::vector<std::string> names{"time", "step_size", "order", "newton_iterations", "energy"};
-    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"dissipation", "identity_defect", "area", "volume", "r_min", "r_max"})
-        names.push_back(name);
-    for (const int n : tracked_modes(c)) names.push_back(fmt::format("mode_{}", n));
+SeriesTable<CurveRow> curve_series(const Case& c) {
+    const std::vector<int> modes = tracked_modes(c);
+    std::vector<std::string> waves;
+    for (const int n : modes) waves.push_back(std::to_string(n));
+    SeriesTable<CurveRow> table;
+    table.add({{"time", [](const CurveRow& r) { return r.time; }},
+               {"step_size", [](const CurveRow& r) { return r.flow.step_size(); }},
+               {"order", [](const CurveRow& r) { return static_cast<double>(r.flow.order()); }},
+               {"newton_iterations",
+                [](const CurveRow& r) { return static_cast<double>(r.flow.counters().newton_iterations); }},
+               {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
+    table.add_family("energy_<kl>", energy_term_numbers(),
+                     [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
+    table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},
+               {"identity_defect", [](const CurveRow& r) { return r.identity_defect; }},
+               {"area", [](const CurveRow& r) { return r.now.o.area; }},
+               {"volume", [](const CurveRow& r) { return r.now.o.volume; }},
+               {"r_min", [](const CurveRow& r) { return std::isfinite(r.now.neck.radius) ? r.now.neck.radius : 0; }},
+               {"r_max", [](const CurveRow& r) { return r.now.o.r_max; }}});
+    table.add_family("mode_<n>", waves, [modes](const CurveRow& r, std::size_t wave) {
+        return mode_amplitude(r.motion.space(), r.y, modes[wave]);
+    });
     if (motion_law(c.model).inextensible)
-        for (const char* name : {"kinetic_energy", "speed", "momentum_z", "angular_momentum_z", "lambda"})
-            names.push_back(name);
-    for (const char* name : {"energy_error", "elements", "wall_seconds"}) names.push_back(name);
-    return names;
-}
-
-std::vector<double> curve_values(const Case& c, const CurveMotion& motion, const CurveRow& row) {
-    const CurveObservation& o = row.now.o;
-    const CurveMotion::Balance& balance = row.now.balance;
-    std::vector<double> out{row.time, row.flow.step_size(), static_cast<double>(row.flow.order()),
-                            static_cast<double>(row.flow.counters().newton_iterations), o.energy};
-    out.insert(out.end(), o.energy_term.begin(), o.energy_term.end());
-    const double neck = std::isfinite(row.now.neck.radius) ? row.now.neck.radius : 0;
-    out.insert(out.end(), {balance.dissipation, row.identity_defect, o.area, o.volume, neck, o.r_max});
-    for (const int n : tracked_modes(c)) out.push_back(mode_amplitude(motion.space(), row.y, n));
-    const int lambda = motion.layout().lambda;
-    if (motion.law().inextensible)
-        out.insert(out.end(), {balance.kinetic, balance.speed, balance.momentum_z, balance.angular_z,
-                               lambda < 0 ? 0 : row.y[lambda]});
-    out.insert(out.end(), {row.energy_error, static_cast<double>(row.elements), row.wall_seconds});
-    return out;
+        table.add({{"kinetic_energy", [](const CurveRow& r) { return r.now.balance.kinetic; }},
+                   {"speed", [](const CurveRow& r) { return r.now.balance.speed; }},
+                   {"momentum_z", [](const CurveRow& r) { return r.now.balance.momentum_z; }},
+                   {"angular_momentum_z", [](const CurveRow& r) { return r.now.balance.angular_z; }},
+                   {"lambda", lambda}});
+    table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
+               {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},
+               {"wall_seconds", [](const CurveRow& r) { return r.wall_seconds; }}});
+    return table;
 }
 
 }  // namespace tubule::axisym

@@ -72,7 +72,7 @@ int Beginning::images() const {
 }
 
 CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSettings& with)
-    : c(of), start(from), settings(with) {
+    : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
     const int degree = c.discretisation.order;
     space =

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "axisym/curve/curve_motion.hpp"
+#include "axisym/curve/curve_series.hpp"
 #include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/integration/flow.hpp"
@@ -32,6 +33,7 @@ struct CurveSetup {
     std::unique_ptr<CurveSpace> space;
     std::unique_ptr<CurveMotion> motion;
     double reference_energy = 0;
+    SeriesTable<CurveRow> series;
 
     int elements() const { return space->splines().elements() * space->images(); }
     Eigen::VectorXd curve(const double* y) const { return Eigen::Map<const Eigen::VectorXd>(y, space->size()); }

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "axisym/graph/graph_derivatives.hpp"
-#include "axisym/graph/graph_series.hpp"
 #include "axisym/graph/graph_start.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -44,6 +43,7 @@ Damped damp(const Forms& forms, const Eigen::VectorXd& x, double dt) {
 GraphAttempt::GraphAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const GraphSettings& settings)
     : case_(c),
       clock_(clock),
+      series_(graph_series(c)),
       settings_(settings),
       out_(watch, clock, true),
       outputs_(c),
@@ -330,8 +330,8 @@ void GraphAttempt::write(double t, const Observation& o, const double* x, const 
 void GraphAttempt::write_row(double t, const Observation& o, const double* x) {
     if (!out_.wants_row(t)) return;
     const long iterations = flow_->counters().newton_iterations + past_.counters.newton_iterations;
-    out_.row(t, graph_values(*stage_, {t, o, x, *flow_, iterations, o.energy - past_.energy_start + dissipated(t),
-                                       stated_over_computed * error_.now(), summary.elements, out_.seconds()}));
+    out_.row(t, series_.values({t, o, x, *stage_, *flow_, iterations, o.energy - past_.energy_start + dissipated(t),
+                                stated_over_computed * error_.now(), summary.elements, out_.seconds()}));
 }
 
 Record GraphAttempt::record(double t, const Observation& o, const double* x, const double* v) const {

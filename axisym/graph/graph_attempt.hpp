@@ -8,6 +8,7 @@
 #include "axisym/graph/graph_error.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "axisym/graph/graph_guards.hpp"
+#include "axisym/graph/graph_series.hpp"
 #include "axisym/graph/graph_stage.hpp"
 #include "axisym/integration/flow.hpp"
 #include "axisym/integration/run_summary.hpp"
@@ -77,6 +78,7 @@ private:
 
     const Case& case_;
     const RunClock& clock_;
+    const SeriesTable<GraphRow> series_;
     GraphSettings settings_;
     RunOutput out_;
     OutputTimes outputs_;

@@ -289,8 +289,9 @@ void MotionAttempt::compare() {
 
 void MotionAttempt::write_row() {
     if (!out_.wants_row(state_.time)) return;
-    out_.row(state_.time, motion_values({state_, now_, memory_.balance.defect_at(total()), memory_.balance.corrected,
-                                         error_now_, summary.elements, out_.seconds()}));
+    out_.row(state_.time,
+             motion_series().values({state_, now_, memory_.balance.defect_at(total()), memory_.balance.corrected,
+                                     error_now_, summary.elements, out_.seconds()}));
 }
 
 void MotionAttempt::write_frame() {

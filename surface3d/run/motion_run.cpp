@@ -117,10 +117,6 @@ private:
 
 }  // namespace
 
-std::vector<std::string> motion_series_names(const Case&) {
-    return motion_names();
-}
-
 void check_restart(const Case& c, const Record& record) {
     motion_restart(record, time_scheme(c));
 }

@@ -11,8 +11,6 @@
 
 namespace tubule::surface3d {
 
-std::vector<std::string> motion_series_names(const Case& c);
-
 // Throws std::runtime_error if the record does not hold what a run goes on from.
 void check_restart(const Case& c, const Record& record);
 

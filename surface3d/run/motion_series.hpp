@@ -1,9 +1,7 @@
 // The series of a run in motion, a row each step.
 #pragma once
 
-#include <string>
-#include <vector>
-
+#include "common/series/table.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 
 namespace tubule::surface3d {
@@ -17,7 +15,6 @@ struct MotionRow {
     double wall_seconds;
 };
 
-std::vector<double> motion_values(const MotionRow& row);
-std::vector<std::string> motion_names();  // of the values
+const SeriesTable<MotionRow>& motion_series();
 
 }  // namespace tubule::surface3d

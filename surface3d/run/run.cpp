@@ -9,10 +9,12 @@
 
 #include "common/result/record.hpp"
 #include "common/run/driver.hpp"
+#include "common/series/table.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
+#include "surface3d/run/motion_series.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -197,16 +199,34 @@ std::unique_ptr<MeshSequence> meshes_of(const Case& c, const Start& start) {
     return std::make_unique<MoreAndMore>(c, start);
 }
 
-std::vector<double> row(const Measured& m, double error, double seconds) {
-    const Observables& o = m.o;
-    const CurvedMesh& mesh = m.start.mesh;
-    std::vector<double> out{0, o.energy};
-    out.insert(out.end(), o.energy_term.begin(), o.energy_term.end());
-    const double width = std::sqrt(o.area / mesh.triangles() * 4 / std::sqrt(3.0));
-    for (const double value : {o.area, o.volume, o.integral_H2, o.integral_K, gauss_bonnet_defect(o, mesh),
-                               m.quality.worst, error, static_cast<double>(mesh.triangles()), width, seconds})
-        out.push_back(value);
-    return out;
+struct RestRow {
+    const Measured& m;
+    const Observables& o;
+    const CurvedMesh& mesh;
+    double energy_error, wall_seconds;
+};
+
+SeriesTable<RestRow> rest_series() {
+    SeriesTable<RestRow> table;
+    table.add({
+        {"time", [](const RestRow&) { return 0.0; }},
+        {"energy", [](const RestRow& r) { return r.o.energy; }},
+    });
+    table.add_family("energy_<kl>", energy_term_numbers(),
+                     [](const RestRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    table.add({
+        {"area", [](const RestRow& r) { return r.o.area; }},
+        {"volume", [](const RestRow& r) { return r.o.volume; }},
+        {"integral_H2", [](const RestRow& r) { return r.o.integral_H2; }},
+        {"integral_K", [](const RestRow& r) { return r.o.integral_K; }},
+        {"gauss_bonnet_defect", [](const RestRow& r) { return gauss_bonnet_defect(r.o, r.mesh); }},
+        {"quality", [](const RestRow& r) { return r.m.quality.worst; }},
+        {"energy_error", [](const RestRow& r) { return r.energy_error; }},
+        {"elements", [](const RestRow& r) { return static_cast<double>(r.mesh.triangles()); }},
+        {"mesh_width", [](const RestRow& r) { return std::sqrt(r.o.area / r.mesh.triangles() * 4 / std::sqrt(3.0)); }},
+        {"wall_seconds", [](const RestRow& r) { return r.wall_seconds; }},
+    });
+    return table;
 }
 
 Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
@@ -228,13 +248,8 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
 }  // namespace
 
 std::vector<std::string> series_names(const Case& c) {
-    if (c.moves()) return motion_series_names(c);
-    std::vector<std::string> names{"time", "energy"};
-    for_each_bending_term([&](std::size_t, const auto& term) { names.push_back(std::string("energy_") + term.name); });
-    for (const char* name : {"area", "volume", "integral_H2", "integral_K", "gauss_bonnet_defect", "quality",
-                             "energy_error", "elements", "mesh_width", "wall_seconds"})
-        names.push_back(name);
-    return names;
+    if (c.moves()) return motion_series().names();
+    return rest_series().names();
 }
 
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
@@ -247,7 +262,7 @@ RunSummary run(const Case& c, const Start& start, RunObserver& observer, const R
     const auto meshes = meshes_of(c, start);
     RunSummary s = drive(c, observer, clock, *meshes);
     const Measured& m = meshes->measured();
-    if (m.has_curvature()) observer.row(row(m, meshes->error(), clock.seconds()));
+    if (m.has_curvature()) observer.row(rest_series().values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });
     return s;
