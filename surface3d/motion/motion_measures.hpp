@@ -7,6 +7,7 @@
 
 namespace tubule::surface3d {
 
+// Many fields: a list of measurements that share no rule.
 struct MotionMeasures {
     Observables bending;  // with H and K of `fields`, to which the force belongs
     MotionFields fields;
