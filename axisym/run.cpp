@@ -4,6 +4,7 @@
 #include "axisym/curve/curve_run.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "axisym/graph/graph_run.hpp"
+#include "common/run/run_pairs.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -22,7 +23,7 @@ std::vector<std::string> series_names(const Case& c) {
 
 void check_restart(const Record& record) {
     if (kind_of(record) == RecordKind::curve)
-        curve_restart(record);
+        curve_restart(record), pair_memory(record);
     else
         restart_state(record);
 }

@@ -21,7 +21,7 @@ constexpr std::string_view kind_names[] = {"graph", "curve", "equilibrium", "sur
     throw std::runtime_error(fmt::format("cannot resume from this frame: {}; run the case without --resume", what));
 }
 
-[[noreturn]] void missing(const char* name) {
+[[noreturn]] void missing(const std::string& name) {
     refuse(fmt::format("{} is missing; results of other versions may not have it", name));
 }
 
@@ -64,21 +64,21 @@ RecordReader::RecordReader(const Record& record, RecordKind kind) : record_(reco
     if (kind_of(record) != kind) refuse(fmt::format("its kind is {}, not {}", name(kind_of(record)), name(kind)));
 }
 
-double RecordReader::number_of(const char* name) const {
+double RecordReader::number_of(const std::string& name) const {
     const std::optional<double> found = find_number(record_, name);
     if (!found) missing(name);
     if (!std::isfinite(*found)) refuse(fmt::format("{} is {}", name, *found));
     return *found;
 }
 
-int RecordReader::integer_of(const char* name) const {
+int RecordReader::integer_of(const std::string& name) const {
     const double found = number_of(name);
     if (std::abs(found) > std::numeric_limits<int>::max() || found != std::trunc(found))
         refuse(fmt::format("{} must be an integer, not {}", name, found));
     return static_cast<int>(found);
 }
 
-const std::vector<double>& RecordReader::data_of(const char* name, std::optional<Eigen::Index> count,
+const std::vector<double>& RecordReader::data_of(const std::string& name, std::optional<Eigen::Index> count,
                                                  std::size_t width) const {
     const Array* found = find_array(record_, name);
     if (!found) missing(name);
@@ -89,14 +89,15 @@ const std::vector<double>& RecordReader::data_of(const char* name, std::optional
     return found->data;
 }
 
-void RecordReader::array(const char* name, std::vector<double>& values, std::optional<Eigen::Index> count) const {
+void RecordReader::array(const std::string& name, std::vector<double>& values,
+                         std::optional<Eigen::Index> count) const {
     values = data_of(name, count, 1);
 }
-void RecordReader::array(const char* name, Eigen::VectorXd& values, std::optional<Eigen::Index> count) const {
+void RecordReader::array(const std::string& name, Eigen::VectorXd& values, std::optional<Eigen::Index> count) const {
     const std::vector<double>& data = data_of(name, count, 1);
     values = Eigen::Map<const Eigen::VectorXd>(data.data(), static_cast<Eigen::Index>(data.size()));
 }
-void RecordReader::array(const char* name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count) const {
+void RecordReader::array(const std::string& name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count) const {
     const std::vector<double>& data = data_of(name, count, 3);
     values = Eigen::Map<const Eigen::Matrix3Xd>(data.data(), 3, static_cast<Eigen::Index>(data.size() / 3));
 }

@@ -47,15 +47,15 @@ public:
     explicit RecordWriter(Record& record) : record_(record) {}
 
     template <class Number>
-    void number(const char* name, const Number& value) {
+    void number(const std::string& name, const Number& value) {
         record_.numbers.emplace_back(name, static_cast<double>(value));
     }
     template <class Values>
-    void array(const char* name, const Values& values, std::optional<Eigen::Index> = {}) {
+    void array(const std::string& name, const Values& values, std::optional<Eigen::Index> = {}) {
         record_.arrays.push_back(tubule::array(name, values));
     }
     template <class Values>
-    void optional_array(const char* name, const Values& values, std::optional<Eigen::Index> = {}) {
+    void optional_array(const std::string& name, const Values& values, std::optional<Eigen::Index> = {}) {
         array(name, values);
     }
 
@@ -72,27 +72,28 @@ public:
     RecordReader(const Record& record, RecordKind kind);
 
     template <class Number>
-    void number(const char* name, Number& value) const {
+    void number(const std::string& name, Number& value) const {
         if constexpr (std::is_floating_point_v<Number>)
             value = number_of(name);
         else
             value = static_cast<Number>(integer_of(name));
     }
-    void array(const char* name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
-    void array(const char* name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;
-    void array(const char* name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count = {}) const;
+    void array(const std::string& name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
+    void array(const std::string& name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;
+    void array(const std::string& name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count = {}) const;
     // `count` rows or none: what only some runs have is written all the same.
     template <class Values>
-    void optional_array(const char* name, Values& values, std::optional<Eigen::Index> count = {}) const {
+    void optional_array(const std::string& name, Values& values, std::optional<Eigen::Index> count = {}) const {
         const Array* found = find_array(record_, name);
         array(name, values, found && found->data.empty() ? std::optional<Eigen::Index>(0) : count);
     }
 
 private:
-    double number_of(const char* name) const;
-    int integer_of(const char* name) const;
+    double number_of(const std::string& name) const;
+    int integer_of(const std::string& name) const;
     // Of `width` numbers a row; 1 for a vector.
-    const std::vector<double>& data_of(const char* name, std::optional<Eigen::Index> count, std::size_t width) const;
+    const std::vector<double>& data_of(const std::string& name, std::optional<Eigen::Index> count,
+                                       std::size_t width) const;
 
     const Record& record_;
 };

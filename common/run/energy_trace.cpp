@@ -3,22 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/result/record.hpp"
-
 namespace tubule {
 namespace {
 
 constexpr double shortest_neighbour = 0.1;  // of a step: shorter ones beside it, as on a new mesh, say nothing of it
 
 }  // namespace
-
-EnergyTrace::EnergyTrace(const Record& record, const std::string& name) {
-    const Array* points = find_array(record, name);
-    if (!points) return;
-    const std::size_t width = points->shape.at(1);
-    for (std::size_t i = 0; i < points->data.size(); i += width)
-        add(points->data[i], points->data[i + 1], width > 2 ? std::optional(points->data[i + 2]) : std::nullopt);
-}
 
 void EnergyTrace::add(double t, double energy, std::optional<double> slope) {
     if (!empty() && t <= end()) return;
@@ -62,15 +52,6 @@ double EnergyTrace::through_neighbours(double t, int after) const {
 std::optional<double> EnergyTrace::difference(double t, double energy) const {
     if (empty() || t > end()) return std::nullopt;
     return std::abs(energy - (*this)(t));
-}
-
-Array EnergyTrace::array(const std::string& name) const {
-    Array out{name, {time_.size(), slope_.empty() ? 2u : 3u}, {}};
-    for (std::size_t i = 0; i < time_.size(); ++i) {
-        out.data.insert(out.data.end(), {time_[i], energy_[i]});
-        if (!slope_.empty()) out.data.push_back(slope_[i]);
-    }
-    return out;
 }
 
 }  // namespace tubule

@@ -5,16 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "common/result/result.hpp"
-
 namespace tubule {
 
 class EnergyTrace {
 public:
-    EnergyTrace() = default;
-    // What array() put into a record under this name; empty where it has none.
-    EnergyTrace(const Record& record, const std::string& name);
-
     // A point later than all before; else it is left out. All points of a trace have a slope, or none has.
     void add(double t, double energy) { add(t, energy, {}); }
     void add(double t, double energy, std::optional<double> slope);
@@ -29,8 +23,13 @@ public:
     // How far another run's energy is from this one's, absolute; nothing after the end.
     std::optional<double> difference(double t, double energy) const;
 
-    // One row a point: time, energy, and slope if there are slopes.
-    Array array(const std::string& name) const;
+    // Of a record (common/result/record.hpp), under names that begin so.
+    template <class Fields, class Trace>
+    static void fields(Fields& f, Trace& t, const std::string& name) {
+        f.array(name + "_time", t.time_);
+        f.array(name + "_energy", t.energy_, t.time_.size());
+        f.optional_array(name + "_slope", t.slope_, t.time_.size());
+    }
 
 private:
     double through_neighbours(double t, int after) const;

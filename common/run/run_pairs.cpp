@@ -7,25 +7,38 @@
 namespace tubule {
 namespace {
 
-constexpr const char *own_trace = "restart_trace", *coarser_trace = "restart_coarser_run", *role = "restart_role",
-                     *coarser_stop = "restart_coarser_stop", *coarser_time = "restart_coarser_time";
+constexpr const char* role = "restart_role";
+
+struct Saved {
+    EnergyTrace own, coarser;
+    int coarser_stop = -1;  // there is no coarser run
+    double coarser_time = 0;
+};
+template <class Fields, class Memory>
+void pair_fields(Fields&& f, Memory& m) {
+    f.number("restart_coarser_stop", m.coarser_stop), f.number("restart_coarser_time", m.coarser_time);
+    EnergyTrace::fields(f, m.own, "restart_trace"), EnergyTrace::fields(f, m.coarser, "restart_coarser_trace");
+}
 
 }  // namespace
 
 void add_to_record(Record& record, const EnergyTrace& own, const EndedRun* coarser) {
-    record.arrays.push_back(own.array(own_trace));
-    if (!coarser) return;
-    record.numbers.emplace_back(coarser_stop, static_cast<double>(coarser->stop.reason));
-    record.numbers.emplace_back(coarser_time, coarser->stop.time);
-    if (!coarser->trace.empty()) record.arrays.push_back(coarser->trace.array(coarser_trace));
+    Saved saved;
+    saved.own = own;
+    if (coarser)
+        saved.coarser = coarser->trace, saved.coarser_stop = static_cast<int>(coarser->stop.reason),
+        saved.coarser_time = coarser->stop.time;
+    pair_fields(RecordWriter(record), saved);
 }
 
 PairMemory pair_memory(const Record& record) {
-    PairMemory out{EnergyTrace(record, own_trace), std::nullopt};
-    out.own.cut_after(record.time);
-    if (const auto stop = find_number(record, coarser_stop))
-        out.coarser = EndedRun{EnergyTrace(record, coarser_trace),
-                               {static_cast<Stop>(*stop), find_number(record, coarser_time).value_or(0), "", ""}};
+    Saved saved;
+    pair_fields(RecordReader(record), saved);
+    saved.own.cut_after(record.time);
+    PairMemory out{std::move(saved.own), std::nullopt};
+    if (saved.coarser_stop >= 0 && saved.coarser_stop < static_cast<int>(stop_kinds.size()))
+        out.coarser =
+            EndedRun{std::move(saved.coarser), {static_cast<Stop>(saved.coarser_stop), saved.coarser_time, "", ""}};
     return out;
 }
 

@@ -16,9 +16,8 @@ struct EndedRun {
     StopReport stop;
 };
 
-// Which run of a pair a record belongs to, and what it needs of the pair to go on. In a record: the arrays
-// restart_trace and restart_coarser_run, the numbers restart_role (0: the run that is reported) and
-// restart_coarser_stop, restart_coarser_time.
+// Which run of a pair a record belongs to (its number restart_role; 0: the run that is reported), and what it needs of
+// the pair to go on. pair_memory() throws as RecordReader.
 struct PairMemory {
     EnergyTrace own;
     std::optional<EndedRun> coarser;  // of the run that is reported

@@ -118,7 +118,7 @@ private:
 }  // namespace
 
 void check_restart(const Case& c, const Record& record) {
-    motion_restart(record, time_scheme(c));
+    motion_restart(record, time_scheme(c)), pair_memory(record);
 }
 
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {

@@ -10,10 +10,11 @@
 #include <utility>
 
 #include "common/case/read.hpp"
+#include "common/run/energy_trace.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
-#include "common/run/energy_trace.hpp"
 #include "surface3d/run/run.hpp"
+#include "tests/missing_fields.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -390,6 +391,9 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
     ASSERT_EQ(detail(whole, "pairs"), 2);
     EXPECT_EQ(undisturbed.frames_at_first_look, 1u);  // the start, in case the coarser run is killed
+    // Every field of the state is needed.
+    expect_each_field_is_needed<std::runtime_error>(undisturbed.frames.back(), "restart_",
+                                                    [&](const Record& record) { check_restart(c, record); });
     // Again and again: in the coarser run, in the run that is found wanting, and in the one that will do.
     int times = 0, before_rows = 0, in_first_pair = 0;
     std::optional<Restart> restart;

@@ -7,6 +7,7 @@
 #include "common/run/energy_trace.hpp"
 #include "common/run/output_times.hpp"
 #include "common/run/run_pairs.hpp"
+#include "tests/missing_fields.hpp"
 
 namespace tubule {
 namespace {
@@ -117,6 +118,10 @@ TEST(EnergyTrace, IsTheSameFromARecord) {
     EXPECT_EQ(memory.coarser->trace(2.75), trace(2.75));
     EXPECT_EQ(memory.coarser->stop.reason, Stop::pinch_off);
     EXPECT_EQ(memory.coarser->stop.time, 3);
+    expect_each_field_is_needed<std::runtime_error>(record, "restart_", pair_memory);
+    Record first;
+    add_to_record(first, trace, nullptr);
+    EXPECT_FALSE(pair_memory(first).coarser);
 }
 
 }  // namespace
