@@ -25,7 +25,7 @@ void check_restart(const Record& record) {
     if (kind_of(record) == RecordKind::curve)
         curve_restart(record), pair_memory(record);
     else
-        restart_state(record);
+        graph_restart(record);
 }
 
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {

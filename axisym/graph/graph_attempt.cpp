@@ -126,7 +126,7 @@ void GraphAttempt::begin() {
 }
 
 void GraphAttempt::resume(const Record& restart) {
-    const RestartState state = restart_state(restart);
+    const GraphRestart state = graph_restart(restart);
     use_stage(std::make_unique<GraphStage>(state.cell, state.breaks, case_));
     stage_->transport.total = state.error_total;
     stage_->transport.spatial = state.error_spatial;
@@ -335,7 +335,7 @@ void GraphAttempt::write_row(double t, const Observation& o, const double* x) {
 }
 
 Record GraphAttempt::record(double t, const Observation& o, const double* x, const double* v) const {
-    RestartState state;
+    GraphRestart state;
     state.cell = stage_->space.cell();
     state.breaks = stage_->space.breaks();
     state.coefficients = Eigen::Map<const Eigen::VectorXd>(x, stage_->space.size());
@@ -348,7 +348,7 @@ Record GraphAttempt::record(double t, const Observation& o, const double* x, con
     state.dissipated = dissipated(t);
     state.error_max = error_.largest;
     state.least_symbol = least_symbol_.value_or(0);
-    return frame_record(t, stage_->space, state, Eigen::Map<const Eigen::VectorXd>(v, stage_->space.size()), o.energy);
+    return graph_record(t, stage_->space, state, Eigen::Map<const Eigen::VectorXd>(v, stage_->space.size()), o.energy);
 }
 
 }  // namespace tubule::axisym

@@ -38,7 +38,7 @@ void restart_fields(Fields&& f, State& s) {
 
 }  // namespace
 
-Record frame_record(double time, const ProfileSpace& space, const RestartState& s, const Eigen::VectorXd& rate,
+Record graph_record(double time, const ProfileSpace& space, const GraphRestart& s, const Eigen::VectorXd& rate,
                     double energy) {
     const Cell& cell = space.cell();
     const auto spline = space.unfold(s.coefficients, 0);
@@ -70,8 +70,8 @@ Record frame_record(double time, const ProfileSpace& space, const RestartState& 
     return out;
 }
 
-RestartState restart_state(const Record& record) {
-    RestartState s;
+GraphRestart graph_restart(const Record& record) {
+    GraphRestart s;
     restart_fields(RecordReader(record, RecordKind::graph), s);
     return s;
 }

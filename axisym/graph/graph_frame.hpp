@@ -10,7 +10,7 @@
 namespace tubule::axisym {
 
 // Everything a run carries from one step to the next, except the integrator's history.
-struct RestartState {
+struct GraphRestart {
     Cell cell;
     std::vector<double> breaks;
     Eigen::VectorXd coefficients, error_total, error_spatial;
@@ -20,10 +20,10 @@ struct RestartState {
 
 // Numbers degree, length, energy; arrays knots, coefficients (the spline over the period [0, length]), sampled
 // z, r, H, K, u_n (normal velocity); and the restart state under names that begin with restart_.
-Record frame_record(double time, const ProfileSpace& space, const RestartState& state, const Eigen::VectorXd& rate,
+Record graph_record(double time, const ProfileSpace& space, const GraphRestart& state, const Eigen::VectorXd& rate,
                     double energy);
 
 // Throws as RecordReader.
-RestartState restart_state(const Record& record);
+GraphRestart graph_restart(const Record& record);
 
 }  // namespace tubule::axisym

@@ -90,7 +90,7 @@ enum class Rest { here, on_its_way, on_a_saddle };
 // Newton's step takes it away as a whole (or, where its rate vanishes, a third of it). What is no graph is believed.
 Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
     if (kind_of(frame) != RecordKind::graph) return Rest::here;
-    const axisym::RestartState state = axisym::restart_state(frame);
+    const axisym::GraphRestart state = axisym::graph_restart(frame);
     const int order = c.discretisation.order;
     const axisym::ProfileSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
     const axisym::Forms forms(space, c.energy);
