@@ -1,6 +1,5 @@
 #include "surface3d/curvature/surface_modes.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <stdexcept>
@@ -26,17 +25,6 @@ void for_each_point(const CurvedMesh& mesh, Visit&& visit) {
 }
 
 }  // namespace
-
-CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells) {
-    const auto points = std::find_if(frame.arrays.begin(), frame.arrays.end(),
-                                     [](const Array& array) { return array.name == "points"; });
-    if (points == frame.arrays.end() || points->data.size() < 3 * cells.nodes)
-        throw std::invalid_argument("the frame has no points for its mesh");
-    CurvedMesh mesh{cells.order, {}, cells.cells, cells.period, cells.shifts};
-    for (std::size_t i = 0; i < cells.nodes; ++i)
-        mesh.nodes.emplace_back(Eigen::Map<const Eigen::Vector3d>(&points->data[3 * i]));
-    return mesh;
-}
 
 double tube_mode_amplitude(const CurvedMesh& tube, int n, int m) {
     if (!(tube.period > 0)) throw std::invalid_argument("a closed surface has no waves along z");

@@ -1,13 +1,9 @@
 // Amplitudes of waves on a curved surface: for growth rates, and for comparisons with the axisymmetric tier.
 #pragma once
 
-#include "common/result/result.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
 
 namespace tubule::surface3d {
-
-// The surface of a frame. Throws std::invalid_argument if it has no points on these cells.
-CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells);
 
 // Amplitude of cos(2 pi n z/length + m theta + phase) in r(theta, z), any phase, by (1/(pi L)) INT r exp(-i ...) dtheta
 // dz over the surface: of the waves m and -m together, the root of the sum of their squares. n = m = 0: the mean

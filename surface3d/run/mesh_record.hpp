@@ -1,22 +1,14 @@
-// Curved meshes and data of their nodes as records of the result file.
+// Curved meshes as records of the result file.
 #pragma once
 
-#include <string>
-
-#include "common/result/result.hpp"
+#include "common/result/record.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
 
 namespace tubule::surface3d {
 
 SurfaceCells cells_of(const CurvedMesh& mesh);
-CurvedMesh curved_mesh(const SurfaceCells& cells, const Array& points);
 
-// One column a node.
-template <class Columns>
-Array array(const std::string& name, const Columns& nodal) {
-    Array out{name, {static_cast<std::size_t>(nodal.cols())}, {nodal.data(), nodal.data() + nodal.size()}};
-    if (nodal.rows() > 1) out.shape.push_back(nodal.rows());
-    return out;
-}
+// The surface of a frame. Throws std::invalid_argument if it has no points on these cells.
+CurvedMesh frame_surface(const Record& frame, const SurfaceCells& cells);
 
 }  // namespace tubule::surface3d

@@ -94,7 +94,7 @@ void MotionAttempt::set_moving() {
 void MotionAttempt::resume(const Restart& restart) {
     auto [state, memory] = motion_restart(restart.record, time_scheme(case_));
     memory_ = memory;
-    use_mesh(curved_mesh(restart.cells.value(), array("points", state.X)));
+    use_mesh(frame_surface(restart.record, restart.cells.value()));
     state_ = std::move(state);
     look();
     outputs_.go_on_from(state_.time);

@@ -193,7 +193,7 @@ struct Prepare {
         const Record frame = frame_of(c, from, result);
         if (frame.mesh) {
             refuse_what_needs_a_shape();
-            const CurvedMesh mesh = curved_mesh(result.meshes.at(*frame.mesh), *find_array(frame, "points"));
+            const CurvedMesh mesh = frame_surface(frame, result.meshes.at(*frame.mesh));
             return {[mesh](int, int order) {
                         return StartMesh{mesh.order == order ? mesh : with_order(mesh, order), {}, {}};
                     },

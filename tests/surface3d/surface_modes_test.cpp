@@ -11,6 +11,7 @@
 #include "common/shapes/tube.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/run/mesh_record.hpp"
 
 namespace tubule::surface3d {
 namespace {

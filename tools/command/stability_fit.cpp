@@ -11,6 +11,7 @@
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
 #include "surface3d/curvature/surface_modes.hpp"
+#include "surface3d/run/mesh_record.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 

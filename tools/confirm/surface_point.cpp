@@ -10,6 +10,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/theory/waves.hpp"
 #include "surface3d/curvature/surface_modes.hpp"
+#include "surface3d/run/mesh_record.hpp"
 #include "tools/compare/results.hpp"
 
 namespace tubule::confirm {
