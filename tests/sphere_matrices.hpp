@@ -246,7 +246,7 @@ inline System flow(const Triangles& t, int k, double tau) {
     return s;
 }
 
-// That step with its rows scaled as they become symmetric but for the wind: p by -1, H by -f_HH/tau, K by -f_KK/tau.
+// That step, rows scaled to be symmetric except for advection: p by -1, H by -f_HH/tau, K by -f_KK/tau.
 inline System almost_symmetric(System flow, double tau) {
     const auto size = flow.A.rows();
     const int n = *std::max_element(flow.node_of_unknown.begin(), flow.node_of_unknown.end()) + 1;

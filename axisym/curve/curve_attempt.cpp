@@ -85,7 +85,7 @@ std::optional<StopReport> CurveAttempt::check(double t) {
     const std::optional<double> stationary = setup_.c.time.stationary;
     if (auto pause = clock_.find_pause(t)) return pause;
     if (stationary && what_may_change(t) < *stationary * summary.reference_energy)
-        return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
+        return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
     return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
 }

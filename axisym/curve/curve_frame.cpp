@@ -66,7 +66,7 @@ struct MakeMeridian {
     Meridian operator()(const Exact& shape) const {
         return meridian(shape);
     }
-    Meridian operator()(const MeshFile&) const { throw CaseError(c.path + ": a mesh is no profile"); }
+    Meridian operator()(const MeshFile&) const { throw CaseError(c.path + ": a mesh is not a profile"); }
     Meridian operator()(const ResultFrame& from) const {
         const Result result = read_start(c, from);
         const int count = static_cast<int>(result.frames.size()),

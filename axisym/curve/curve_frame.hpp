@@ -9,7 +9,7 @@
 
 namespace tubule::axisym {
 
-// What a run of a curve needs to go on.
+// What a run of a curve needs to resume.
 struct CurveRestart {
     std::vector<double> breaks;
     Eigen::VectorXd y, rate;

@@ -29,7 +29,7 @@ std::span<const CurveGuard> curve_guards() {
              return StopReport{Stop::ill_posed, time,
                                fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
                                            s.o.s_symbol),
-                               "no resolution helps: the energy does not resist short waves there"};
+                               "refinement does not help: the energy does not resist short waves there"};
          }},
         {[](const Snapshot& s, double) { return s.o.g_min / s.o.g_max - stretched; },
          [](const Snapshot& s, double time) {
@@ -45,9 +45,10 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
                                            double time) {
     if (const auto crossing = self_intersection(space, x)) {
         const CurvePoint p = space.evaluate(x, (*crossing)[0]);
-        return StopReport{Stop::self_intersection, time,
-                          fmt::format("the profile meets itself or the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
-                          "contact is not modelled: later results are invalid"};
+        return StopReport{
+            Stop::self_intersection, time,
+            fmt::format("the profile intersects itself or crosses the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
+            "contact is not modelled: later results are invalid"};
     }
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
@@ -62,7 +63,8 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
 std::optional<StopReport> CurveStall::after_step(double time, double step, double end) {
     if (time > crawling * since_) since_ = time, steps_ = 0;
     if (++steps_ <= most_crawling || step >= tiny_step * end) return std::nullopt;
-    return StopReport{Stop::solver_failed, time, fmt::format("the time integrator is stuck with steps of {:.2g}", step),
+    return StopReport{Stop::solver_failed, time,
+                      fmt::format("the time integrator makes no progress with steps of {:.2g}", step),
                       "try another accuracy, discretisation.elements or parametrisation"};
 }
 

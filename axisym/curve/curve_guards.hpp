@@ -1,4 +1,4 @@
-// Why a run of a curve ends before its time.
+// Why a run of a curve ends early.
 #pragma once
 
 #include <optional>
@@ -9,18 +9,18 @@
 
 namespace tubule::axisym {
 
-// Positive while all is well; what to report once it is not.
+// A value that is positive while all is well, and the report for when it no longer is.
 struct CurveGuard {
     double (*value)(const Snapshot& s, double r_min);
     StopReport (*report)(const Snapshot& s, double time);
 };
 std::span<const CurveGuard> curve_guards();
 
-// Looked for now and then: a profile that meets itself or the axis, elements that its curvature is too much for.
+// Checked now and then: a profile that intersects itself or the axis, elements too long for its curvature.
 std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen::VectorXd& x, const Snapshot& s,
                                            double time);
 
-// Steps that lead nowhere: IDA may go on with them for ever.
+// Steps that make no progress: IDA may continue them indefinitely.
 class CurveStall {
 public:
     std::optional<StopReport> after_step(double time, double step, double end);

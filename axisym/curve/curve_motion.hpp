@@ -28,7 +28,7 @@ struct CurveLaw : MotionLaw {
 // the swirl u_theta; the pressure p; multipliers. -1 for those that the law does not have.
 struct MotionLayout {
     int r = 0, z = 0, u_r = -1, u_z = -1, swirl = -1, p = -1;
-    int lambda = -1;             // force -lambda nu, by which the volume is kept: INT u.nu = 0
+    int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0
     int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
     int shift = -1;              // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
@@ -92,7 +92,7 @@ private:
     void add_column(int number, int part, int e, int g, const Packs& factor, double* values) const;
     Eigen::VectorXd gradient_at(const Weights& weights, const double* y) const;
 
-    // A field of unknowns: where it stands, and which of the pointwise slots it feeds.
+    // A field of unknowns: where it stands, and which of the pointwise slots it fills.
     struct Part {
         const Field* field;
         int offset;

@@ -7,7 +7,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Whether two runs of a pair tell the same story as far as they can be compared.
+// Whether the energies of two runs of a pair can be compared.
 bool comparable(const StopReport& coarse, const StopReport& fine) {
     return coarse.reason == fine.reason || can_go_on(fine.reason);
 }
@@ -34,10 +34,10 @@ public:
     double error(const EndedRun& other) override {
         RunSummary& s = run_->summary;
         if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
-            s.warnings.push_back("so few elements leave no coarser run to compare with: the error is not known");
+            s.warnings.push_back("too few elements for a coarser run to compare with: the error is unknown");
         else if (!comparable(other.stop, s.stop))
             s.warnings.push_back(
-                fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is not known",
+                fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is unknown",
                             other.stop.time, name(other.stop.reason)));
         else
             return run_->error;

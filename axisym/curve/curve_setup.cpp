@@ -100,7 +100,7 @@ FlowSystem CurveSetup::system() const {
     system.pattern = &motion.pattern();
     system.differential = motion.differential();
     // Velocities without inertia, pressures and numbers follow from the curve; their own errors do not count. Over
-    // a very short step rounding alone moves them more than the curve: they have no say in when the iteration ends
+    // a very short step rounding alone moves them more than the curve: they do not affect when the iteration ends
     // either.
     const double length = std::sqrt(start.area);
     system.scale = Eigen::VectorXd::Constant(at.size, 1e12 * length / settings.tolerance);

@@ -14,7 +14,7 @@ namespace tubule::axisym {
 
 CurveLaw law_of(const Case& c);
 
-// What all runs of a case begin with: half of the profile where it mirrors itself and the case allows that.
+// What all runs of a case start from: half of the profile where it is symmetric and the case allows that.
 struct Beginning {
     Meridian meridian;
     double area = 0, volume = 0;
@@ -37,12 +37,12 @@ struct CurveSetup {
 
     int elements() const { return space->splines().elements() * space->images(); }
     Eigen::VectorXd curve(const double* y) const { return Eigen::Map<const Eigen::VectorXd>(y, space->size()); }
-    // Without what is watched: dissipation and guards.
+    // Without the monitored quantities: dissipation and guards.
     FlowSystem system() const;
     TimeControl control(double first_step) const;
 };
 
-// Unknowns and rates at the start: those to compute from, and what of them is shown, whose curve is the exact one.
+// Unknowns and rates at the start: those to compute from, and those to show, with the exact curve.
 struct CurveBegin {
     Eigen::VectorXd y, rate, shown;
     double first_step = 0;

@@ -160,9 +160,9 @@ std::optional<StopReport> GraphAttempt::find_lost_accuracy(double t) const {
     return StopReport{
         Stop::resolution_lost, t,
         fmt::format("the error of the energy reached {:.2g} of E_ref{}", error_.now() / summary.reference_energy,
-                    asked ? " with the discretisation asked for" : ""),
-        asked ? "leave discretisation.elements and discretisation.time_tolerance to the program, or refine them"
-              : "ask for more accuracy: errors of this start are amplified on the way"};
+                    asked ? " with the given discretisation" : ""),
+        asked ? "omit discretisation.elements and discretisation.time_tolerance, or refine them"
+              : "ask for more accuracy: errors grow during the run from this start"};
 }
 
 std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Observation& o) {
@@ -171,7 +171,8 @@ std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Obser
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
     if (case_.time.stationary &&
         o.dissipation * (case_.time.end - t) < *case_.time.stationary * summary.reference_energy)
-        return StopReport{Stop::stationary, t, fmt::format("the energy dissipates at {:.3g} only", o.dissipation), ""};
+        return StopReport{Stop::stationary, t,
+                          fmt::format("the energy dissipates at a rate of only {:.3g}", o.dissipation), ""};
     if (auto pause = clock_.find_pause(t)) return pause;
     if (auto lost = find_lost_accuracy(t)) return lost;
     if (o.symbol_3d <= 0 && summary.warnings.empty())
@@ -183,8 +184,8 @@ std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Obser
 }
 
 // A shape that keeps sharpening gets more room each time, as every remesh restarts the integrator. Afterwards the
-// profile is the same, but on the new mesh its knots want to move, little and fast. Linearly implicit Euler damps that,
-// where the integrator would chase it with steps of next to nothing.
+// profile is the same, but on the new mesh its knots move a little, and fast. Linearly implicit Euler damps that,
+// where the integrator would resolve it with tiny steps.
 std::optional<StopReport> GraphAttempt::remesh() {
     const bool soon = flow_->counters().steps < few_steps && summary.meshes > 1;
     remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
@@ -276,7 +277,7 @@ std::optional<StopReport> GraphAttempt::step() {
     const Flow::Outcome outcome = flow_->advance(case_.time.end);
     if (outcome == Flow::Outcome::failed) return recover();
     const double t = flow_->time();
-    const StopReport given_up{Stop::resolution_lost, t, "the error exceeds what was asked", ""};
+    const StopReport given_up{Stop::resolution_lost, t, "the error exceeds the requested accuracy", ""};
     if (outcome == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
     const Observation o = observe(t, flow_->x(), flow_->v());
     stage_->transport.add_step(t - before, flow_->x(), flow_->v());

@@ -28,7 +28,7 @@ public:
     void go();
 
     RunSummary summary;
-    bool gave_up = false;  // its error exceeds what was asked, and finer settings would help
+    bool gave_up = false;  // its error exceeds the accuracy asked, and finer settings would help
     const ErrorTransport::EnergyError& latest_error() const { return error_.latest; }
 
 private:
@@ -37,7 +37,7 @@ private:
         double energy_start = 0, dissipated = 0;
         FlowCounters counters;
     };
-    // The last state that was good.
+    // The last good state.
     struct Good {
         Eigen::VectorXd x;
         double time = 0;

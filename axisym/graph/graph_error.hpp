@@ -1,4 +1,4 @@
-// The error of the energy along a run of a graph, as the error transport computes it now and then.
+// The error of the energy along a run of a graph, as the error transport computes it at intervals.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ public:
     // Whether it is time, after a step, to carry the error on.
     bool due(const Observation& o);
     void carry_on(GraphStage& stage, const Observation& o);
-    // Beyond what is allowed, by a cause that finer settings cure.
+    // Beyond what is allowed, for a reason that finer settings remedy.
     bool is_curable(const GraphSettings& settings, double allowed) const;
 
     double now() const { return std::abs(latest.total); }

@@ -30,7 +30,7 @@ std::span<const GraphGuard> graph_guards() {
                  fmt::format("the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to "
                              "{:.3g} at x = kappa_theta",
                              stage.place(o.z_symbol), o.symbol),
-                 "no refinement helps; k40 or k42 is too negative for the curvatures of this shape"};
+                 "refinement does not help; k40 or k42 is too negative for the curvatures of this shape"};
          }}};
     return list;
 }

@@ -1,4 +1,4 @@
-// Why a run of a graph ends before its time.
+// Why a run of a graph ends early.
 #pragma once
 
 #include <span>
@@ -11,10 +11,10 @@ namespace tubule::axisym {
 // What is watched: a state, in a run with these limits.
 struct GraphLimits {
     double r_min = 0;
-    double least_symbol = 0;  // below it the flow is all but ill-posed
+    double least_symbol = 0;  // below it the flow is nearly ill-posed
 };
 
-// Positive while all is well; what to report once it is not.
+// A value that is positive while all is well, and the report for when it no longer is.
 struct GraphGuard {
     double (*value)(const Observation& o, const GraphLimits& limits);
     StopReport (*report)(const Observation& o, const GraphStage& stage, const double* x, double time);
@@ -23,7 +23,7 @@ std::span<const GraphGuard> graph_guards();
 
 StopReport overhang(const Observation& o, const GraphStage& stage, const double* x, double time);
 
-// Whether the profile is so steep that what fails there fails by an overhang.
+// Whether the profile is so steep that a failure there is due to an overhang.
 bool is_about_to_overhang(const Observation& o);
 
 // Of the first observation of a run.

@@ -1,4 +1,4 @@
-// A case of tier "axisym" whose profile is a graph r(z): the gradient flow of tubes, at its quickest.
+// A case of tier "axisym" whose profile is a graph r(z): the gradient flow of tubes, in its fastest form.
 #pragma once
 
 #include "axisym/graph/graph_series.hpp"
@@ -7,7 +7,7 @@
 namespace tubule::axisym {
 
 // As run(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
-// (graph_error_transport.hpp); where that exceeds what was asked, it begins again with finer settings.
+// (graph_error_transport.hpp); where that exceeds the accuracy asked, it starts again with finer settings.
 RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart = nullptr);
 
 }  // namespace tubule::axisym

@@ -13,7 +13,7 @@ struct GraphSettings {
     double time_tolerance = 0;
     double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
     bool free_time = true, free_mesh = true;
-    bool may_give_up = true;  // where the error exceeds what was asked, and finer settings would help
+    bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
 };
 
 GraphSettings first_graph_settings(const Case& c);

@@ -32,7 +32,7 @@ struct FirstMesh {
     std::vector<double> breaks;
     double reference_energy = 0;
 };
-// Breaks that will do for the start and, as far as that can be foreseen, for what the flow makes of it.
+// Breaks suitable for the start and, as far as can be foreseen, for how the flow changes it.
 FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
                      const std::function<double(double)>& start);
 

@@ -12,7 +12,7 @@ public:
     // A point later than all before; else it is left out. All points of a trace have a slope, or none has.
     void add(double t, double energy) { add(t, energy, {}); }
     void add(double t, double energy, std::optional<double> slope);
-    // A run goes on from here: forgets what is later.
+    // A run resumes here: forgets everything later.
     void cut_after(double t);
     bool empty() const { return time_.empty(); }
     double end() const { return time_.back(); }

@@ -21,7 +21,7 @@ struct RunObserver {
     virtual void discard() {}  // the run begins again with finer settings: forget all rows and frames
     virtual void progress(double /*time*/, double /*energy*/, double /*step*/) {}
     virtual bool interrupted() { return false; }
-    virtual void note(const std::string& /*words*/) {}  // what is worth telling at once
+    virtual void note(const std::string& /*words*/) {}  // a message to show at once
 };
 
 // Whether the run was stopped from outside, and can be resumed as if it had not been.

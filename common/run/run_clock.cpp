@@ -10,9 +10,9 @@ double RunClock::seconds() const {
 
 std::optional<StopReport> RunClock::find_pause(double time) const {
     if (limit_ && seconds() > *limit_)
-        return StopReport{Stop::time_limit, time, fmt::format("used the {} s of time.limit", *limit_),
-                          "go on with --resume"};
-    if (interrupted()) return StopReport{Stop::interrupted, time, "interrupted by a signal", "go on with --resume"};
+        return StopReport{Stop::time_limit, time, fmt::format("reached the time limit of {} s (time.limit)", *limit_),
+                          "continue with --resume"};
+    if (interrupted()) return StopReport{Stop::interrupted, time, "interrupted by a signal", "continue with --resume"};
     return std::nullopt;
 }
 

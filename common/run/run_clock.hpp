@@ -1,4 +1,4 @@
-// The wall time of a run with all attempts, and whether it is to pause: be saved now and go on another time.
+// The wall time of a run with all attempts, and whether it is to pause: be saved now and resumed later.
 #pragma once
 
 #include <chrono>

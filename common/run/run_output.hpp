@@ -22,7 +22,7 @@ public:
     void progress(double time, double energy, double step) {
         if (reported_) watch_.progress(time, energy, step);
     }
-    // What there is at this time has been written by the run that was interrupted.
+    // Output at this time has already been written by the interrupted run.
     void go_on_from(double time) { last_row_ = last_frame_ = time; }
 
     bool wants_row(double time) const { return reported_ && time != last_row_; }
@@ -30,7 +30,7 @@ public:
     void frame(double time, const std::function<Record()>& make);
     // A checkpoint, if the last one is some time ago.
     void safeguard(const std::function<Record()>& make);
-    // The state at the end: a checkpoint where the run can go on from it, else a frame.
+    // The state at the end: a checkpoint where the run can be resumed, else a frame.
     void end(const StopReport& stop, double time, const std::function<Record()>& make);
 
 private:

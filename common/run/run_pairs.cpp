@@ -74,11 +74,11 @@ bool RunPairs::refine(const RunSummary& last) {
     return true;
 }
 
-// The coarser run has been saved, to go on with. Of the error nothing is known yet.
+// The coarser run has been saved, to be resumed. The error is not known yet.
 RunSummary& RunPairs::unfinished(RunSummary& s) const {
     s.estimated_error = 1;
     s.stop.message +=
-        fmt::format(", at t = {:.6g} of the coarser run, which tells the error of the other", s.stop.time);
+        fmt::format(", at t = {:.6g} of the coarser run, which serves to estimate the error", s.stop.time);
     s.stop.time = begin_time_;
     return s;
 }

@@ -10,7 +10,7 @@
 
 namespace tubule {
 
-// What is left of a run for another to be compared with.
+// What is kept of a run to compare another one with.
 struct EndedRun {
     EnergyTrace trace;
     StopReport stop;
@@ -39,7 +39,7 @@ public:
     // Of the run that has ended last.
     virtual EndedRun ended() = 0;
 
-    // The error of the reported run, absolute. Appends to its warnings what is not known of it.
+    // The error of the reported run, absolute. Appends a warning if it is unknown.
     virtual double error(const EndedRun& coarser) = 0;
     // As those of EstimatedRuns.
     virtual bool refine(const RunSummary& last) = 0;
@@ -49,7 +49,7 @@ public:
 class RunPairs : public EstimatedRuns {
 public:
     // `restart`: the record from which the runs go on, or none. If that is of a reported run whose coarser run ended
-    // for a reason that holds no more, the coarser one is made again.
+    // for a reason that no longer applies, the coarser one is run again.
     RunPairs(PairedRuns& runs, const Case& c, RunObserver& watch, double begin_time, const Record* restart);
 
     RunSummary& next() override;

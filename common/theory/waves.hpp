@@ -35,8 +35,8 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
 // volume.
 double tension_of_waves(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves);
 
-// A case of motion that begins as a tube: that tube made straight, and its waves. The tension is that of the start; 0
-// where nothing decides it (fixed volume, no waves).
+// A time-dependent case that starts as a tube: that tube made straight, and its waves. The tension is that of the
+// start; 0 where nothing determines it (fixed volume, no waves).
 struct TubeStart {
     UniformTube tube;
     double length = 1;

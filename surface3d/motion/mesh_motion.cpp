@@ -80,7 +80,7 @@ VectorField tangential(const VectorField& v, const VectorField& normal) {
 }
 
 // Motions of the nodes along the surface. A tube's mesh does not run along the tube as a whole: on a straight one
-// nothing resists that, and on one that is nearly straight noise decides it, divided by the square of noise.
+// nothing resists that, and on one that is nearly straight it is noise divided by the square of noise.
 struct AlongSurface {
     const VectorField& normal;
     VectorField running;  // of norm 1; zero on a closed surface
@@ -108,7 +108,7 @@ void meet_flux(const System& system, const Projection& project, const VectorFiel
 
 // What r does along the surface: r - (m nu, Z), with m such that nothing is left along the nodal normals. Leaving out
 // m, and testing with nodal tangents alone, would let the curvature vector of the mesh, which is not quite normal, pull
-// nodes for ever: a cell at rest deforms.
+// nodes indefinitely: a cell at rest deforms.
 VectorField without_multiplier(const System& system, const Projection& project, const VectorField& normal,
                                const AlongSurface& along_surface, VectorField r) {
     for (int sweep = 0; sweep < sweeps; ++sweep) {

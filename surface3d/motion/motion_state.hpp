@@ -40,7 +40,7 @@ struct MotionStep {
     double correction = 0;  // energy that keeping area and volume took
 };
 
-// Whether positions, velocities and multipliers are numbers.
+// Whether positions, velocities and multipliers are finite.
 inline bool is_finite(const MotionState& s) {
     return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda);
 }

@@ -165,7 +165,7 @@ Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau
 }
 
 // Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,
-// which would move a surface at rest ever faster: a rigid motion takes it back. It changes no shape.
+// which would move a surface at rest faster and faster: a rigid motion cancels that. It changes no shape.
 void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
     if (kept.size() == 0) return;
     const CurvedMesh m = mesh(to.X);
@@ -214,8 +214,9 @@ MovingSurface::Correction MovingSurface::correction(const VectorField& X, const 
         const double off = parts.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
         if (off <= kept || (k == most_corrections && off <= still_kept)) return out;
         if (k == most_corrections)
-            throw SolveError(fmt::format("area and volume are not kept: {:.2g} of them is missing after {} corrections",
-                                         off, most_corrections));
+            throw SolveError(
+                fmt::format("area and volume are not conserved: relative error {:.2g} after {} corrections", off,
+                            most_corrections));
         const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
         if (area && volume) {
             Eigen::Matrix2d J;

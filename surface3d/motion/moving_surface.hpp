@@ -20,7 +20,7 @@ struct MotionControl {
     std::optional<double> area = {}, volume = {};  // kept to rounding, where the law has the multiplier
     double relaxation = 0.1;                       // time in which the mesh becomes even
     bool follow_curvature = false;                 // or one whose triangles are small where the surface is curved
-    // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition as far as the mesh can tell: lambda is
+    // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition to the accuracy of the mesh: lambda is
     // left out, as the pressure stands for it, and the area alone is kept to rounding.
     double least_variation = 1e-8;
     double smoothing = 0;  // of schemes that smooth curvatures: eps of a - eps Lap a = a_h, a length squared
@@ -28,11 +28,11 @@ struct MotionControl {
 
 class MovingSurface {
 public:
-    // A law that nothing makes resist rigid motions gets a slight friction, and these are held at zero.
+    // A law that does not resist rigid motions gets a slight friction, and these are held at zero.
     MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control);
 
-    // At rest, with the area and volume that are kept: what a new mesh lacks of them, a short step would make up for
-    // at great speed. SolveError where they cannot be kept to 1e-8.
+    // At rest, corrected to the area and volume that are kept: a short step would make up for the defect of a new mesh
+    // at high speed. SolveError where they cannot be kept to 1e-8.
     MotionState start(const CurvedMesh& mesh);
     // The same with a velocity as in MotionState, with which nodes begin to move, too: a first step from nodes at rest
     // would not bend the surface. With a rigid motion added that makes `momenta` what is given, if anything is.
@@ -57,8 +57,8 @@ public:
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
     Eigen::VectorXd pressure_at_nodes(const MotionState& state) const;
 
-    // Momentum and angular momentum but for the density (a tube: about its axis alone), which friction alone changes;
-    // empty where there is no inertia.
+    // Momentum and angular momentum except for the density (a tube: about its axis alone), which friction alone
+    // changes; empty where there is no inertia.
     Eigen::VectorXd momenta(const MotionState& state) const;
     Eigen::VectorXd momenta_after(const MotionState& from, double tau) const;  // what friction leaves of them
     // Adds the rigid motion that makes them `kept`, to positions for a time te.
@@ -66,7 +66,7 @@ public:
     // Columns r of (r, v) for every rigid motion v that the law leaves open: what is to be zero of a velocity.
     Eigen::MatrixXd open_rigid_motions(const CurvedMesh& mesh) const;
 
-    // Whether area and volume are one condition as far as the mesh can tell.
+    // Whether area and volume are one condition to the accuracy of the mesh.
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
     // The rates of area and volume with which `begin` comes, in a time `span`, to those that are kept: linear about the
     // surface `at`, as seen from the expected `end`, with `missed` more, which a step like this is known to miss.

@@ -31,7 +31,7 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
     const double defect = gauss_bonnet_defect(o, mesh);
     if (!(std::abs(defect) <= allowed * 4 * pi))
         return StopReport{Stop::resolution_lost, 0,
-                          fmt::format("INT K = {:.6g} is off by {:.3g} from 2 pi times the Euler characteristic {}",
+                          fmt::format("INT K = {:.6g} differs by {:.3g} from 2 pi times the Euler characteristic {}",
                                       o.integral_K, defect, euler_characteristic(mesh)),
                           advice};
     return std::nullopt;
@@ -97,7 +97,7 @@ std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
     if (!pair) return std::nullopt;
     const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);
     return StopReport{Stop::self_intersection, 0,
-                      fmt::format("the surface meets itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
+                      fmt::format("the surface intersects itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
                       "contact is not modelled: later results are invalid"};
 }
 

@@ -1,4 +1,4 @@
-// Signs that a discrete surface is none, or that its curvatures do not belong to it.
+// Signs that a mesh is not a valid surface, or that its curvatures are inconsistent with it.
 #pragma once
 
 #include <optional>

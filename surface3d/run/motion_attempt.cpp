@@ -124,7 +124,8 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& nex
 std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     const double t = state_.time;
     const auto failed = [&](const std::string& what) {
-        return Refusal{0.25, {Stop::solver_failed, t, what, "try other elements, or another discretisation.order"}};
+        return Refusal{0.25,
+                       {Stop::solver_failed, t, what, "try another discretisation.elements or discretisation.order"}};
     };
     try {
         const MotionStep next = scheme_->step(state_, tau);
@@ -175,8 +176,8 @@ bool MotionAttempt::wants_new_mesh() const {
 }
 
 // The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.
-// What the energy jumps counts as an error. Where no better mesh can be made, the old one is kept: check_state() tells
-// when it will do no longer.
+// The jump of the energy counts as an error. Where no better mesh can be made, the old one is kept: check_state() stops
+// the run when it is no longer good enough.
 void MotionAttempt::make_new_mesh() {
     memory_.count.mesh_since = memory_.count.steps;
     const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
@@ -269,7 +270,7 @@ std::optional<StopReport> MotionAttempt::check_progress() {
     const double t = state_.time;
     if (auto pause = clock_.find_pause(t)) return pause;
     if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
-        return StopReport{Stop::stationary, t, "the energy changes no more, as asked by time.stationary", ""};
+        return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     return stall_.look(t, state_.step, first_step * memory_.scale.relaxation,
                        memory_.balance.lowest_total / memory_.scale.reference_energy, case_.accuracy.energy);
 }

@@ -32,13 +32,13 @@ public:
 
     RunSummary summary;
     EnergyTrace trace;
-    // Largest ones, absolute: of the energy from the coarser run; of the balance with what dissipates, which shows what
-    // both runs of a pair lose alike.
+    // Largest errors, absolute: of the energy against the coarser run; of the balance with dissipation, which shows
+    // what both runs of a pair lose alike.
     double difference() const { return memory_.error; }
     double defect() const { return memory_.balance.defect; }
 
 private:
-    // What became of a trial step: nothing to say if it is taken.
+    // Why a trial step was rejected; empty if it is accepted.
     struct Refusal {
         double shrink = 0.25;  // the next trial is so much shorter
         StopReport report;     // if no step is short enough
@@ -87,7 +87,7 @@ private:
     MotionMeasures now_;
     MotionMemory memory_;
     StallDetector stall_;
-    std::optional<StopReport> early_;  // nothing can be begun, or nothing is left to do
+    std::optional<StopReport> early_;  // the run cannot start, or is already complete
     double error_now_ = 0;
 };
 

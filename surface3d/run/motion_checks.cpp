@@ -29,7 +29,7 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
     if (!(m.symbol > 0))
         return StopReport{Stop::ill_posed, time,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
-                          "no resolution helps: the energy does not resist short waves there"};
+                          "refinement does not help: the energy does not resist short waves there"};
     if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
@@ -37,9 +37,9 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
     if (!(m.turn.angle <= sharpest_turn))
         return StopReport{m.turn.saddle ? Stop::pinch_off : Stop::resolution_lost, time,
                           fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
-                                      m.turn.saddle ? "a neck closes" : "the surface is too sharp", where(m.turn.where),
-                                      m.turn.angle),
-                          m.turn.saddle ? "more elements follow the neck further" : "use more elements"};
+                                      m.turn.saddle ? "a neck is closing" : "the surface bends too sharply",
+                                      where(m.turn.where), m.turn.angle),
+                          m.turn.saddle ? "use more elements to follow the neck further" : "use more elements"};
     if (!(m.quality.worst > worst_quality))
         return StopReport{Stop::mesh_lost, time,
                           fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),
@@ -52,14 +52,14 @@ std::optional<StopReport> find_rise_in_step(double rise, double asked, double ti
     if (rise <= climb * asked) return std::nullopt;
     return StopReport{
         Stop::resolution_lost, time,
-        fmt::format("the energy rises by {:.3g} of E_ref in a step of {:.3g}, which it cannot", rise, step),
+        fmt::format("the energy increased by {:.3g} of E_ref in a step of {:.3g}, which the model forbids", rise, step),
         "use more elements or, if given, a smaller discretisation.step"};
 }
 
 std::optional<StopReport> find_slow_rise(double rise, double asked, double time) {
     if (rise <= creep * asked) return std::nullopt;
     return StopReport{Stop::resolution_lost, time,
-                      fmt::format("the energy has risen by {:.3g} of E_ref, little by little, which it cannot", rise),
+                      fmt::format("the energy gradually increased by {:.3g} of E_ref, which the model forbids", rise),
                       "use more elements or, if given, a smaller discretisation.step"};
 }
 
@@ -73,11 +73,11 @@ std::optional<StopReport> find_impossible_motion(const Observables& o, const Cur
 std::optional<StopReport> find_drift(double change, double asked, double time) {
     if (std::abs(change) <= most_drift * asked) return std::nullopt;
     if (!std::isfinite(change))
-        return StopReport{Stop::resolution_lost, time, "the volume is not a number", "use more elements"};
+        return StopReport{Stop::resolution_lost, time, "the volume is not finite", "use more elements"};
     return StopReport{
         Stop::resolution_lost, time,
-        fmt::format("the volume has drifted by {:.3g} of itself, as where on so few triangles it cannot be "
-                    "told from the area, which is kept",
+        fmt::format("the relative volume drift is {:.3g}: on so few triangles, keeping the area does not keep the "
+                    "volume",
                     std::abs(change)),
         "use more elements"};
 }
@@ -89,7 +89,7 @@ std::optional<StopReport> StallDetector::look(double time, double step, double t
         return std::nullopt;
     }
     if (++steps_ <= most_stalled || step >= tiny) return std::nullopt;
-    return StopReport{Stop::solver_failed, time, fmt::format("stuck with steps of {:.2g}", step),
+    return StopReport{Stop::solver_failed, time, fmt::format("no progress with steps of {:.2g}", step),
                       "ask for less accuracy, or use more elements"};
 }
 

@@ -1,5 +1,5 @@
 // Why a run in motion stops before its end: judgements on what was measured. Each is silent while all is well, and
-// speaks where a number is none. The guards of single surfaces are in guards.hpp.
+// triggers on NaN, too. The guards of single surfaces are in guards.hpp.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace tubule::surface3d {
 
-// What lies in the shape and its triangles, so that no shorter step would help: an energy that does not resist short
+// Faults of the shape and its triangles, which no shorter step would remedy: an energy that does not resist short
 // waves, a neck thinner than r_min, normals that turn too far from node to node, a degenerate triangle.
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time);
 
@@ -28,9 +28,9 @@ std::optional<StopReport> find_impossible_motion(const Observables& o, const Cur
 // Where they are two, steps that miss the volume are refused.
 std::optional<StopReport> find_drift(double change, double asked, double time);
 
-// Steps that lead nowhere: a hundred in which neither time goes on by a thousandth nor the lowest energy falls by a
+// Steps that make no progress: 100 in which neither time advances by a thousandth nor the lowest energy falls by a
 // tenth of the accuracy asked, while steps are shorter than `tiny`. A run that follows a singularity by shorter and
-// shorter steps is none, as its energy falls.
+// shorter steps does not count as stalled, as its energy falls.
 class StallDetector {
 public:
     std::optional<StopReport> look(double time, double step, double tiny, double lowest_energy, double asked);

@@ -55,9 +55,9 @@ public:
         RunSummary& s = ended_.summary;
         const bool known = known_until(other.trace, s.stop.time);
         if (!known)
-            s.warnings.push_back(fmt::format(
-                "the coarser run of the pair ended at t = {:.6g} with {}: the error after that is not known",
-                other.stop.time, name(other.stop.reason)));
+            s.warnings.push_back(
+                fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error after that is unknown",
+                            other.stop.time, name(other.stop.reason)));
         const bool together = ended_by_physics(s.stop) && s.stop.reason == other.stop.reason;
         if (!known && !together) ended_.difference = s.reference_energy;
         return std::max(ended_.difference, ended_.defect);

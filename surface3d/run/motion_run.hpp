@@ -1,4 +1,4 @@
-// Runs of a moving surface: as accurate as asked in space and time, stopped where its answer would mean nothing.
+// Runs of a moving surface: as accurate as asked in space and time, stopped where the results would be invalid.
 #pragma once
 
 #include <string>

@@ -5,7 +5,7 @@
 
 namespace tubule::surface3d {
 
-constexpr int least_triangles = 80;  // fewer tell nothing
+constexpr int least_triangles = 80;  // fewer are too inaccurate to estimate an error
 
 // What a run is for: its own sake, or for another to be compared with, on fewer triangles or with elements of another
 // order.

@@ -8,7 +8,7 @@ namespace {
 
 // Measured choices: docs/decisions.md, "Surfaces in motion".
 constexpr double relaxes_in = 0.2;  // of the time that the shape needs to change
-// Variations of H that are no more than this, or than so many times what two ways to find it differ, are none.
+// H counts as constant if it varies by less than this, or by less than so many times the difference of two recoveries.
 constexpr double same_everywhere = 1e-9, times_noise = 4;
 
 // The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.

@@ -72,7 +72,7 @@ double reference_energy(const Observables& o) {
     return std::max(std::abs(o.energy), o.magnitude);
 }
 
-// A shape on one mesh after the other, whose energies tell the error: of the last one, which is kept for the result.
+// A shape on a sequence of meshes, whose energies give the error of the last one, which is kept for the result.
 class MeshSequence : public EstimatedRuns {
 public:
     MeshSequence(const Case& c, const Start& start) : case_(c), start_(start) {}
@@ -169,7 +169,7 @@ private:
 };
 
 // Twice as many triangles again and again, until the energy is as accurate as asked. Every other mesh has half the
-// width; those in between have their own say, so that two energies which agree by chance do not end it.
+// width; those in between are compared separately, so that two energies which agree by chance do not end it.
 class MoreAndMore : public MeshSequence {
 public:
     using MeshSequence::MeshSequence;

@@ -73,7 +73,7 @@ const T& once(const ByOrder<T>& made, int order, const MakeOne& make) {
     return found != made->end() ? found->second : made->emplace(order, make()).first->second;
 }
 
-// Meshes of the shape map(base), of the kind that the case asks for, with curvatures where it wants the exact ones, and
+// Meshes of the shape map(base), of the kind that the case asks for, with exact curvatures where it asks for them, and
 // the velocity of the map if it has one.
 template <class Base, class Map>
 Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
@@ -110,7 +110,7 @@ std::filesystem::path beside(const Case& c, const std::string& path) {
     throw CaseError(fmt::format("{}: {}", c.path, what));
 }
 
-// What `make` makes of a mesh of the case at `path`, which may turn out to be none to be used.
+// What `make` makes of a mesh of the case at `path`, which may turn out to be unusable.
 template <class MakeOne>
 auto usable(const std::string& path, const MakeOne& make) {
     try {
@@ -148,7 +148,7 @@ struct Prepare {
         if (c.surface.recovery == Recovery::exact)
             refuse(
                 c,
-                "discretisation.recovery must not be \"exact\": of a surface made of triangles only points are known");
+                "discretisation.recovery must not be \"exact\": a surface made of triangles is known only at points");
     }
     template <class Base, class Map>
     Prepared on(const Base& base, const Map& map) const {

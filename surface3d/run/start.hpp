@@ -22,7 +22,7 @@ struct StartMesh {
 class Start {
 public:
     // Throws CaseError that names the key to blame: a file that cannot be read or used, a result without such a frame,
-    // a mesh or exact curvatures that this shape has not.
+    // a mesh or exact curvatures that this shape does not have.
     explicit Start(const Case& c);
 
     // With elements of this order and about this many triangles, where their number can be chosen.

@@ -64,7 +64,7 @@ TEST(Guards, illPosedFromTheStart) {
     EXPECT_STOP(o, Stop::ill_posed);
     EXPECT_EQ(o.summary.stop.time, 0);
     EXPECT_SAYS(o.summary.stop.message, "well-posedness at z = ");
-    EXPECT_SAYS(o.summary.stop.advice, "no refinement helps");
+    EXPECT_SAYS(o.summary.stop.advice, "refinement does not help");
     expect_saved(o);
 }
 

@@ -299,7 +299,7 @@ TEST(CurveRun, anErrorThatIsNotKnownIsNotStatedAsSmall) {
     EXPECT_EQ(o.summary.estimated_error, 1);
     EXPECT_FALSE(o.summary.as_accurate_as_asked);
     ASSERT_FALSE(o.summary.warnings.empty());
-    EXPECT_NE(o.summary.warnings[0].find("the error is not known"), std::string::npos) << o.summary.warnings[0];
+    EXPECT_NE(o.summary.warnings[0].find("the error is unknown"), std::string::npos) << o.summary.warnings[0];
 }
 
 TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {

@@ -94,7 +94,7 @@ class Confirm(ProgramTest):
             ("--end must be above 0", "--end", "-1"),
         ):
             self.assertIn(words, self.tubule("confirm", self.scan, *arguments, status=2)[1])
-        self.assertIn("no result of tubule scan", self.tubule("confirm", "case.toml", status=2)[1])
+        self.assertIn("not a result of tubule scan", self.tubule("confirm", "case.toml", status=2)[1])
         self.assertFalse((self.folder / "scan_confirm").exists())
 
 

@@ -61,7 +61,7 @@ class Kill(ProgramTest):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(signal=number):
                 out = self.interrupted(number)
-                self.assertRegex(out, "case.toml: interrupted at t = .*\n +go on with --resume")
+                self.assertRegex(out, "case.toml: interrupted at t = .*\n +continue with --resume")
                 with h5py.File(self.result) as file:
                     checkpoint = file["checkpoint"].attrs["time"]
                     self.assertEqual(file["series/time"][-1], checkpoint)
@@ -137,7 +137,7 @@ class Kill(ProgramTest):
         self.write("case.toml", SLOW.replace("[time]", "[time]\nlimit = 0.25"))
         out, _ = self.tubule("run", self.case, status=5)
         self.assertIn("time-limit at t = ", out)
-        self.assertIn("go on with --resume", out)
+        self.assertIn("continue with --resume", out)
         for _ in range(1000):
             times = series(self.result)["time"]
             with self.start("run", self.case, "--resume") as process:

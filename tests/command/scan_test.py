@@ -289,7 +289,7 @@ class Refusals(ScanTest):
     def test_other_files_are_not_replaced(self):
         text = self.result
         text.write_text("mine")
-        self.assertIn("is no scan", self.scan("case.toml", "--over", f"{K42}=0,0.1", status=2)[1])
+        self.assertIn("is not a scan", self.scan("case.toml", "--over", f"{K42}=0,0.1", status=2)[1])
         self.assertEqual(text.read_text(), "mine")
 
     def test_resume_with_another_scan(self):

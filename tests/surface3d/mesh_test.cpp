@@ -204,7 +204,7 @@ MeshErrors mesh_errors(const Shape& shape, const TriangleMesh& base, double exac
 }
 
 // Graded meshes of these numbers of triangles are better than uniform ones by these factors at least. Energy errors can
-// change sign on the way and then flatter, so L2 errors have a say, and more than one number.
+// change sign on the way and cancel there, so L2 errors are compared, and more than one number.
 template <class Shape>
 void expect_gains(const Shape& shape, const Profile& profile, const std::vector<int>& numbers, double exact_H2,
                   double exact_K2, const MeshErrors& gain) {

@@ -322,7 +322,7 @@ TEST(Models, AreaAndVolumeThatCannotBeKeptAreRefused) {
     };
     const CurvedMesh cell = mesh_of(wavy, icosphere(2), 3),
                      sphere = mesh_of(Sphere{.radius = 1, .modes = {}}, icosphere(2), 3);
-    const std::string refused = "area and volume are not kept";
+    const std::string refused = "area and volume are not conserved";
     EXPECT_EQ(why(cell, ModelKind::fluid, 0.5, 1).substr(0, refused.size()), refused);
     EXPECT_EQ(why(cell, ModelKind::gradient_flow, 1, -1).substr(0, refused.size()), refused);
     // What five corrections do, they do: a thousandth; on a sphere, whose H varies by less than `least_variation`, the

@@ -193,10 +193,9 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "case.toml: shape.path: cannot open none.hdf: No such file or directory");
     EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.elements=100"}),
               "case.toml: discretisation.mesh and .elements must be absent: the triangles come from shape.path");
-    EXPECT_EQ(
-        refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.recovery=exact"}),
-        "case.toml: discretisation.recovery must not be \"exact\": of a surface made of triangles only points are "
-        "known");
+    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.recovery=exact"}),
+              "case.toml: discretisation.recovery must not be \"exact\": a surface made of triangles is known only at "
+              "points");
 }
 
 }  // namespace

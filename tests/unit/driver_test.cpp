@@ -64,7 +64,7 @@ TEST(Driver, SaysWhatIsMissed) {
     Watch watch;
     const RunSummary lost = driven(runs, watch);
     EXPECT_EQ(lost.stop.reason, Stop::resolution_lost);
-    EXPECT_EQ(lost.stop.message, "the energy is off by 0.1 of E_ref (estimated), 0.002 was asked for");
+    EXPECT_EQ(lost.stop.message, "the estimated error of the energy is 0.1 of E_ref, but 0.002 was asked for");
     EXPECT_TRUE(lost.warnings.empty());
 
     FakeRuns given;
@@ -73,7 +73,7 @@ TEST(Driver, SaysWhatIsMissed) {
     EXPECT_EQ(warned.stop.reason, Stop::finished);
     ASSERT_EQ(warned.warnings.size(), 1u);
     EXPECT_EQ(warned.warnings[0],
-              "the energy is off by 1 of E_ref (estimated), 0.002 was asked for: the triangles are given");
+              "the estimated error of the energy is 1 of E_ref, but 0.002 was asked for: the triangles are given");
 }
 
 TEST(Driver, PausesBeforeAFinerRun) {

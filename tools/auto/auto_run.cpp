@@ -39,7 +39,8 @@ public:
     }
     // The limit as the user knows it.
     void reword(StopReport& stop) const {
-        if (stop.reason == Stop::time_limit) stop.message = fmt::format("used the {} s of time.limit", *limit_);
+        if (stop.reason == Stop::time_limit)
+            stop.message = fmt::format("reached the time limit of {} s (time.limit)", *limit_);
     }
 
 private:
@@ -87,21 +88,21 @@ std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& gr
     const auto say = [&](const std::string& words) { out += (out.empty() ? "" : "; ") + words; };
     if (known.unknown > 0)
         say(
-            fmt::format("the growth rates of waves are not known at {} of {} times, and were taken to be those before "
+            fmt::format("the growth rates of waves are unknown at {} of {} times; earlier ones were used instead "
                         "({})",
                         known.unknown, known.states, known.why_unknown));
     if (known.rough > 0)
-        say(fmt::format("the growth rates of waves are known to a tenth of them at best at {} of {} times", known.rough,
+        say(fmt::format("the growth rates of waves are known to 10 % at best at {} of {} times", known.rough,
                         known.states));
     if (known.estimated > 0)
-        say(fmt::format("the shape moves at {} of {} times: growth rates there leave out what its flow does to waves",
+        say(fmt::format("the shape moves at {} of {} times: growth rates there neglect the effect of its flow on waves",
                         known.estimated, known.states));
     const NoiseGrowth::Peak peak = growth.largest();
     if (peak.m == growth.modes() && peak.amplitude > grown * c.automatic.noise)
-        say(fmt::format("m = {} grows most and is the last one looked at: more auto.modes may show faster ones",
+        say(fmt::format("m = {} grows most and is the largest m considered: a larger auto.modes may show faster waves",
                         peak.m));
     if (peak.m > 0 && growth.error(peak.m) > uncertain)
-        say(fmt::format("the growth of m = {} is known to a factor {:.2g} only", peak.m,
+        say(fmt::format("the growth of m = {} is known only to within a factor of {:.2g}", peak.m,
                         std::exp(growth.error(peak.m))));
     return out;
 }
@@ -201,7 +202,8 @@ RunSummary AutoRun::in_three_dimensions(const Restart* restart) {
     return s;
 }
 
-// A run that is stationary, but for waves that will be too large before its end, goes on: nothing else would show them.
+// A run that is stationary, but for waves that will be too large before its end, goes on: they would be missed
+// otherwise.
 RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rates, const Restart* restart) {
     std::vector<double> output = case_.time.output;
     output.insert(output.end(), for_rates.begin(), for_rates.end());
@@ -297,10 +299,11 @@ RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, cons
     if (!choice.axisymmetric) return run.in_three_dimensions(restart);
     if (!restart) return run.axisymmetric(nullptr);
     if (!restart->record.mesh && !is_switch(restart->record)) return run.axisymmetric(restart);
-    if (!unfinished) throw std::invalid_argument("a run of tier \"auto\" goes on in three dimensions with its file");
+    if (!unfinished)
+        throw std::invalid_argument("resuming a run of tier \"auto\" in three dimensions needs its result file");
     const Before before = axisymmetric_part(*unfinished);
     if (before.frames.empty() || !is_switch(before.frames.back()))
-        throw std::runtime_error("the result has no frame at which its run went on in three dimensions");
+        throw std::runtime_error("the result has no frame at which its run switched to three dimensions");
     return run.after_switch(before.frames.back(), before, restart->record.mesh ? restart : nullptr);
 }
 

@@ -23,7 +23,7 @@ public:
     // Frames at the times `only_for_rates` do not go to the file.
     ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::set<double> only_for_rates);
 
-    // Goes on from a frame of the file: with the amplitudes that it says.
+    // Resumes from a frame of the file, with the amplitudes stored there.
     void resume(const Record& frame);
 
     void row(std::span<const double> values) override { file_.row(map_(values)); }

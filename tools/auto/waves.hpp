@@ -12,11 +12,11 @@ namespace tubule {
 
 struct WaveRates {
     std::vector<double> rates;  // the fastest of m = 1 ... auto.modes
-    bool estimated = false;     // the shape moves, and is inextensible: what that does to waves is left out
+    bool estimated = false;     // the shape moves, and is inextensible: the effect on waves is neglected
     double accuracy = 0;        // relative to the larger of a rate and the slowest one
 };
 
-// Of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be had.
+// Of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be computed.
 WaveRates wave_rates(const Case& c, const Record& frame);
 
 // The rate of a wave with inertia, from those of the same model without it (viscosity and friction alone) and of the

@@ -1,4 +1,4 @@
-// What this program is made of: for `tubule --version` and the /about of results.
+// Build information: for `tubule --version` and the /about of results.
 #pragma once
 
 #include <string>

@@ -23,7 +23,7 @@ namespace tubule {
 TUBULE_COMMANDS(TUBULE_COMMAND)
 #undef TUBULE_COMMAND
 
-// What a result says of its making when it begins: the build, the machine, when.
+// What a result records when its run begins: the build, the machine, the time.
 About about_start();
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.

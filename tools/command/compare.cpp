@@ -206,7 +206,7 @@ Comparison compared(const CompareOptions& options) {
     return out;
 }
 
-// ---- how it is told
+// ---- output
 
 double turn_of(const compare::RigidMotion& motion) {  // degrees
     const Eigen::Matrix3d& r = motion.rotation;

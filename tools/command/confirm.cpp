@@ -168,7 +168,7 @@ void check(const ConfirmOptions& options) {
         refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
         refuse(fmt::format("--end must be above 0, not {}", *options.choices.end));
-    if (!is_scan(options.scan)) throw CaseError(options.scan + ": is no result of tubule scan");
+    if (!is_scan(options.scan)) throw CaseError(options.scan + ": is not a result of tubule scan");
 }
 
 // All cases are checked before anything is run.
@@ -261,7 +261,7 @@ void add_confirm(CLI::App& app, int& exit_status) {
     command->add_option("-o,--output", o->folder, "folder of the results (default: beside the scan, NAME_confirm)");
     CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");
     command->add_flag("--json", o->json, "the same, as JSON")->excludes(csv);
-    command->add_flag("--quiet", o->quiet, "no words about the progress");
+    command->add_flag("--quiet", o->quiet, "no progress output");
     command->callback([o, &exit_status] { exit_status = confirm_scan(*o); });
 }
 

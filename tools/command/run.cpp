@@ -187,7 +187,7 @@ std::optional<Opened> open_result(const Case& c, const Engine& engine, const std
 int run_case(Case c, const RunOptions& options) {
     const std::filesystem::path file = result_path(options, c);
     if (options.check_derivatives && !derivatives_pass(c)) {
-        fmt::print(stderr, "{}: a derivative is wrong; nothing was run\n", c.path);
+        fmt::print(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
         return exit_code(Stop::solver_failed);
     }
     if (options.expect)
@@ -266,8 +266,8 @@ void add_run(CLI::App& app, int& exit_status) {
     command->add_option("CASE", o->cases, "case files")->required();
     command->add_option("--set", o->sets, "override a key, such as --set energy.k42=0.06")->allow_extra_args(false);
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
-    command->add_flag("--resume", o->resume, "go on with a result that was interrupted, killed or out of time");
-    command->add_flag("--quiet", o->quiet, "no progress; words only if something went wrong");
+    command->add_flag("--resume", o->resume, "continue a result that was interrupted, killed or out of time");
+    command->add_flag("--quiet", o->quiet, "no progress; output only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,
                       "first check the derivatives of the energy at the start");

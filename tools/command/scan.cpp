@@ -136,9 +136,9 @@ void add_scan(CLI::App& app, int& exit_status) {
     command->add_flag("--to-the-end", o->choices.to_the_end,
                       "run each point to time.end even where its outcome is known before");
     command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");
-    command->add_flag("--resume", o->resume, "go on with a scan that was interrupted or killed");
+    command->add_flag("--resume", o->resume, "continue a scan that was interrupted or killed");
     command->add_option("--jobs", o->jobs, "threads (default: one a processor)");
-    command->add_flag("--quiet", o->quiet, "no progress, no words");
+    command->add_flag("--quiet", o->quiet, "no output except errors");
     command->callback([o, &exit_status] { exit_status = scan(*o); });
 }
 

@@ -101,7 +101,7 @@ void add_summary(Text& out, const Result& result, const std::string& file) {
     const bool stopped =
         std::any_of(result.about.begin(), result.about.end(), [](const auto& entry) { return entry.first == "stop"; });
     for (const auto& [name, value] : result.about) line(name, text_of(value));
-    if (!stopped) line("stop", "none yet: the run is going on, or was killed");
+    if (!stopped) line("stop", "none yet: the run is still going, or was killed");
     const auto& times = result.series.at(result.series_names.front());
     line("rows", std::to_string(times.size()));
     line("frames", std::to_string(result.frames.size()));
@@ -242,7 +242,7 @@ Text shown_scan(const ShowOptions& options) {
 }
 
 Text shown(const ShowOptions& options) {
-    if (options.frame && !options.csv && !options.json) throw std::runtime_error("--frame goes with --csv or --json");
+    if (options.frame && !options.csv && !options.json) throw std::runtime_error("--frame needs --csv or --json");
     if (is_scan(options.file)) return shown_scan(options);
     const Result result = read_result(options.file);
     std::optional<std::size_t> frame;

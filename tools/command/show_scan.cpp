@@ -80,7 +80,7 @@ std::string scan_summary(const std::filesystem::path& file) {
         line(key, text_of(value));
         stopped = stopped || key == "stop";
     }
-    if (!stopped) line("stop", "none yet: the scan is going on, or was killed");
+    if (!stopped) line("stop", "none yet: the scan is still going, or was killed");
     std::array<std::size_t, n_outcomes> counts{};
     for (const PointResult& p : result.points) ++counts[static_cast<std::size_t>(p.outcome)];
     add(out, "\n{:>10}     outcome\n", "points");

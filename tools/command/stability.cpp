@@ -60,7 +60,8 @@ StabilitySubject subject_of(const StabilityOptions& options) {
         subject.c = read_case(options.file, options.sets);
         return subject;
     }
-    if (!options.sets.empty()) throw std::invalid_argument("--set needs a case: what made a result cannot be changed");
+    if (!options.sets.empty())
+        throw std::invalid_argument("--set needs a case: the case of a result cannot be changed");
     try {
         subject.result = read_result(options.file);
     } catch (const std::runtime_error& error) {
@@ -91,12 +92,12 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
         models.push_back(model);
     }
     if (!viscous && (options.Re || options.gamma))
-        throw std::invalid_argument("--Re and --gamma belong to --model " + quoted_names(&ModelEntry::viscous) +
-                                    " or \"all\"");
+        throw std::invalid_argument("--Re and --gamma are only valid with --model " +
+                                    quoted_names(&ModelEntry::viscous) + " or \"all\"");
     return models;
 }
 
-// The shape of a case of motion, if its waves are known in closed form.
+// The shape of a time-dependent case, if its waves are known in closed form.
 std::optional<TubeSubject> tube_of(const Case& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
     if (!shape || c.equilibrium) return std::nullopt;
@@ -157,7 +158,7 @@ std::string answer(const StabilityOptions& options, StabilitySubject subject) {
     std::optional<TubeSubject> tube;
     if (subject.frame && subject.frame->mesh)
         throw std::invalid_argument(
-            "the frame is a surface in three dimensions: spectra are of tier \"axisym\"; --fit N,M gives growth rates");
+            "the frame is a surface in three dimensions: spectra need tier \"axisym\"; --fit N,M gives growth rates");
     if (!options.numerical) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
     if (tube) {
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
@@ -168,13 +169,13 @@ std::string answer(const StabilityOptions& options, StabilitySubject subject) {
         return tube_report(options, *tube, models);
     }
     if (!options.plot.empty() || !options.q.empty())
-        throw std::invalid_argument("--plot and --q belong to straight tubes, in closed form");
+        throw std::invalid_argument("--plot and --q apply only to straight tubes, in closed form");
     const Sphere* sphere = std::get_if<Sphere>(&subject.c.shape);
     if (sphere && !subject.frame && !options.numerical && !subject.c.equilibrium && sphere->modes.empty())
         return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
-    if (options.waves) throw std::invalid_argument("--waves belongs to tubes and spheres, in closed form");
+    if (options.waves) throw std::invalid_argument("--waves applies only to tubes and spheres, in closed form");
     if (subject.c.tier == Tier::surface3d)
-        throw std::invalid_argument("tier \"surface3d\" has no spectra but those of straight tubes and of spheres");
+        throw std::invalid_argument("tier \"surface3d\" has spectra only for straight tubes and spheres");
     if (subject.c.equilibrium && !subject.frame) subject.frame = equilibrium_frame(subject.c);
     return spectrum_report(options, subject, models);
 }
@@ -184,7 +185,7 @@ void refuse_contradictions(const StabilityOptions& o) {
         throw std::invalid_argument("--q and --waves exclude each other: both choose the waves");
     if (!o.fit.empty() && (!o.q.empty() || o.waves || o.tension || o.frame || o.numerical || !o.plot.empty() ||
                            !o.model.empty() || o.Re || o.gamma))
-        throw std::invalid_argument("--fit goes with --csv and --json only");
+        throw std::invalid_argument("--fit can only be combined with --csv and --json");
 }
 
 int stability(const StabilityOptions& options) {
@@ -219,7 +220,7 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--Re", o->Re, "of viscous models, where the case has none")->check(CLI::PositiveNumber);
     command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
         ->check(CLI::NonNegativeNumber);
-    command->add_option("--tension", o->tension, "sigma (default: what model, case and shape come to)");
+    command->add_option("--tension", o->tension, "sigma (default: from model, case and shape)");
     command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();

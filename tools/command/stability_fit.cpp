@@ -80,7 +80,7 @@ std::string words_of(WaveNumbers wave, const Amplitudes& a, const theory::Growth
     out += fmt::format("rate {:.10g} +- {:.2g} for t = {:.6g} to {:.6g} ({} points), e-fold in {:.6g}\n", fit.rate,
                        fit.error, fit.from, fit.to, fit.points, 1 / std::abs(fit.rate));
     if (!(fit.error < 0.1 * std::abs(fit.rate)))
-        out += "the amplitude is no exponential anywhere: the error bar is that large\n";
+        out += "the amplitude is nowhere exponential, hence the large error bar\n";
     if (linear)
         out += fmt::format("linear theory of the case over the same time: {:.10g}, differs by {:.2g}\n", *linear,
                            fit.rate - *linear);

@@ -31,7 +31,7 @@ std::string words_of(const std::vector<Found>& found) {
         if (spectrum.at_rest())
             out += fmt::format("  at rest with sigma = {:.8g}, lambda = {:.8g}\n", spectrum.sigma, spectrum.lambda);
         else
-            out += "  in motion: rates are those of this instant\n";
+            out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
         const axisym::ModeRates* fastest = nullptr;
         for (const axisym::ModeRates& mode : spectrum.modes) {

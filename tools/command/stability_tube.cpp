@@ -53,7 +53,7 @@ double number(const std::string& text, const std::string& option) {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
-        throw std::invalid_argument(fmt::format("{}: '{}' is no number", option, text));
+        throw std::invalid_argument(fmt::format("{}: '{}' is not a number", option, text));
     return value;
 }
 
@@ -129,17 +129,17 @@ void set_tension(const TubeSubject& subject, ModelReport& report) {
     if (inextensible && !report.law.keeps_volume) {
         if (subject.tension_source == "as asked")
             throw std::invalid_argument(
-                "--tension must be absent: with the volume free, the tube's balance decides it");
+                "--tension must be absent: with the volume free, the tube's balance determines it");
         report.tube.tension = theory::tension_of_free_volume(subject.tube.energy, subject.tube.radius);
         report.tension_source = "of a tube whose volume is free";
     } else if (subject.tension && (inextensible || subject.tension_source != "minus the mean pressure of the frame")) {
         report.tube.tension = *subject.tension, report.tension_source = subject.tension_source;
     } else if (inextensible && !subject.waves.empty()) {
         report.tube.tension = theory::tension_of_waves(subject.tube, report.law, subject.length, case_waves(subject));
-        report.tension_source = "what keeps area and volume under the waves of the case, at its start";
+        report.tension_source = "keeps area and volume, given the waves at the start of the case";
     } else {
         report.tension_source =
-            inextensible ? "not known without waves; choose with --tension" : "a gradient flow has none of itself";
+            inextensible ? "not known without waves; choose with --tension" : "a gradient flow has none of its own";
     }
 }
 
@@ -259,7 +259,7 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
     const bool ill = theory::ill_posed_along(report.tube) || theory::ill_posed_around(report.tube);
     add(out, "  beyond the threshold of: {}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")));
     if (const double rate = radius_rate_of(report); rate != 0)
-        add(out, "  the radius changes at the rate {:.6g}{}: rates are those of this instant\n", rate,
+        add(out, "  the radius changes at the rate {:.6g}{}: growth rates hold at this instant only\n", rate,
             report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end) : "");
     if (const auto least = least_k42_of(report.tube); least && !ill)
         add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least);
@@ -304,7 +304,7 @@ std::string words_of(const TubeSubject& subject, const std::vector<ModelReport>&
     add(out, "tube of radius {:.8g} and length {:.8g}; {}\n", subject.tube.radius, subject.length,
         moduli(subject.tube.energy));
     if (!subject.waves.empty())
-        add(out, "its waves (amplitudes up to {:.4g}) are taken as small; --numerical takes the shape as it is\n",
+        add(out, "its waves (amplitudes up to {:.4g}) are taken as small; --numerical uses the shape as it is\n",
             std::abs(subject.waves.front().amplitude));
     add(out, "{}", ill_posed_words(subject.tube));
     for (const ModelReport& report : reports) add_model(out, report, last, subject.end);
@@ -455,7 +455,8 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
         const bool swings = law.inertia != 0, moves = law.unconstrained();
         if (!options.csv) add(out, "\n{}\n", words(model));
         if (!options.csv && moves)
-            add(out, "  the radius changes at the rate {:.6g}: rates are those of this instant\n", radius_rate(sphere));
+            add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n",
+                radius_rate(sphere));
         if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
             const theory::Growth found = growth(sphere, law, l);

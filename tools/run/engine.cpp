@@ -43,7 +43,7 @@ public:
         if (case_.moves()) surface3d::check_restart(case_, record);
     }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
-        if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no half of it to go on from
+        if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from
         return surface3d::run(case_, start_, observer, restart);
     }
 

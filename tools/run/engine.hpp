@@ -1,4 +1,4 @@
-// What runs a case: the one place that decides which tier it is.
+// Runs a case: the one place that chooses its tier.
 #pragma once
 
 #include <memory>
@@ -19,10 +19,10 @@ public:
     // Names of the series that a run writes, "time" first.
     virtual std::vector<std::string> series_names() const = 0;
 
-    // Throws std::runtime_error where a run cannot go on from this record, as one of another version.
+    // Throws std::runtime_error where a run cannot resume from this record, such as one of another version.
     virtual void check_restart(const Record& record) const = 0;
 
-    // Runs the case, or goes on from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
+    // Runs the case, or resumes from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
     // tier's own run.
     virtual RunSummary run(RunObserver& observer, const Restart* restart = nullptr,
                            const Result* unfinished = nullptr) const = 0;

@@ -182,7 +182,7 @@ BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, st
     return choice;
 }
 
-// What lies between two words is nothing.
+// There are no values between two words.
 void refuse_words_between(const Scan& scan) {
     if (!scan.boundary || scan.boundary->refine == 0) return;
     for (const Axis& axis : scan.axes)
@@ -376,8 +376,8 @@ Scan read_scan(const ScanChoices& choices) {
                             ": boundary and points exclude each other: the rows of a table have no neighbours");
         scan.boundary = boundary_of(boundary, seeds, refine, scan.path);
     } else if (seeds || refine) {
-        throw CaseError(
-            fmt::format("{}: {} must be absent: it belongs to boundary", scan.path, seeds ? "seeds" : "refine"));
+        throw CaseError(fmt::format("{}: {} must be absent: it is only valid with boundary", scan.path,
+                                    seeds ? "seeds" : "refine"));
     }
     scan.to_the_end = choices.to_the_end || file.to_the_end;
     refuse_doubled_keys(scan);

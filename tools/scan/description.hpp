@@ -46,7 +46,7 @@ struct Scan {
     Case case_of(std::size_t point) const;                      // throws CaseError
 };
 
-// What the command line adds; it wins over the file.
+// What the command line adds; it overrides the file.
 struct ScanChoices {
     std::string file;               // a scan or a case
     std::vector<std::string> sets;  // key=value

@@ -1,4 +1,4 @@
-// What became of a point of a scan. One list serves results, tables and pictures.
+// The outcome of a point of a scan. One list serves results, tables and pictures.
 #pragma once
 
 #include <optional>
@@ -18,9 +18,9 @@ enum class Outcome {
     closed,             // a cell or torus at rest, no sphere
     pinched,            // a neck closed
     overhang,           // a graph r(z) turned vertical
-    ill_posed,          // the flow is none any more
+    ill_posed,          // the flow is no longer well-posed
     self_intersection,  // the surface meets itself
-    failed,             // the numerics gave up, or the point is no case
+    failed,             // the numerics failed, or the point is not a valid case
     undecided           // still moving at time.end, or out of time
 };
 inline constexpr int n_outcomes = static_cast<int>(Outcome::undecided) + 1;

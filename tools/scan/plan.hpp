@@ -18,7 +18,7 @@ using Edge = std::pair<std::size_t, std::size_t>;
 
 // Following the lines: first the nodes of a coarse lattice; where two neighbours of it differ, the point halfway
 // between them, and so on down to neighbours on the grid; from each such crossing edge, all corners of the cells beside
-// it. What this comes to in the end does not depend on the order in which points are finished. With `halvings`, each
+// it. The result does not depend on the order in which points are finished. With `halvings`, each
 // crossing edge of the grid is bisected so many times more, by points between those of the grid.
 class Plan {
 public:

@@ -44,15 +44,15 @@ struct PointResult {
 };
 
 // Names of the stop reasons; then "decided", for runs that were ended as soon as their outcome was known; then
-// "refused", for points that are no case.
+// "refused", for points that are not a valid case.
 const std::vector<std::string>& stop_words();
 int stop_word(Stop reason);
 
 // Runs a case. `to_the_end`: even where the outcome is known before. A run that `interrupted` ends has
-// Stop::interrupted and says nothing; what else goes wrong is an outcome, never thrown.
+// Stop::interrupted and no result; other failures are outcomes, never thrown.
 PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted);
 
-// The result of a point whose keys make no case.
+// The result of a point whose keys are not a valid case.
 PointResult refused_point(const std::string& message);
 
 }  // namespace tubule

@@ -276,9 +276,10 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     const auto messages = get_text_array(group, "message");
     std::vector<PointResult> points(count);
     if (outcomes.size() != count || stops.size() != count || messages.size() != count)
-        throw std::runtime_error("/points has not the shape of /axes");
+        throw std::runtime_error("/points does not have the shape of /axes");
     for (std::size_t i = 0; i < count; ++i) {
-        if (outcomes[i] < 0 || outcomes[i] >= n_outcomes) throw std::runtime_error("/points/outcome: an unknown one");
+        if (outcomes[i] < 0 || outcomes[i] >= n_outcomes)
+            throw std::runtime_error("/points/outcome holds an unknown outcome");
         points[i].point = i;
         points[i].outcome = static_cast<Outcome>(outcomes[i]);
         points[i].stop = static_cast<int>(stops[i]);
@@ -286,7 +287,7 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     }
     for (std::size_t m = 0; m < n_measures; ++m) {
         const auto column = get_array(group, measure_names[m]).data;
-        if (column.size() != count) throw std::runtime_error("/points has not the shape of /axes");
+        if (column.size() != count) throw std::runtime_error("/points does not have the shape of /axes");
         for (std::size_t i = 0; i < count; ++i) points[i].measures[m] = column[i];
     }
     return points;
@@ -310,7 +311,7 @@ Handle open_file(const fs::path& file) {
 Stored read_file(const fs::path& path) {
     const Quiet quiet;
     const auto file = open_file(path);
-    if (!has(file, "scan") || !has(file, "points")) throw std::runtime_error("no scan of tubule: it lacks /scan");
+    if (!has(file, "scan") || !has(file, "points")) throw std::runtime_error("not a scan of tubule: it has no /scan");
     Stored stored;
     stored.id = get_count(file, "id");
     stored.sequence = get_count(file, "sequence");
@@ -336,7 +337,7 @@ Stored load(const fs::path& path) {
         const auto journal = read_journal(path);  // before the file: see replay
         Stored stored = read_file(path);
         replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
-            if (kind != Entry::point) throw std::runtime_error("its journal is of a run, not of a scan");
+            if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
             keep(stored.result, from_bytes(payload));
         });
         return stored;
@@ -406,9 +407,10 @@ ScanWriter::~ScanWriter() = default;
 ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const About& about) {
     const auto path = fs::weakly_canonical(file);
     if (fs::exists(path) && !is_scan(path))
-        throw std::runtime_error(fmt::format(
-            "{}: is no scan\nit was not replaced, since it may be needed: remove it first, or write elsewhere",
-            path.string()));
+        throw std::runtime_error(
+            fmt::format("{}: is not a scan\nit was not replaced, since it may be needed: remove it first, or choose "
+                        "another file with -o",
+                        path.string()));
     auto impl = std::make_unique<Impl>(path);
     std::random_device random;
     Stored& c = impl->stored;

@@ -1,4 +1,4 @@
-// The result of a scan, NAME.hdf, with the house's promise: a point that was handed over survives a kill at any later
+// The result of a scan, NAME.hdf, crash-safe: a point that was handed over survives a kill at any later
 // moment, in NAME.hdf.journal until the file is written again as a whole. Layout: docs/scans.md.
 #pragma once
 

@@ -15,7 +15,7 @@ public:
     ~ScanProgress();
 
     void begin(std::size_t known);  // points that are done before anything is run
-    // Points done and wanted; `follows`: more may come to be wanted, so that no time left is told.
+    // Points done and wanted; `follows`: more may be added, so that no remaining time is shown.
     void operator()(std::size_t known, std::size_t wanted, bool follows);
 
 private:

@@ -1,4 +1,4 @@
-// Closed forms that are drawn over a map: functions of a case that vanish on a line.
+// Closed-form thresholds drawn over a map: functions of a case that vanish on a line.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@ namespace tubule {
 struct Threshold {
     std::string name;                               // of its group in the file
     std::string label;                              // in pictures
-    std::optional<double> (*value)(const Case& c);  // nothing where it says nothing of such a case
+    std::optional<double> (*value)(const Case& c);  // empty where it does not apply to the case
 };
 
 // All that are known: to add one, see theory.cpp.
@@ -22,7 +22,7 @@ const std::vector<Threshold>& thresholds();
 struct ThresholdMap {
     std::string name, label;
     std::vector<std::size_t> first, second;  // places on the axes
-    std::vector<double> values;              // row by row; not a number where it says nothing
+    std::vector<double> values;              // row by row; NaN where it does not apply
 };
 
 // Of a grid with two axes of numbers; those that change their sign on it.

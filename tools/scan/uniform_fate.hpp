@@ -8,7 +8,7 @@
 
 namespace tubule {
 
-// What a row says of a tube.
+// What a row records of a tube.
 struct TubeState {
     double energy = 0, volume = 0, r_min = 0, r_max = 0;
 };
