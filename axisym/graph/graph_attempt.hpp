@@ -17,6 +17,8 @@
 
 namespace tubule::axisym {
 
+// Many fields: what the run is given, its state and its guards; the error, the mesh and the output have classes of
+// their own.
 class GraphAttempt {
 public:
     // All references must outlive the attempt.
