@@ -150,7 +150,7 @@ GraphLimits GraphAttempt::limits() const {
 bool GraphAttempt::must_give_up(const Observation& o) {
     error_.carry_on(*stage_, o);
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
-    gave_up = error_.is_curable(settings_, allowed);
+    gave_up = settings_.may_give_up && error_.is_curable(settings_, allowed);
     return gave_up;
 }
 

@@ -133,7 +133,7 @@ void add_profile_frame(Result& result, double time, double r) {
         rs.data.push_back(i % 120 == 0 ? 0 : r * std::sin(pi * i / 120));
         zs.data.push_back(-r * std::cos(pi * i / 120));
     }
-    result.frames.push_back({time, {}, {rs, zs}});
+    result.frames.push_back({time, {{"length", 0}}, {rs, zs}});
 }
 
 TEST(Frames, OfBothTiersOverTime) {

@@ -195,7 +195,7 @@ TEST(CurvatureEvolution, FollowsTheDisplacementThatIsExpected) {
     rest.base.displacement = 0.1 * smooth_at(rest.mesh);
     rest.base.mesh_velocity = smooth_at(rest.mesh);
     rest.base.velocity.setZero();
-    rest.base.stiffer = 0.3;
+    rest.base.curvature_stabilisation = 0.3;
     rest.assembled();
     Eigen::VectorXd x = Eigen::VectorXd::Zero(rest.unknowns.size());
     x.segment(rest.unknowns.H, n) = rest.base.fields.H;
@@ -206,20 +206,20 @@ TEST(CurvatureEvolution, FollowsTheDisplacementThatIsExpected) {
 }
 
 TEST(CurvatureEvolution, IsStifferByTheWidthOfTriangles) {
-    // On a sphere of radius 2 |B| = sqrt(2)/2; w = u.nu is tested with itself: te (grad w, grad w) stiffer |B| width
-    // more.
-    const double te = 0.1, stiffer = 0.3;
+    // On a sphere of radius 2 |B| = sqrt(2)/2; w = u.nu is tested with itself: te (grad w, grad w)
+    // curvature_stabilisation |B| width more.
+    const double te = 0.1, stabilisation = 0.3;
     Eigen::MatrixXd block[2];
     for (int i : {0, 1}) {
         AtRest rest(mesh_of(Sphere{.radius = 2, .modes = {}}, icosphere(2), 3), gradient_flow, energies.back(), te);
-        rest.base.stiffer = i * stiffer;
+        rest.base.curvature_stabilisation = i * stabilisation;
         rest.assembled();
         block[i] = rest.block(rest.unknowns.H, rest.mesh.size(), 0, rest.mesh.size());
     }
     const CurvedMesh mesh = mesh_of(Sphere{.radius = 2, .modes = {}}, icosphere(2), 3);
     const Eigen::VectorXd width = mesh_quality(mesh).width, w = smooth_at(mesh).row(0).transpose();
     const double slopes = w.dot(stiffness_matrix(SurfaceSpace(mesh), mesh) * w);
-    const double more = w.dot((block[1] - block[0]) * w) / (te * slopes * stiffer * std::sqrt(0.5));
+    const double more = w.dot((block[1] - block[0]) * w) / (te * slopes * stabilisation * std::sqrt(0.5));
     EXPECT_GT(more, 0.95 * width.minCoeff());  // the widths are the largest within each triangle
     EXPECT_LT(more, width.maxCoeff());
 }

@@ -325,7 +325,7 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy..k42=3", form},
         Override{"time.output=[0.1", "not valid TOML: Error while parsing array: encountered end-of-file"},
         Override{"about.title=\xff", "not valid TOML: Encountered invalid utf-8 sequence"},
-        Override{"time.end.x=1", "time.end is neither a table nor a list, it has no 'x'"},
+        Override{"time.end.x=1", "time.end is neither a table nor a list, so it has no 'x'"},
         Override{"shape.mode.2.n=1", "shape.mode is a list of 1: '2' must be an index from 0 to 1 (1 adds an entry)"},
         Override{"shape.mode.n=1", "shape.mode is a list of 1: 'n' must be an index from 0 to 1 (1 adds an entry)"},
         Override{"shape.mode.-1.n=1", "shape.mode is a list of 1: '-1' must be an index from 0 to 1 (1 adds an entry)"},

@@ -302,8 +302,8 @@ TEST_F(ResultFile, MalformedMeshesAndFramesOnThemAreRefused) {
         return message_of([&] { writer.mesh(mesh); });
     };
     EXPECT_CONTAINS(refused([](auto& m) { m.order = 5; }), "mesh: its order is 5, not 1 to 4");
-    EXPECT_CONTAINS(refused([](auto& m) { m.order = 3; }), "mesh: 12 node numbers for cells of 10");
-    EXPECT_CONTAINS(refused([](auto& m) { m.cells.clear(); }), "mesh: 0 node numbers for cells of 6");
+    EXPECT_CONTAINS(refused([](auto& m) { m.order = 3; }), "mesh: 12 node numbers do not divide into cells of 10");
+    EXPECT_CONTAINS(refused([](auto& m) { m.cells.clear(); }), "mesh: 0 node numbers do not divide into cells of 6");
     EXPECT_CONTAINS(refused([](auto& m) { m.nodes = 8; }), "mesh: a cell uses node 8, but there are 8");
     EXPECT_CONTAINS(refused([](auto& m) { m.cells[3] = -1; }), "mesh: a cell uses node -1, but there are 9");
     EXPECT_CONTAINS(refused([](auto& m) { m.period = nan; }), "mesh: its period is nan");
@@ -493,7 +493,7 @@ TEST_F(ResultFile, NothingToResumeFrom) {
     }
     const std::string message = message_of([&] { ResultWriter::resume(file); });
     EXPECT_CONTAINS(message, file.string());
-    EXPECT_CONTAINS(message, "neither frame nor checkpoint");
+    EXPECT_CONTAINS(message, "no frame or checkpoint to resume from");
     EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{0});  // still there
 }
 
