@@ -374,7 +374,8 @@ TEST(Remesh, SaysWhereItCannot) {
 
     const StopReport best = refusal(sheared_ellipsoid(5, 3, 0), {.quality = 0.99});
     EXPECT_EQ(best.reason, Stop::mesh_lost);
-    EXPECT_NE(best.message.find("instead of the required 0.99 in the triangle at ("), std::string::npos) << best.message;
+    EXPECT_NE(best.message.find("instead of the required 0.99 in the triangle at ("), std::string::npos)
+        << best.message;
 
     // So thin and turned that the nodes no longer tell the surface.
     const StopReport twisted = refusal(sheared_ellipsoid(5, 3, 6));
