@@ -17,7 +17,10 @@ PROGRAM, CASES = sys.argv[1], sorted(Path(sys.argv[2]).glob("*.toml"))
 
 # Exit statuses by the table of docs/results.md, which a test compares with the program.
 RESULTS = (Path(sys.argv[2]).parent / "docs" / "results.md").read_text()
-STATUS = {name: int(status) for name, status in re.findall(r"^\| `([a-z-]+)` \| (\d+) \|", RESULTS, re.MULTILINE)}
+ABOUT = RESULTS[RESULTS.index("### /about") : RESULTS.index("### /series")]
+# No case is interrupted, and none makes a solver fail: other tests show those.
+WITHOUT_CASE = {"interrupted", "solver-failed"}
+STATUS = {name: int(status) for name, status in re.findall(r"^\| `([a-z-]+)` \| (\d+) \|", ABOUT, re.MULTILINE)}
 
 
 class Stops(unittest.TestCase):
@@ -51,7 +54,7 @@ class Stops(unittest.TestCase):
                         else:
                             self.assertEqual(last.attrs["time"], about["stop_time"])
                     reached.add(stop)
-        self.assertEqual(reached, set(STATUS), "a stop reason that no case shows")
+        self.assertEqual(reached, set(STATUS) - WITHOUT_CASE, "a stop reason that no case shows")
 
 
 if __name__ == "__main__":
