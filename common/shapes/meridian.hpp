@@ -60,7 +60,7 @@ Meridian graph_meridian(const Shape& shape) {
     return m;
 }
 
-// Why a shape has no meridian, for it is not axisymmetric about z: the key to blame, and the words that follow it.
+// Why a shape that is not axisymmetric about z has no meridian: the key to blame, and the message that follows it.
 // Empty if it is axisymmetric. asymmetry(shape) gives it, where a shape may not be.
 using Asymmetry = std::pair<std::string, std::string>;
 

@@ -17,7 +17,7 @@ std::vector<std::string> auto_series_names(const Case& c, const Choice& choice);
 // `choice` is that for the case. An axisymmetric start is run in tier axisym, with the growth rates of waves around the
 // axis at many times. Where the noise of the case grows to auto.largest by them, the run is made again until then, and
 // goes on in tier surface3d with these waves on the profile. `unfinished` is the file that `restart` belongs to. What
-// was chosen and why stands in the summary's details ("choice", "reason", ...), and is told by note().
+// was chosen, and why, is in the details of the summary ("choice", "reason", ...) and goes to note().
 RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished);
 
