@@ -133,6 +133,17 @@ class FourTerms(unittest.TestCase):
         self.assertGreater(energy[0] - energy[-1], 1e-3 * reference)
         self.assertLess(np.max(np.abs(defect)), ACCURACY * reference)
 
+    def test_the_papers_scheme_refuses_it(self):
+        # Its forces are written for k20, k40 and k42: bad input (status 2), not a failure of the run.
+        case = self.folder / "paper.toml"
+        case.write_text(
+            f'tier = "surface3d"\nenergy = {{k20 = {K20}, k22 = {K22}}}\nshape = {{kind = "sphere", radius = 1}}\n'
+            'model.kind = "fluid"\ntime.end = 0.1\ndiscretisation = {scheme = "paper", step = 0.1}\n'
+        )
+        done = run(FOUR_TERMS, "check", case)
+        self.assertEqual(done.returncode, 2, done.stdout)
+        self.assertIn('discretisation.scheme must not be "paper" with energy.k22', done.stderr)
+
     def test_without_its_modulus_nothing_changes(self):
         # A sphere of fixed area and volume is rigid: an overdamped run needs to see that H is the same everywhere.
         # Expected values are those of the ordinary program; the two are compiled differently.
