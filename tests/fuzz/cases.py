@@ -26,9 +26,9 @@ def sources():
     return [(text, tomllib.loads(text)) for text in texts]
 
 
-def broken_text(rng, text):
+def broken_text(rng, text, encoding="utf-8"):
     """A few changes of characters: as typing, copying and broken disks make them."""
-    raw = bytearray(text.encode())
+    raw = bytearray(text.encode(encoding))
     for _ in range(rng.choice((1, 1, 2, 5))):
         at = rng.randrange(len(raw) + 1)
         span = rng.choice((1, 1, 5, 40))

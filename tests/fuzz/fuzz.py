@@ -28,13 +28,14 @@ from sandbox import Finding, Sandbox
 #     FAST             how many cases belong to the fast tests
 #     one(rng, box)    makes and judges one case, all of it drawn from `rng`, in the Sandbox `box`: a word for the counts,
 #                      such as "refused" or "finished"; raises Finding
-FUZZERS = ("cases",)
+FUZZERS = ("cases", "results", "kills", "meshes", "commands")
 
 
 class Campaign:
     def __init__(self, arguments):
-        self.program, self.seed, self.keep = arguments.program.resolve(), arguments.seed, arguments.keep
+        self.program, self.seed, self.keep = arguments.program.resolve(), arguments.seed, arguments.keep.resolve()
         self.modules = {name: importlib.import_module(name) for name in arguments.fuzzers or FUZZERS}
+        self.keep.mkdir(parents=True, exist_ok=True)
         self.lock = threading.Lock()
         self.counts = {name: collections.Counter() for name in self.modules}
         self.findings = {name: collections.Counter() for name in self.modules}
@@ -44,7 +45,7 @@ class Campaign:
     def run(self, name, index):
         """One case, its folder kept where there is a finding."""
         began = time.monotonic()
-        with tempfile.TemporaryDirectory(prefix="fuzz-") as top:
+        with tempfile.TemporaryDirectory(dir=self.keep, ignore_cleanup_errors=True) as top:
             folder = Path(top) / "case"
             kind, words = self.judge(name, index, folder)
             with self.lock:
@@ -68,7 +69,7 @@ class Campaign:
         again = shlex.join([*again, "--seed", str(self.seed), "--index", str(index)])
         kept = self.keep / f"{name}-{self.seed}-{index}"
         shutil.rmtree(kept, ignore_errors=True)
-        shutil.copytree(folder, kept, symlinks=True)
+        folder.rename(kept)
         (kept / "finding").write_text(f"{words}\n\nagain: {again}\n", errors="surrogateescape")
         print(f"\n{name} {index}: {words}\n  kept in {kept}\n  again: {again}".encode(errors="replace").decode(), flush=True)
 
