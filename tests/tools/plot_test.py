@@ -16,12 +16,13 @@ import h5py
 import numpy as np
 
 PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
-sys.path.insert(0, str(PLOT))
+sys.path[:0] = [str(PLOT), str(Path(__file__).resolve().parents[1] / "support")]
 import colours  # noqa: E402
 import curves  # noqa: E402
 import energy  # noqa: E402
 import labels  # noqa: E402
 import results  # noqa: E402
+import scripts  # noqa: E402
 import tubes  # noqa: E402
 import validation  # noqa: E402
 import work_precision  # noqa: E402
@@ -110,8 +111,9 @@ class InFolder(unittest.TestCase):
         self.folder = Path(folder.name)
 
     def plot(self, *arguments, program=None):
-        command = [program, "plot"] if program else [sys.executable, "-B", PLOT / "plot.py", *TERMS]
-        return subprocess.run([*map(str, command), *map(str, arguments)], capture_output=True, text=True)
+        if not program:
+            return scripts.run_script(PLOT / "plot.py", *TERMS, *arguments)
+        return subprocess.run([program, "plot", *arguments], capture_output=True, text=True)
 
     def drawn(self, *arguments, **options):
         """Texts of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
@@ -502,8 +504,7 @@ class Validation(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        command = [sys.executable, "-B", PLOT / "validation.py", table, "-o", self.folder / "v.svg"]
-        return subprocess.run(command, capture_output=True, text=True)
+        return scripts.run_script(PLOT / "validation.py", table, "-o", self.folder / "v.svg")
 
     def test_figure(self):
         rows = [self.ROW.format(name, h, 1e-3 * h) for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2)]
@@ -542,8 +543,7 @@ class WorkPrecision(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        command = [sys.executable, "-B", PLOT / "work_precision.py", table, "-o", self.folder / "w.svg"]
-        return subprocess.run(command, capture_output=True, text=True)
+        return scripts.run_script(PLOT / "work_precision.py", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         rows = 'series,energy_asked,error,estimate,cpu_ms\n"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
@@ -582,8 +582,7 @@ class StepCosts(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        command = [sys.executable, "-B", PLOT / "step_costs.py", table, "-o", self.folder / "s.svg"]
-        return subprocess.run(command, capture_output=True, text=True)
+        return scripts.run_script(PLOT / "step_costs.py", table, "-o", self.folder / "s.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS)
@@ -621,8 +620,7 @@ class WorkPrecisionFluid(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        command = [sys.executable, "-B", PLOT / "work_precision_fluid.py", table, "-o", self.folder / "w.svg"]
-        return subprocess.run(command, capture_output=True, text=True)
+        return scripts.run_script(PLOT / "work_precision_fluid.py", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))
