@@ -11,6 +11,7 @@ import tempfile
 import unittest
 import xml.etree.ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -630,14 +631,14 @@ class WorkPrecisionFluid(InFolder):
             self.assertIn(words, texts)
 
     def test_only_runs_that_none_beats_are_drawn(self):
-        runs = [work_precision_fluid.Run("", 0, error, 0, cpu) for error, cpu in ((1, 1), (2, 2), (0.5, 3), (0.6, 1.5))]
+        runs = [SimpleNamespace(error=error, cpu_s=cpu) for error, cpu in ((1, 1), (2, 2), (0.5, 3), (0.6, 1.5))]
         self.assertEqual([(run.error, run.cpu_s) for run in work_precision_fluid.best(runs)], [(1, 1), (0.6, 1.5), (0.5, 3)])
 
     def test_refusals(self):
         for text, words in (
             ("a,b\n1,2\n", "must have the columns"),
             (self.HEADER + "fluid,reference,0,1e-5,fast,9\n", "must have the columns"),
-            (self.HEADER + "gas,reference,0,1e-5,1e-5,9\n", "must have the columns"),
+            (self.HEADER + "gas,reference,0,1e-5,1e-5,9\n", "has no reference, or no other run, of fluid"),
             (self.HEADER + self.ROWS.format("fluid"), "has no reference, or no other run, of stokes"),
         ):
             done = self.draw(text)

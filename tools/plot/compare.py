@@ -7,7 +7,11 @@ import sys
 
 import command_line
 
-EXIT_UNAVAILABLE = 4
+command_line.require_libraries("tubule compare")
+import style  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+
 HEIGHT = 2.3  # inches of the axes
 SERIES = {"energy": "energy E", "rate": "rate dE/dt", "area": "area", "volume": "volume"}
 SHAPES = {"hausdorff": ("shape", "shape, Hausdorff"), "l2": ("shape_l2", "shape, L2")}
@@ -38,17 +42,13 @@ class Page:
         self.logarithmic = bool(self.energy) and time_is_logarithmic(energy["times"])
 
     def draw(self, outputs):
-        from matplotlib.figure import Figure
-
-        import style
-
         height = HEIGHT + 0.5
         figure = Figure(figsize=(style.WIDTH, height))
         width = (0.36 if self.energy else 0.6, 0.36)
         if self.energy:
-            self._energies(figure.add_axes([0.075, 0.4 / height, width[1], HEIGHT / height]), style)
+            self._energies(figure.add_axes([0.075, 0.4 / height, width[1], HEIGHT / height]))
         left = 0.52 if self.energy else 0.1
-        self._differences(figure.add_axes([left, 0.4 / height, width[0] * 0.75, HEIGHT / height]), style)
+        self._differences(figure.add_axes([left, 0.4 / height, width[0] * 0.75, HEIGHT / height]))
         style.save(figure, outputs)
 
     def _time_axis(self, axes):
@@ -58,7 +58,7 @@ class Page:
             axes.set_xlim(EARLIEST * end, 1.3 * end)
         axes.set_xlabel("time t", labelpad=2)
 
-    def _energies(self, axes, style):
+    def _energies(self, axes):
         dark, light = style.line_colours(2)
         for side, colour, dashes in (("a", dark, "-"), ("b", light, "--")):
             name = f"{side.upper()}: {self.comparison[side]['file'].rsplit('/', 1)[-1]}"
@@ -67,7 +67,7 @@ class Page:
         axes.set_ylabel("bending energy E", labelpad=3)
         axes.legend(loc="best")
 
-    def _differences(self, axes, style):
+    def _differences(self, axes):
         lines = [(name, label) for name, label in SERIES.items() if name in self.series]
         count = len(lines) + (len(SHAPES) if self.frames else 0)
         colours = iter(style.line_colours(count))
@@ -93,8 +93,6 @@ class Page:
         axes.set_ylabel("relative difference of A and B", labelpad=3)
         handles, labels = axes.get_legend_handles_labels()
         if self.tolerances:
-            from matplotlib.lines import Line2D
-
             handles.append(Line2D([], [], color="0.4", linestyle="-.", linewidth=0.8))
             labels.append("tolerance")
         axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0)
@@ -104,21 +102,5 @@ class Page:
             axes.axhline(self.tolerances[name], color=colour, linestyle="-.", linewidth=0.8)
 
 
-def main():
-    outputs = sys.argv[1:]
-    try:
-        import style
-    except ImportError as error:
-        packages = "python3-numpy python3-matplotlib python3-h5py"
-        print(f"tubule compare: {sys.executable}: {error}; install the packages {packages}", file=sys.stderr)
-        return EXIT_UNAVAILABLE
-
-    def draw(outputs):
-        style.check_outputs(outputs)
-        Page(json.load(sys.stdin)).draw(outputs)
-
-    return command_line.run(draw, outputs, str)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.run(Page(json.load(sys.stdin)).draw, sys.argv[1:], str))

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 import raster
 from labels import MINUS, number
 from results import BadInput
-from style import WIDTH, line_colours, time_name, time_text
+from style import WIDTH, line_colours, time_title
 
 PIECES, FEWEST = 300, 2  # along the side of a square of all cells; minimum per cell
 HALVINGS = 48  # of the side of a piece
@@ -89,10 +89,7 @@ class CutPanel:
                     lines = LineCollection(column[row][..., self.across], colors=[colour], linewidths=1, capstyle="round")
                     axes.add_collection(lines, autolim=False)
             left += self.wide + GAP
-        axes.legend(handles=self._legend_entries(colours), title=f"cut {self.name}", title_fontsize=7, loc="upper left",
+        titles = [time_title(i, column.time) for i, column in enumerate(self.columns)]
+        handles = [Line2D([], [], color=colour, label=title) for colour, title in zip(colours, titles)]
+        axes.legend(handles=handles, title=f"cut {self.name}", title_fontsize=7, loc="upper left",
                     bbox_to_anchor=(1.02, 1.02), borderaxespad=0, labelspacing=0.35)  # fmt: skip
-
-    def _legend_entries(self, colours):
-        times = [column.time for column in self.columns]
-        names = ["last state" if t is None else f"{time_name(i)} = {time_text(t)}" for i, t in enumerate(times)]
-        return [Line2D([], [], color=colour, label=name) for colour, name in zip(colours, names)]

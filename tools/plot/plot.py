@@ -9,8 +9,19 @@ from operator import attrgetter
 
 import command_line
 
-EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
-DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
+command_line.require_libraries("tubule plot")
+import scan  # noqa: E402
+import style  # noqa: E402
+from balance import BalancePanel, has_balance  # noqa: E402
+from curves import CurvePanel  # noqa: E402
+from cuts import CutPanel  # noqa: E402
+from energy import EnergyPanel  # noqa: E402
+from labels import row_labels  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from results import BadInput, read_result  # noqa: E402
+from surfaces import SurfacePanel, choose_colours  # noqa: E402
+from tubes import TubePanel, choose_columns  # noqa: E402
+
 COLOURS = ("u_n", "H", "K", "p")
 NOTHING = {
     "profiles": "no profiles",
@@ -45,9 +56,6 @@ class Page:
         return self.options.kind in (*kinds, "all")
 
     def profiles(self):
-        from curves import CurvePanel
-        from tubes import TubePanel, choose_columns
-
         if not any(r.frames for r in self.results):
             return
         columns = choose_columns(self.results, self.options.times)
@@ -58,10 +66,6 @@ class Page:
             yield (TubePanel if graphs else CurvePanel)(self.results, self.labels, columns)
 
     def surfaces(self):
-        from cuts import CutPanel
-        from surfaces import SurfacePanel, choose_colours
-        from tubes import choose_columns
-
         shown = [(r, label) for r, label in zip(self.results, self.labels) if r.surfaces]
         if not shown:
             return
@@ -74,9 +78,6 @@ class Page:
             yield CutPanel(results, labels, columns, self.options.plane)
 
     def series(self):
-        from balance import BalancePanel, has_balance
-        from energy import EnergyPanel
-
         everything = self.options.kind == "all"
         if self.wants("energy"):
             # A surface at rest and a single stationary shape have one row, which makes no curve.
@@ -98,13 +99,6 @@ class Page:
 
 def draw(paths, outputs, options):
     """Reads all results, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
-    from matplotlib.figure import Figure
-
-    import style
-    from labels import row_labels
-    from results import BadInput, read_result
-
-    style.check_outputs(outputs)
     results = [read_result(path) for path in paths]
     names = [os.path.splitext(os.path.basename(path))[0] for path in paths]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
@@ -152,9 +146,6 @@ def read_arguments(options):
 
 def draw_any(options, outputs):
     """A scan, or runs."""
-    import scan
-    from results import BadInput
-
     if not any(scan.is_scan(path) for path in options.results):
         draw(options.results, outputs, options)
         return
@@ -171,15 +162,7 @@ def main():
         read_arguments(options)
     except ValueError as error:
         print(f"tubule plot: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
-    for module, package in DEBIAN_PACKAGES.items():
-        try:
-            __import__(module)
-        except ImportError:
-            print(f"tubule plot: {sys.executable} has no {module}; install the package {package}", file=sys.stderr)
-            return EXIT_UNAVAILABLE
-    # A result file never changes in place, so it needs no lock; on some disks locks fail.
-    os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+        return command_line.EXIT_BAD_INPUT
     return command_line.run(lambda pictures: draw_any(options, pictures), outputs, str)
 
 

@@ -146,7 +146,6 @@ def draw_line(axes, points, names, panel):
 
 
 def draw(path, outputs):
-    style.check_outputs(outputs)
     axes, points, names, title, boundary, crossings, thresholds = read(path)
     if len(axes) > 2:
         raise BadInput(f"{path}: a picture has one or two axes, this scan {len(axes)}: {', '.join(a.key for a in axes)}")

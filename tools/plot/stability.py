@@ -3,9 +3,15 @@
 
 import argparse
 import json
+import math
 import sys
 
 import command_line
+
+command_line.require_libraries("tubule stability --plot")
+import style  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.transforms import blended_transform_factory  # noqa: E402
 
 
 def curve_label(m):
@@ -26,8 +32,6 @@ def rate_limits(models):
 
 
 def draw_model(axes, model, length, limits, colours):
-    import math
-
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     for curve, colour in zip(model["curves"], colours):
         rate = [math.nan if value is None else value for value in curve["rate"]]
@@ -48,8 +52,6 @@ def draw_model(axes, model, length, limits, colours):
 
 def draw_tensions(axes, data, colours):
     """The axis of tensions: the onset of growth for each m, the stable range, and the tensions of the models."""
-    from matplotlib.transforms import blended_transform_factory
-
     marks = [limit["tension"] for limit in data["thresholds"]] + [m["report"]["tension"] for m in data["models"]]
     low, high = min(marks), max(marks)
     pad = 0.18 * (high - low) or max(abs(high), 1.0)
@@ -80,10 +82,6 @@ def draw_tensions(axes, data, colours):
 
 def draw(data, outputs):
     """A panel for each model, below them the tensions at the onset of growth."""
-    import style
-    from matplotlib.figure import Figure
-
-    style.check_outputs(outputs)
     models = data["models"]
     columns = min(len(models), 2)
     rows = (len(models) + columns - 1) // columns
@@ -109,11 +107,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", action="append", required=True)
     options = parser.parse_args()
-    try:
-        import results  # noqa: F401
-    except ImportError as error:
-        print(f"tubule stability --plot: {error}; install python3-matplotlib python3-h5py", file=sys.stderr)
-        return 4
     return command_line.run(lambda outputs: draw(json.load(sys.stdin), outputs), options.output)
 
 

@@ -1,49 +1,25 @@
 #!/usr/bin/python3
 """Draws the cost of a step in three dimensions with each measure for its linear system, from the table of step_costs."""
 
-import csv
 import sys
-from dataclasses import dataclass
 
 import command_line
+import style
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from results import BadInput
+from tables import read_rows
 
-NUMBERS = ("order", "triangles", "threads", "whole", "analysis", "factors", "iterations")
 PARTS = ("solvers", "lagged")  # "threads" needs a quiet machine and may be missing
 STEP, SYSTEM = "a step", "its system, with border"
 CHOSEN = "LDL^T single, METIS on nodes"
 DENSE = "the same, H and K first"  # twenty times as long as the others: only in the table
 
 
-@dataclass
-class Row:
-    part: str
-    measure: str
-    order: int
-    triangles: int
-    threads: int
-    whole: float
-    analysis: float
-    factors: float
-    iterations: float
-
-
 def read_table(path):
-    """A list of Row. Raises BadInput."""
-    from results import BadInput
-
-    try:
-        with open(path, newline="") as file:
-            rows = []
-            for row in csv.DictReader(file):
-                values = [float(row[name]) for name in NUMBERS]
-                if not all(0 <= value < float("inf") for value in values):
-                    raise ValueError(f"a value is negative or not finite in {values}")
-                rows.append(Row(row["part"], row["measure"], *map(int, values[:3]), *values[3:]))
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        columns = ", ".join(("part", "measure", *NUMBERS))
-        raise BadInput(f"{path}: must have the columns {columns} with numbers ({error})") from error
+    """The rows. Raises BadInput."""
+    numbers = ("order", "triangles", "threads", "whole", "analysis", "factors", "iterations")
+    rows = read_rows(path, ("part", "measure"), numbers)
     for part in PARTS:
         if not any(row.part == part for row in rows):
             raise BadInput(f"{path}: has no rows of {part}")
@@ -71,15 +47,13 @@ def draw_solvers(axes, rows, colours):
 
 def draw_lagged(axes, rows, sizes):
     """Time of the linear solve with kept factors over that with new ones; numbers are iterations."""
-    import style
-
     for index, (size, colour) in enumerate(zip(sizes, style.line_colours(len(sizes)))):
         line = [row for row in rows if (row.order, row.triangles) == size]
         if not line:
             continue
         lags = [int(row.measure.split()[-1]) for row in line]
         ratios = [row.whole / line[0].whole for row in line]
-        axes.plot(lags, ratios, color=colour, marker=style.MARKERS[index], label=f"k = {size[0]}, {size[1]}")
+        axes.plot(lags, ratios, color=colour, marker=style.MARKERS[index], label=f"k = {size[0]:g}, {size[1]:g}")
         axes.annotate(f"{line[-1].iterations:.0f}", (lags[-1], ratios[-1]), (4, 0), textcoords="offset points",
                       va="center", fontsize=6.5)
     axes.axhline(1, color="0.6", linewidth=0.6, linestyle=":", zorder=0)
@@ -101,7 +75,7 @@ def draw_threads(axes, rows, sizes, colours):
         gains = [line[(*size, 1)] / line[(*size, 2)] for size in sizes]
         axes.bar(places, gains, width=0.25, color=colours[index], label=name)
     axes.axhline(1, color="0.6", linewidth=0.6, linestyle=":", zorder=0)
-    axes.set_xticks(range(len(sizes)), [f"{order}, {triangles}" for order, triangles in sizes], fontsize=6)
+    axes.set_xticks(range(len(sizes)), [f"{order:g}, {triangles:g}" for order, triangles in sizes], fontsize=6)
     axes.set_xlabel("k, triangles")
     axes.set_ylabel("wall time of one thread over two")
     axes.set_ylim(top=1.35 * axes.get_ylim()[1])
@@ -110,11 +84,6 @@ def draw_threads(axes, rows, sizes, colours):
 
 
 def draw(path, outputs):
-    import style
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-
-    style.check_outputs(outputs)
     rows = read_table(path)
     sizes = sorted({(row.order, row.triangles) for row in rows})
     orders = sorted({order for order, _ in sizes})
@@ -125,7 +94,7 @@ def draw(path, outputs):
         for j, number in enumerate(triangles):
             axes = figure.add_axes([0.255 + 0.25 * j, 0.735 - 0.295 * i, 0.225, 0.235])
             draw_solvers(axes, [r for r in rows if (r.part, r.order, r.triangles) == ("solvers", order, number)], colours)
-            axes.set_title(f"k = {order}, {number} triangles")
+            axes.set_title(f"k = {order:g}, {number:g} triangles")
             if j > 0:
                 axes.set_yticklabels([])
             if i + 1 == len(orders):

@@ -56,6 +56,18 @@ def time_text(time):
     return number(float(f"{time:.4g}"))
 
 
+def time_title(index, time):
+    """Of the shapes at this time; None: of the last ones."""
+    return "last state" if time is None else f"{time_name(index)} = {time_text(time)}"
+
+
+def draw_scale_bar(axes, x, y, length, scale):
+    """An upright bar of about this length, rounded to one digit, above (x, y); `scale` inches per unit of length."""
+    bar = float(f"{length:.0e}")
+    axes.plot([x, x], [y, y + scale * bar], color="0.1", linewidth=1.0, solid_capstyle="butt")
+    axes.text(x + 0.05, y + scale * bar / 2, number(bar), ha="left", va="center", fontsize=7)
+
+
 def check_outputs(paths):
     """Raises BadInput, before any work, for a picture that cannot be written."""
     for path in paths:

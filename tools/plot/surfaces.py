@@ -9,9 +9,9 @@ from matplotlib.colors import Normalize
 import flow
 import raster
 from colours import Colours, colour_scale, curvature_colours, draw_bar
-from labels import number, power, wrapped
+from labels import power, wrapped
 from results import BadInput
-from style import DPI, WIDTH, time_name, time_text
+from style import DPI, WIDTH, draw_scale_bar, time_title
 from tubes import caption
 
 MAX_HEIGHT = 5.4  # inches of all rows together
@@ -148,8 +148,7 @@ class SurfacePanel:
         self.right = self.centres[-1] + self.scale * widths[-1] / 2
         self.left = min(left, self.centres[0] - self.scale * widths[0] / 2) - 0.12
 
-        times = [column.time for column in columns]
-        self.titles = ["last state" if t is None else f"{time_name(i)} = {time_text(t)}" for i, t in enumerate(times)]
+        self.titles = [time_title(i, column.time) for i, column in enumerate(columns)]
         if self.beside and not columns[0].time:
             self.titles = [""]  # only the time zero: a shape without a time
         self.height, self.middles = HEADER if any(self.titles) else 0.08, []  # of each row of pictures, from the top
@@ -185,7 +184,8 @@ class SurfacePanel:
         if not self.beside and len(self.quantities) > 1:
             for middle, quantity in zip(self.middles, self.quantities * len(self.labels)):
                 axes.text(self.left, self.top - middle, quantity.symbol, ha="right", va="center", style="italic")
-        self._draw_scale_bar(axes)
+        low = self.top - self.middles[-1] - self.scale * self.heights[-1] / 2
+        draw_scale_bar(axes, self.right + 0.14, low, max(self.heights) / 3, self.scale)
 
     def _samples(self, surface, row, size):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
@@ -235,13 +235,6 @@ class SurfacePanel:
             middle = self.centres.mean() if self.beside else x
             axes.text(middle, below, words, ha="center", va="top", fontsize=6.5, linespacing=1.1)
         axes.set(xlim=(0, axes.figure.get_figwidth()), ylim=(0, axes.figure.get_figheight()))  # imshow changes them
-
-    def _draw_scale_bar(self, axes):
-        longest = max(self.heights)
-        bar = float(f"{longest / 3:.0e}")
-        x, y = self.right + 0.14, self.top - self.middles[-1] - self.scale * self.heights[-1] / 2
-        axes.plot([x, x], [y, y + self.scale * bar], color="0.1", linewidth=1.0, solid_capstyle="butt")
-        axes.text(x + 0.05, y + self.scale * bar / 2, number(bar), ha="left", va="center", fontsize=7)
 
     def draw_colour_bars(self, figure, bottom):
         """A colour bar for each quantity, and what the arrows mean, in the 0.5 inches above `bottom`."""

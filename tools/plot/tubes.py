@@ -9,7 +9,7 @@ from matplotlib.collections import QuadMesh
 from colours import curvature_colours, draw_bars
 from labels import number, wrapped
 from results import BadInput
-from style import WIDTH, time_name, time_text
+from style import WIDTH, draw_scale_bar, time_text, time_title
 
 MAX_COLUMNS = 6
 MAX_HEIGHT = 5.6  # inches of all rows together
@@ -167,26 +167,17 @@ class ProfilePanel:
                     axes.text(x, below, caption, ha="center", va="top", fontsize=6.5, linespacing=1.1)
         for label, y in zip(self.labels, self.middles):
             axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
-        self._draw_scale_bar(axes)
+        longest = max(frame.length for frame in self.frames)
+        draw_scale_bar(axes, self.right + 0.14, self.middles[-1] - self.scale * longest / 2, longest / 2, self.scale)
 
     def _title(self, index, column):
-        if column.time is None:
-            return "last state"
-        if all(result.is_equilibrium for result in self.results):
+        if column.time is not None and all(result.is_equilibrium for result in self.results):
             return f"shape {number(column.time)}" if len(self.columns) > 1 else ""
-        return f"{time_name(index)} = {time_text(column.time)}"
+        return time_title(index, column.time)
 
     def _draw_axis(self, axes, frame, x, y):
         reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
         axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
-
-    def _draw_scale_bar(self, axes):
-        longest = max(frame.length for frame in self.frames)
-        bar = float(f"{longest / 2:.0e}")
-        size = self.scale * bar
-        x, y = self.right + 0.14, self.middles[-1] - self.scale * longest / 2
-        axes.plot([x, x], [y, y + size], color="0.1", linewidth=1.0, solid_capstyle="butt")
-        axes.text(x + 0.05, y + size / 2, number(bar), ha="left", va="center", fontsize=7)
 
     def draw_colour_bars(self, figure, bottom):
         """Two colour bars in the 0.5 inches above `bottom`."""

@@ -7,9 +7,12 @@ tubular.py FOLDER -o PICTURE: results named l2.hdf ... (branches in k42) and len
 import os
 import sys
 
-import numpy as np
-
 import command_line
+import numpy as np
+import style
+from labels import formula, number
+from matplotlib.figure import Figure
+from results import read_result
 
 SHOWN = (0.0, 0.06, 0.12)  # k42
 
@@ -31,12 +34,6 @@ def nearest(values, wanted):
 
 
 def draw(folder, outputs):
-    import style
-    from labels import formula, number
-    from matplotlib.figure import Figure
-    from results import read_result
-
-    style.check_outputs(outputs)
     lengths = (2, 3, 4)
     branches = {length: read_result(os.path.join(folder, f"l{length}.hdf")) for length in lengths}
     colours = dict(zip(SHOWN, style.line_colours(len(SHOWN))))

@@ -2,12 +2,21 @@
 """Draws the paper's validation: its surface coloured by curvature, and errors of recovered curvatures against the mesh
 width, from the table that curvature_table prints."""
 
-import csv
 import math
 import sys
 
 import command_line
+import matplotlib.pyplot as plt
+import numpy as np
+import style
 from labels import SUPERSCRIPT
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from results import BadInput
+from tables import read_rows
 
 SURFACE, MESH = "dumbbell", "structured"
 QUANTITIES = {"H": "H", "K": "K", "grad_H": "\u2207H", "grad_K": "\u2207K"}
@@ -23,24 +32,15 @@ RECOVERIES = {
 
 def read_table(path):
     """{(k, recovery, quantity): [(h, error), ...]} of the validation surface, coarse first. Raises BadInput."""
-    from results import BadInput
-
     lines = {}
-    try:
-        with open(path, newline="") as file:
-            for row in csv.DictReader(file):
-                if row["surface"] != SURFACE or row["mesh"] != MESH or row["recovery"] not in RECOVERIES:
-                    continue
-                for quantity in QUANTITIES:
-                    point = float(row["h"]), float(row[quantity])
-                    if not all(0 < value < math.inf for value in point):
-                        raise ValueError(f"{quantity} = {point[1]} at h = {point[0]}")
-                    lines.setdefault((int(row["k"]), row["recovery"], quantity), []).append(point)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        columns = ", ".join(("surface", "mesh", "k", "recovery", "h", *QUANTITIES))
-        raise BadInput(f"{path}: must have the columns {columns} with positive numbers ({error})") from error
+    for row in read_rows(path, ("surface", "mesh", "recovery"), ("k", "h", *QUANTITIES)):
+        if row.surface != SURFACE or row.mesh != MESH or row.recovery not in RECOVERIES:
+            continue
+        for quantity in QUANTITIES:
+            point = row.h, getattr(row, quantity)
+            if min(point) <= 0:
+                raise BadInput(f"{path}: h and errors must be positive numbers, not {quantity} = {point[1]} at h = {point[0]}")
+            lines.setdefault((int(row.k), row.recovery, quantity), []).append(point)
     if not lines:
         raise BadInput(f"{path}: has no rows for the surface {SURFACE}, {MESH}")
     return {key: sorted(points, reverse=True) for key, points in lines.items()}
@@ -48,8 +48,6 @@ def read_table(path):
 
 def profile(angle):
     """r, z, outward normal (r, z), H and K at an angle from the pole of the dumbbell: theory.md (4.5), (7.9)."""
-    import numpy as np
-
     c, s = np.cos(angle), np.sin(angle)
     scale, scale1, scale2 = 0.25 + 0.75 * c * c, -1.5 * c * s, -1.5 * (c * c - s * s)
     r, r1, r2 = scale * s, scale1 * s + scale * c, scale2 * s + 2 * scale1 * c - scale * s
@@ -61,9 +59,6 @@ def profile(angle):
 
 def picture(curvature, colours, limit, points=500):
     """The surface seen from the side, its axis level, as an RGBA image; curvature 0 is white, +-limit full colour."""
-    import matplotlib.pyplot as plt
-    import numpy as np
-
     angle = np.linspace(1e-3, math.pi - 1e-3, 2000)
     values = dict(zip("r z nr nz H K".split(), profile(angle)))
     z = np.linspace(-1, 1, points)
@@ -81,9 +76,6 @@ def picture(curvature, colours, limit, points=500):
 
 
 def draw_surface(figure, left, bottom, name, colours, limit):
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     axes = figure.add_axes([left, bottom, 0.33, 0.16])
     axes.imshow(picture(name, colours, limit), extent=(-1, 1, -0.5, 0.5), origin="lower", interpolation="bilinear")
     axes.axis("off")
@@ -103,12 +95,6 @@ def draw_slope(axes, fine, coarse, order, above):
 
 
 def draw(path, outputs):
-    import style
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
-
-    style.check_outputs(outputs)
     lines = read_table(path)
     orders = sorted({k for k, _, _ in lines})
     looks = {

@@ -4,9 +4,12 @@
 import os
 import sys
 
-import numpy as np
-
 import command_line
+import numpy as np
+import style
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from results import read_result
 
 LIMITS = (0.48, 0.97)  # of the reduced volume
 HEIGHT = 4.4  # inches
@@ -21,12 +24,6 @@ def unstable(series):
 
 
 def draw(paths, outputs):
-    import style
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from results import read_result
-
-    style.check_outputs(outputs)
     results = [read_result(path) for path in paths]
     names = [os.path.splitext(os.path.basename(path))[0].removeprefix("branch_") for path in paths]
     figure = Figure(figsize=(style.WIDTH, HEIGHT))

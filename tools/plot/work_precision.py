@@ -1,12 +1,16 @@
 #!/usr/bin/python3
 """Draws error against CPU time from a table with the columns series, energy_asked, error, estimate, cpu_ms."""
 
-import csv
 import sys
 
 import command_line
+import numpy as np
+import style
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from tables import read_rows
 
-COLUMNS = ("energy_asked", "error", "estimate", "cpu_ms")
 # CPU milliseconds of the prototype with settings tuned by hand, quintic B-splines, for its errors, which were
 # relative to E(0), which is 0.3946 of E_ref.
 PROTOTYPE = ((0.3946e-4, 0.51), (0.3946e-6, 1.3), (0.3946e-8, 4.8))
@@ -14,35 +18,15 @@ FLOOR = 1e-16  # an error of zero is drawn here
 
 
 def read_table(path):
-    """{series: rows of COLUMNS, by requested accuracy, coarse first}. Raises BadInput."""
-    from results import BadInput
-
+    """{series: rows (energy_asked, error, estimate, cpu_ms), by requested accuracy, coarse first}. Raises BadInput."""
     lines = {}
-    try:
-        with open(path, newline="") as file:
-            for row in csv.DictReader(file):
-                values = tuple(float(row[name]) for name in COLUMNS)
-                if not all(0 <= value < float("inf") for value in values):
-                    raise ValueError(f"a value is negative or not finite in {values}")
-                lines.setdefault(row["series"], []).append(values)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        raise BadInput(f"{path}: must have the columns series, {', '.join(COLUMNS)} with numbers ({error})") from error
-    if not lines:
-        raise BadInput(f"{path}: has no rows")
+    for series, *values in read_rows(path, ("series",), ("energy_asked", "error", "estimate", "cpu_ms")):
+        lines.setdefault(series, []).append(values)
     return {name: sorted(rows, reverse=True) for name, rows in lines.items()}
 
 
 def draw(path, outputs):
     """Filled: errors; hollow: the estimates of the program; dotted lines: requested accuracies."""
-    import numpy as np
-    import style
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    style.check_outputs(outputs)
     lines = read_table(path)
     figure = Figure(figsize=(style.WIDTH * 0.68, 3.2))
     axes = figure.add_axes([0.135, 0.125, 0.73, 0.845])

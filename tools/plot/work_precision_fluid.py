@@ -1,47 +1,27 @@
 #!/usr/bin/python3
 """Draws error against CPU time of a fluid and of Stokes flow, from the table of tests/benchmark/work_precision_fluid.py."""
 
-import csv
 import sys
-from dataclasses import dataclass, replace
 
 import command_line
+import style
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from results import BadInput
+from tables import read_rows
 
 MODELS = {"fluid": "fluid, with inertia", "stokes": "Stokes flow"}
-NUMBERS = ("asked", "error", "estimate", "cpu_s")
 REFERENCE = "reference"  # the run that the others are compared with; its error is its distance to the next finest
 
 STAR = {"color": "k", "marker": "*", "markersize": 6.5, "mew": 0.7, "ls": ""}
 
 
-@dataclass
-class Run:
-    series: str
-    asked: float  # 0 with explicit settings
-    error: float
-    estimate: float
-    cpu_s: float
-
-
 def read_table(path):
-    """{model: list of Run}. Raises BadInput."""
-    from results import BadInput
-
-    runs = {model: [] for model in MODELS}
-    try:
-        with open(path, newline="") as file:
-            for row in csv.DictReader(file):
-                values = [float(row[name]) for name in NUMBERS]
-                if not all(0 <= value < float("inf") for value in values):
-                    raise ValueError(f"a value is negative or not finite in {values}")
-                runs[row["model"]].append(Run(row["series"], *values))
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        columns = ", ".join(("model", "series", *NUMBERS))
-        raise BadInput(f"{path}: must have the columns {columns} with numbers ({error})") from error
-    for model, rows in runs.items():
-        if not any(run.series == REFERENCE for run in rows) or len(rows) == 1:
+    """{model: rows}; `asked` is 0 with explicit settings. Raises BadInput."""
+    rows = read_rows(path, ("model", "series"), ("asked", "error", "estimate", "cpu_s"))
+    runs = {model: [row for row in rows if row.model == model] for model in MODELS}
+    for model, of_model in runs.items():
+        if not any(run.series == REFERENCE for run in of_model) or len(of_model) == 1:
             raise BadInput(f"{path}: has no reference, or no other run, of {model}")
     return runs
 
@@ -58,16 +38,16 @@ def best(runs):
 def draw_model(axes, runs, styles):
     reference = next(run for run in runs if run.series == REFERENCE)
     # Nothing is known below the error of the reference.
-    runs = [replace(run, error=max(run.error, reference.error)) for run in runs if run is not reference]
+    runs = [run._replace(error=max(run.error, reference.error)) for run in runs if run is not reference]
     axes.axhspan(reference.error * 1e-6, reference.error, color="0.93", zorder=0)
     axes.annotate("the reference is no better known", (1, reference.error), (-3, -3), ha="right", va="top",
                   xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=6.5, color="0.35")
-    for series, style in styles.items():
+    for series, look in styles.items():
         every = [run for run in runs if run.series == series]
         front = best(every)
-        faint = {**style, "ls": "", "alpha": 0.3, "markersize": 2.5}
+        faint = {**look, "ls": "", "alpha": 0.3, "markersize": 2.5}
         axes.loglog([run.cpu_s for run in every], [run.error for run in every], zorder=1, **faint)
-        axes.loglog([run.cpu_s for run in front], [run.error for run in front], zorder=2, **style)
+        axes.loglog([run.cpu_s for run in front], [run.error for run in front], zorder=2, **look)
     for run in runs:
         if run.asked > 0:
             axes.loglog([run.cpu_s] * 2, [run.error, run.estimate], color="k", lw=0.6, zorder=2)
@@ -78,11 +58,6 @@ def draw_model(axes, runs, styles):
 
 def draw(path, outputs):
     """All runs, faint, and a line through the best of each kind. Stars: requested accuracies; hollow: the estimates."""
-    import style
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-    style.check_outputs(outputs)
     table = read_table(path)
     given = [run for runs in table.values() for run in runs if run.asked == 0 and run.series != REFERENCE]
     names = list(dict.fromkeys(run.series for run in given))
