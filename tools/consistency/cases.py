@@ -1,6 +1,7 @@
 """Cases as nested dicts: reads, changes and writes them as text for the program. Standard library only."""
 
 import copy
+import json
 import tomllib
 from pathlib import Path
 
@@ -29,7 +30,7 @@ def changed(original, **changes):
 def text(node, path=()):
     """As TOML."""
     plain = {key: value for key, value in node.items() if not _is_table(value)}
-    lines = [f"{key} = {_value(value)}" for key, value in plain.items()]
+    lines = [f"{key} = {json.dumps(value)}" for key, value in plain.items()]
     for key, value in node.items():
         name = ".".join((*path, key))
         if isinstance(value, dict):
@@ -42,11 +43,3 @@ def text(node, path=()):
 
 def _is_table(value):
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
-
-
-def _value(value):
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"' if isinstance(value, str) else repr(value)

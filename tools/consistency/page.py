@@ -47,56 +47,6 @@ def numbers(tables):
                                      "" if row.bound is None else row.bound))  # fmt: skip
     return out.getvalue()
 
-READING = """**Summary.** For smooth starts both tiers agree, and their differences vanish as the mesh is refined. On the finest
-meshes here, integrals at rest differ by at most {at_rest}, growth rates of small waves by {rates}, and
-energies in motion by {motion} of E_ref at all output times ({figure} for the figure's tube, {equilibrium} where the cell comes to
-rest). The dissipated energy differs by {dissipated}, and shapes in motion differ by {shapes} of their size.
-
-**Limits of the accuracy.** *At rest* the recovery of curvature limits the accuracy. Integrals are of order 5 and
-higher; values at single points, such as the extremes of H and K ({extremes}), are far less accurate. *In motion* the
-time steps of 3D limit it: for growth rates the fixed step leaves (rate x step)^2/3, all other errors follow the
-tolerance. *At the start* the force limits it: it takes four derivatives of the surface, so on an interpolated start a
-part of it is noise at the scale of the triangles. This noise adds {noise_coarse} times
-the true dissipation of the overdamped tube on the coarsest mesh and {noise_fine} times on the finest, where the rates
-of its smooth waves have an error of {waves}. Without inertia the noise disappears at once. A fluid seems to keep
-it as waves of little energy, which affect values at a point or an instant: the largest speed and lambda differ by up to {pointwise}.
-
-**Where the tiers differ.** *Where curvature jumps*, at the seams of the capsule: the energy at rest is off by {seams}
-and converges with first order at best; extremes of H and K do not converge. As a fluid, the capsule emits waves that
-no mesh resolves; the energies differ by {capsule}, and the energy of tier 1 itself is only known to {capsule_known}.
-*Smallest and largest radius* in 3D are those of nodes, so they have no order of convergence. For closed surfaces the
-tiers define them differently (distances from the centre in 3D, from the axis in tier 1), so they are not compared."""
-
-HEAD = """# Consistency of the two tiers
-
-This page compares every quantity that both tier 1 (`axisym`) and tier 2 (`surface3d`, "3D" below) compute, on the
-same starts. This page, [all numbers](consistency.csv) and the picture are made by
-
-    tools/figures consistency        # {minutes:.0f} minutes of one core
-
-which exits with status 1 if a difference exceeds its bound. Do not edit them: the texts are in `tools/consistency/`.
-
-{reading}
-
-![Differences between the tiers against the number of triangles; dotted: fourth order in the mesh width](consistency.svg)
-
-## How to read the tables
-
-- *Tier 1* has a requested accuracy far beyond that of 3D; if there are several times, its last value is shown.
-- *Its error* is the stated one for the energy; for other quantities it is the difference from a run with a ten times
-  smaller requested error. If an exact value is given, that is the reference and the error is zero.
-- *T* triangles of order 4. *Differences* are the largest over all output times (`consistency.csv` has each of them).
-  They are relative to E_ref for energies and for dissipated energy, to the size of the shape for distances (radius of
-  the sphere of the same area, or of the tube), to 4 pi for INT K, else to the largest value of tier 1.
-- *Order* is the order of the difference in the mesh width, between the mesh with the largest difference (the
-  coarsest, unless its difference is accidentally small) and the finest. It is empty where the error of tier 1 or
-  rounding would determine it. The tolerance of the time steps decreases with T^-3, so that errors in time decrease as
-  those in space should, with the fourth power of the mesh width; fixed steps (rates) are the same on all meshes.
-- *Bound*: the command fails if the difference on the finest mesh is larger, or if the order is below 1 while the
-  difference exceeds a tenth of the bound (except for extremes, and where curvature jumps). Empty: not checked.
-- *CPU seconds* are of one thread and, in 3D, include the coarser run for the error estimate; the machine was busy.
-"""
-
 
 INTEGRALS = ("area", "volume", "energy", "energy_20", "energy_40", "energy_42", "integral_K")
 AT_REST = ("tube-at-rest", "spheroid-at-rest")
@@ -105,8 +55,8 @@ MOVING = ("figure", "waves-overdamped", "waves-stokes", *INERTIAL)
 RATES = ("rates-gradient-flow", "rates-overdamped", "rates-stokes", "rates-pearling", "rates-buckling")
 
 
-def reading(tables):
-    """The summary of the tables in words."""
+def head(tables):
+    """The head of the page: the text of page.txt with the numbers of the tables."""
 
     def largest(scenes, *quantities, what=lambda row: row.difference(row.meshes[-1])):
         """Largest value over these rows (all if none are named), by default of the difference on the finest mesh."""
@@ -118,7 +68,8 @@ def reading(tables):
         ]
         return f"{max(found):.2g}" if found else "(not run)"
 
-    return READING.format(
+    return (Path(__file__).parent / "page.txt").read_text().format(
+        minutes=sum(scene.cost.total for scene in tables) / 60,
         at_rest=largest(AT_REST, *INTEGRALS),
         extremes=largest(AT_REST, "min H", "max H", "min K", "max K"),
         rates=largest(RATES),
@@ -140,7 +91,7 @@ def reading(tables):
 def write(path, tables):
     """Writes PATH and, beside it, the same name with .csv and .svg."""
     path = Path(path)
-    parts = [HEAD.format(reading=reading(tables), minutes=sum(scene.cost.total for scene in tables) / 60)]
+    parts = [head(tables)]
     for scene in tables:
         parts.append(f"## {scene.title}\n\n{textwrap.fill(scene.words, 118)}\n\n{table(scene)}\n")
     keep(path, "\n".join(parts))
