@@ -75,7 +75,7 @@ void CurveAttempt::add_to_trace(double t) {
     trace.add(t, now_.o.energy, gradient.dot(setup_.curve(flow_->v())));
 }
 
-// By how much the energy could change until the end, by what dissipates, moves and is accelerated now.
+// Bound of the change of the energy until the end, from the present dissipation, kinetic energy and acceleration.
 double CurveAttempt::what_may_change(double t) const {
     const double left = setup_.c.time.end - t;
     return std::max({now_.balance.dissipation * left, now_.balance.kinetic, now_.balance.acceleration * left * left});

@@ -26,7 +26,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
 }
 
-// One point of the profile, and what happens there.
+// One point of the profile, with curvatures and flow.
 struct Sample {
     double r, z, H, K, u_n, u_t, u_theta, p;
 };

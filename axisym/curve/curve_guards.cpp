@@ -9,9 +9,9 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr double steepest = 3;       // curvature times length of an element: beyond that nothing is resolved
+constexpr double steepest = 3;       // largest curvature times element length: beyond it the curve is not resolved
 constexpr double stretched = 1e-3;   // least over largest |X_s|
-constexpr int most_crawling = 2000;  // steps by which the time has not grown by a thousandth
+constexpr int most_crawling = 2000;  // steps in which the time grows by less than a thousandth
 constexpr double crawling = 1.001, tiny_step = 1e-9;  // of the time reached; of the end
 
 }  // namespace

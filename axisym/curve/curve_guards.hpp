@@ -9,14 +9,14 @@
 
 namespace tubule::axisym {
 
-// A value that is positive while all is well, and the report for when it no longer is.
+// A value that is positive while the run may continue, and the report for when it is not.
 struct CurveGuard {
     double (*value)(const Snapshot& s, double r_min);
     StopReport (*report)(const Snapshot& s, double time);
 };
 std::span<const CurveGuard> curve_guards();
 
-// Checked now and then: a profile that intersects itself or the axis, elements too long for its curvature.
+// Checked at intervals: a profile that intersects itself or the axis, elements too long for its curvature.
 std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen::VectorXd& x, const Snapshot& s,
                                            double time);
 

@@ -83,7 +83,7 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
 
 namespace {
 
-// A sampled profile; halves are completed by their mirror image, which does no harm to the distance.
+// A sampled profile; halves are completed by their mirror image, which does not change the distance.
 struct Sampled {
     ArcLength arc;
     std::vector<Eigen::Vector2d> points;

@@ -19,8 +19,8 @@ struct ShapeMeasures {
 ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x);
 
 // Parameters of two points at which the profile crosses itself, or of one (twice) where it is beyond the axis
-// or, a half, beyond its plane of symmetry; to
-// the resolution of 8 chords an element.
+// or, a half, beyond its plane of symmetry; to the resolution of 8 chords
+// per element.
 std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, const Eigen::VectorXd& x);
 
 // The Hausdorff distance of two surfaces of revolution with a common axis: that of their profiles. To about 1e-9 of

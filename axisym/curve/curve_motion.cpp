@@ -23,7 +23,7 @@ constexpr std::array<int, n_slots> slot_field{curve_r,    curve_r,    curve_z, c
                                               velocity_z, velocity_z, swirl,   swirl,   pressure};
 constexpr std::array<int, n_slots> slot_derivative{0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
 
-// What comes out: the factors of test functions and their derivatives, and two integrals.
+// The result: factors of test functions and their derivatives, and two integrals.
 enum Row { kr, kz, mr0, mr1, mz0, mz1, sw0, sw1, continuity, drift_sum, shift_sum, n_rows };
 constexpr int n_test_rows = drift_sum;
 constexpr std::array<int, n_test_rows> row_field{curve_r,    curve_z, velocity_r, velocity_r, velocity_z,
@@ -385,7 +385,7 @@ void CurveMotion::scatter(int e, const Eigen::MatrixXd& local, double* values) c
         for (int a = 0; a < local_size_; ++a) values[slot[b * local_size_ + a]] += signs[a] * signs[b] * local(a, b);
 }
 
-// What the energy, the gauge and the numbers lambda, area, volume contribute.
+// Contributions of the energy, the gauge and the numbers lambda, area, volume.
 void CurveMotion::add_forms(const double* y, double* values) const {
     const auto number = [&](int at) { return at < 0 ? 0.0 : y[at]; };
     const Weights force{.energy = 1, .volume = number(at_.lambda)};
@@ -458,7 +458,7 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
 
 namespace {
 
-// Rows and columns of a matrix divided by the roots of their largest entries, again and again: pressures and velocities
+// Rows and columns of a matrix divided by the roots of their largest entries, iterated: pressures and velocities
 // over a very short step differ by many orders of magnitude.
 struct Equilibrated {
     Eigen::VectorXd rows, columns;

@@ -62,7 +62,7 @@ private:
         return *run_;
     }
 
-    // Goes on with the run that was interrupted, if it is that one.
+    // Resumes the interrupted run if that had the same role in its pair.
     RunSummary& run(const CurveSettings& settings, const EndedRun* coarser) {
         attempt(settings, coarser);
         if (restart_ && begun_->is_coarser == settings.is_coarser)
@@ -76,7 +76,7 @@ private:
     const Case& case_;
     RunObserver& watch_;
     const RunClock& clock_;
-    const Record* restart_;  // until the run goes on from it
+    const Record* restart_;  // until the run resumes from it
     const Beginning start_;
     std::optional<CurveSettings> begun_;  // of the run that was interrupted
     CurveSettings settings_;              // of the run to be reported

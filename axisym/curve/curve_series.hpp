@@ -8,7 +8,7 @@
 
 namespace tubule::axisym {
 
-// What a row is computed from.
+// Input of a row.
 struct CurveRow {
     double time;
     const Snapshot& now;

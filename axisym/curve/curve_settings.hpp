@@ -1,4 +1,4 @@
-// How fine a run of a curve is, and the pairs of runs that tell its error.
+// The resolution of a run of a curve, and the pairs of runs that estimate its error.
 #pragma once
 
 #include "common/case/case.hpp"
@@ -8,7 +8,7 @@ namespace tubule::axisym {
 constexpr int first_curve_elements = 12;  // of one cell
 
 struct CurveSettings {
-    int elements = 0;         // asked for, of one cell; there are more at seams
+    int elements = 0;         // requested, of one cell; there are more at seams
     double tolerance = 0;     // of the time integrator
     int pair = 1;             // its number
     bool is_coarser = false;  // of its pair; else it is the run that is reported

@@ -30,7 +30,7 @@ double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
     return 1 - sum * sum / (o.area * o.energy);
 }
 
-// How strongly the parameter is kept even: in the scale of the rows that it is added to (curve_motion.hpp).
+// Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
 double gauge_of(const Case& c, double energy, double area) {
     const MotionLaw law = motion_law(c.model);
     if (law.inertia != 0) return std::sqrt(energy * area);
@@ -60,7 +60,7 @@ Beginning beginning_of(const Case& c) {
     if (c.discretisation.symmetry && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
-        } catch (const std::invalid_argument&) {  // it does not mirror itself
+        } catch (const std::invalid_argument&) {  // not mirror-symmetric
         }
     }
     const auto [area, volume] = area_and_volume(whole);
@@ -128,7 +128,7 @@ CurveBegin begin_state(const CurveSetup& setup) {
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     std::optional<CurveMotion::Start> consistent;
-    // As short as the linear algebra bears, for a start that is not smooth may be far from where it was soon.
+    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast.
     double h = 1e-10 * std::min(setup.c.time.end, 1.0);
     for (int tries = 0; !consistent; ++tries) try {
             consistent = setup.motion->consistent(y, h);

@@ -14,12 +14,12 @@ namespace tubule::axisym {
 
 CurveLaw law_of(const Case& c);
 
-// What all runs of a case start from: half of the profile where it is symmetric and the case allows that.
+// The common start of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct Beginning {
     Meridian meridian;
     double area = 0, volume = 0;
 
-    int images() const;  // of the meridian in the whole
+    int images() const;  // of the meridian in the whole shape
 };
 Beginning beginning_of(const Case& c);
 

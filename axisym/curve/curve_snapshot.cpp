@@ -9,8 +9,8 @@
 namespace tubule::axisym {
 namespace {
 
-// The narrowest place that is no pole: a minimum of r between two higher places, over the ends of elements and their
-// middles. Radius infinity where there is none.
+// The narrowest place other than a pole: a minimum of r between two larger values, over the ends of elements and their
+// midpoints. Radius infinity if there is none.
 Neck narrowest(const CurveSpace& space, const double* y) {
     const std::vector<double>& breaks = space.splines().breaks();
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());

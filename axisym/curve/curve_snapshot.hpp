@@ -1,4 +1,4 @@
-// What is measured of a curve at one time.
+// Measurements of a curve at one time.
 #pragma once
 
 #include "axisym/curve/curve_motion.hpp"

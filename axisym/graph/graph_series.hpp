@@ -7,7 +7,7 @@
 
 namespace tubule::axisym {
 
-// What a row is computed from.
+// Input of a row.
 struct GraphRow {
     double time;
     const Observation& o;

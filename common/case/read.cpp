@@ -28,7 +28,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
     try {
         Reader::read(root, "", path + ":1:1", [&](Reader& k) { keys(k, c); });
     } catch (const CaseError& error) {
-        // Several keys may share the blame, and an override may be one of them.
+        // Several keys may cause the error, among them an override.
         const std::string message = error.what();
         if (sets.empty() || message.starts_with("--set ")) throw;
         throw CaseError(fmt::format("{} (with --set {})", message, fmt::join(sets, " --set ")));

@@ -19,7 +19,7 @@ std::string shown(const toml::node& node) {
     if (const auto* value = node.as_integer()) return fmt::format("{}", value->get());
     if (const auto* value = node.as_floating_point()) {
         const std::string digits = fmt::format("{}", value->get());
-        return digits.find_first_of(".en") == std::string::npos ? digits + ".0" : digits;  // 1.0 is no integer
+        return digits.find_first_of(".en") == std::string::npos ? digits + ".0" : digits;  // 1.0 is not an integer
     }
     if (const auto* value = node.as_boolean()) return fmt::format("{}", value->get());
     if (node.is_table()) return "a table";

@@ -9,7 +9,7 @@ namespace tubule {
 
 namespace {
 
-// What it takes to turn a into b: 1 for swapping neighbours, the likeliest slip, and 2 for inserting, deleting
+// What it takes to turn a into b: 1 for swapping neighbours, the most common typo, and 2 for inserting, deleting
 // or replacing a letter. Letter case does not matter.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
     std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));

@@ -9,7 +9,7 @@ namespace tubule {
 
 namespace {
 
-// The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML wants, then its
+// The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML requires, then its
 // tables. Numbers are written with the digits that read back exactly.
 class Writer {
 public:

@@ -14,7 +14,7 @@ namespace tubule::durable {
 
 namespace {
 
-// Whether the operation may go on; if not, errno says why.
+// Whether the operation may proceed; if not, errno is set.
 bool allowed(const Operation& operation) {
     const int error = fault ? fault(operation) : 0;
     if (error != 0) errno = error;
@@ -23,7 +23,7 @@ bool allowed(const Operation& operation) {
 
 void sync_directory(const std::filesystem::path& directory) {
     File handle(directory, O_RDONLY | O_DIRECTORY);
-    // Some file systems cannot sync a directory and say so by EINVAL; there is nothing more to do then.
+    // Some file systems cannot sync a directory and return EINVAL; nothing more can be done.
     const bool done = allowed({Call::sync, handle.descriptor(), {}}) && ::fsync(handle.descriptor()) == 0;
     if (!done && errno != EINVAL) fail("sync directory", directory, errno);
 }
@@ -86,7 +86,7 @@ void replace(const std::filesystem::path& path, std::span<const std::byte> conte
         if (!allowed({Call::rename, -1, {}}) || ::rename(aside.c_str(), path.c_str()) != 0)
             fail("replace", path, errno);
     } catch (...) {
-        ::unlink(aside.c_str());  // make room again; the error on its way matters more than this one's
+        ::unlink(aside.c_str());  // free the space; an error here matters less than the one being thrown
         throw;
     }
     sync_directory(path.has_parent_path() ? path.parent_path() : ".");

@@ -20,7 +20,7 @@ struct Operation {
 // For tests: called before every operation. Returns 0 to let it happen, or an errno value to make it fail.
 inline std::function<int(const Operation&)> fault;
 
-// All of these throw std::runtime_error with the path and the system's words.
+// All of these throw std::runtime_error with the path and the system's message.
 
 // An owned file descriptor.
 class File {
@@ -46,8 +46,8 @@ private:
 
 void remove(const std::filesystem::path& path);
 
-// Gives `path` these contents, or leaves it as it was: writes PATH.tmp, then renames. When this has
-// returned, the new contents survive a loss of power too.
+// Replaces the contents of `path`, or leaves it unchanged: writes PATH.tmp, then renames. After this
+// returns, the new contents survive a loss of power, too.
 void replace(const std::filesystem::path& path, std::span<const std::byte> contents);
 
 [[noreturn]] void fail(const char* verb, const std::filesystem::path& path, int error);

@@ -165,7 +165,7 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
         throw std::runtime_error(fmt::format("{}: not a regular file", file.string()));
     try {
         const auto access = property_list(H5P_FILE_ACCESS);
-        // A result never changes in place, so there is nothing to lock against; and on some file systems locks fail.
+        // A result never changes in place, so it needs no lock; on some file systems locks fail.
         H5Pset_file_locking(access, false, true);
         const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "it");
         require_parts(opened);
@@ -180,7 +180,7 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
 std::vector<std::byte> hdf5_image(const Contents& contents) {
     const std::lock_guard lock(library);
     const Quiet quiet;
-    // Growing by as much as all of it should take, so that it is moved seldom.
+    // Grows in steps of the expected size, so that it is rarely reallocated.
     const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
     put_attribute(file, "id", contents.id);
     put_attribute(file, "sequence", contents.sequence);

@@ -8,7 +8,7 @@ namespace tubule::h5 {
 
 namespace {
 
-// HDF5's own word on its last error: the innermost description.
+// HDF5's message for its last error: the innermost description.
 std::string last_error() {
     std::string words;
     const auto visit = [](unsigned n, const H5E_error2_t* error, void* out) -> herr_t {

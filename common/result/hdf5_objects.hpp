@@ -1,5 +1,5 @@
 // Handles, attributes, datasets and groups of the HDF5 library, with errors as exceptions: for the files of this folder
-// that write and read HDF5. All throw std::runtime_error with HDF5's own words.
+// that write and read HDF5. All throw std::runtime_error with HDF5's message.
 #pragma once
 
 #include <hdf5.h>

@@ -30,7 +30,7 @@ struct Head {
 };
 constexpr std::size_t summed_head = offsetof(Head, crc);
 
-// Eight tables take eight bytes a turn: a bytewise CRC would cost more than the write of a row.
+// Eight tables process eight bytes at a time: a bytewise CRC would take longer than writing a row.
 constexpr auto crc_tables = [] {
     std::array<std::array<std::uint32_t, 256>, 8> t{};
     for (std::uint32_t i = 0; i < 256; ++i) {
@@ -72,7 +72,7 @@ void put(std::vector<std::byte>& out, const std::string& text) {
 // In place of the number of a mesh.
 constexpr std::uint64_t no_mesh = ~std::uint64_t{0};
 
-// Reading of a payload. Its CRC was right, so running over its end means a fault in this file.
+// Reading of a payload. Its CRC matched, so reading past its end is a bug in this file.
 class Payload {
 public:
     explicit Payload(std::span<const std::byte> bytes) : rest_(bytes) {}
@@ -192,11 +192,11 @@ void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
     throw std::runtime_error(fmt::format("a journal record has the unknown kind {}", static_cast<unsigned>(kind)));
 }
 
-// Opens and locks; a file that another writer took away between the two is no longer the journal, so try again.
+// Opens and locks. If another writer removed the file in between, it is no longer the journal: try again.
 durable::File open_locked(const std::filesystem::path& path) {
     while (true) {
         durable::File file(path, O_RDWR | O_CREAT | O_APPEND);
-        // Some network file systems do not support locks; that is no reason to reject a run.
+        // Some network file systems do not support locks; a run is not rejected for that.
         if (::flock(file.descriptor(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
             throw std::runtime_error(
                 fmt::format("{} is in use: another process is writing this result", path.string()));
@@ -277,12 +277,12 @@ void Journal::commit(std::uint64_t sequence) {
     try {
         file_.write(buffer_);
     } catch (...) {
-        // A torn record would hide all that follow it, should the caller be able to go on.
+        // A torn record would hide all later ones if the caller continued.
         sound_ = false;
         try {
             file_.truncate(size_);
             sound_ = true;
-        } catch (const std::runtime_error&) {  // then it stays unsound, and says so at the next record
+        } catch (const std::runtime_error&) {  // it stays unsound, and the next record reports that
         }
         throw;
     }
@@ -341,8 +341,8 @@ std::vector<std::byte> read_journal(const std::filesystem::path& result) {
             n = read_from(size, std::span(bytes).subspan(size));
         }
         bytes.resize(size);
-        // If the run has begun the journal anew meanwhile, its first record is another one now, and what was read may
-        // be part old, part new.
+        // If the run has restarted the journal meanwhile, its first record is a different one, and the data read may
+        // mix old and new.
         std::vector<std::byte> front(std::min(size, header_size + sizeof(Head)));
         if (read_from(0, front) == front.size() && std::equal(front.begin(), front.end(), bytes.begin())) return bytes;
     }

@@ -1,10 +1,10 @@
-// NAME.hdf.journal: what was handed to the writer since NAME.hdf was last written.
+// NAME.hdf.journal: everything passed to the writer since NAME.hdf was last written.
 //
 //   header   8 bytes "TUBULEJ1", 8 bytes id of the result
 //   record   8 bytes length of the payload, 8 bytes sequence number, 4 bytes kind, 4 bytes CRC-32, payload
 //
 // in the byte order of the machine. The CRC runs over the id, the record's first 20 bytes and its payload, so that a
-// record of another result never passes. Sequence numbers go up by one; NAME.hdf tells the last one it includes.
+// record of another result is never accepted. Sequence numbers go up by one; NAME.hdf stores the last one it includes.
 #pragma once
 
 #include <cstdint>
@@ -35,12 +35,12 @@ public:
     explicit Journal(const std::filesystem::path& result);
     Journal(const Journal&) = delete;
     Journal& operator=(const Journal&) = delete;
-    ~Journal();  // takes the file away if nothing was ever written to it
+    ~Journal();  // removes the file if nothing was written to it
 
     void restart(std::uint64_t id);  // drops all records: call it when the result file includes them
     void remove();
 
-    // Each appends one record, with a single write(2). If that fails the journal is cut back to what it was.
+    // Each appends one record, with a single write(2). If that fails the journal is truncated to its previous size.
     void row(std::uint64_t sequence, std::span<const double> values);
     void record(Entry kind, std::uint64_t sequence, const Record& record);
     void discard(std::uint64_t sequence);
@@ -63,12 +63,12 @@ private:
 // The bytes of the journal beside a result; empty if there is none.
 std::vector<std::byte> read_journal(const std::filesystem::path& result);
 
-// Applies to `contents` the records that follow on them, up to the first one that is torn; nothing if the journal is of
-// another result. While a run goes on, read the journal first and the contents then: there is never a gap in this
-// order. Throws std::runtime_error on a gap.
+// Applies to `contents` the records that follow them, up to the first torn one; none if the journal belongs to another
+// result. During a run, read the journal first and the contents afterwards: in this order there is never a
+// gap. Throws std::runtime_error on a gap.
 void replay(std::span<const std::byte> journal, Contents& contents);
 
-// The same for other contents: `apply` takes the records that follow on `sequence`, which goes with them.
+// The same for other contents: `apply` takes the records after `sequence`, which is updated.
 void replay(std::span<const std::byte> journal, std::uint64_t id, std::uint64_t& sequence,
             const std::function<void(Entry, std::span<const std::byte>)>& apply);
 

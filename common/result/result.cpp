@@ -116,12 +116,12 @@ void check_record(const Record& record, const std::vector<SurfaceCells>& meshes,
     if (record.mesh) check_grid(record, meshes, where);
 }
 
-// The result behind a name, whatever the process's directory becomes later; through a symbolic link if it is one.
+// The absolute path of a result, valid after a change of directory; symbolic links are followed.
 fs::path resolved(const fs::path& file) {
     return fs::weakly_canonical(file);
 }
 
-// A slip of the keyboard after -o must not cost a case file or somebody's data.
+// A typo after -o must not overwrite a case file or other data.
 void refuse_to_replace_others(const fs::path& file) {
     if (!fs::exists(file)) return;
     try {
@@ -145,7 +145,7 @@ Contents load(const fs::path& file) {
     return contents;
 }
 
-// Makes the newest restart record the last thing that happened, and returns it.
+// Drops everything after the newest restart record, and returns that record.
 Record rewind(Contents& contents) {
     const Record* newest = contents.frames.empty() ? nullptr : &contents.frames.back();
     if (contents.checkpoint && (!newest || contents.checkpoint->time >= newest->time)) newest = &*contents.checkpoint;
@@ -165,7 +165,7 @@ Record rewind(Contents& contents) {
     }
     contents.rows.resize(kept);
     std::erase_if(contents.frames, [&](const Record& frame) { return frame.time > record.time; });
-    // From the end only: the numbers of the others stay what they were.
+    // From the end only, so that the numbers of the others do not change.
     std::size_t needed = record.mesh ? *record.mesh + 1 : 0;
     for (const Record& frame : contents.frames)
         if (frame.mesh) needed = std::max(needed, *frame.mesh + 1);
@@ -178,7 +178,7 @@ Record rewind(Contents& contents) {
 }  // namespace
 
 struct ResultWriter::Impl {
-    // The writer that already holds the name, or the lack of rights to it, shows here.
+    // Fails if another writer holds the file, or if permissions are missing.
     explicit Impl(const fs::path& f) : file(f), journal(f) {}
 
     fs::path file;
@@ -202,7 +202,7 @@ struct ResultWriter::Impl {
     }
 
     // What was journalled is safe; it goes into the file when there is as much of it as the file has already (so that
-    // all consolidations together write only a small multiple of the final size), and for those who look in meanwhile
+    // all consolidations together write only a small multiple of the final size), and for concurrent readers
     // as often as takes less than 2 % of the time.
     void consolidate_if_due() {
         const bool outgrown = journal.size() > image_size + journal_slack;
@@ -240,7 +240,7 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     impl->contents.case_text = c;
     impl->contents.about = about;
     impl->contents.series = series;
-    // The old result ends here: its journal, should one lie about, has another id.
+    // The old result ends here; a leftover journal of it has another id.
     impl->consolidate();
     write_view(path, impl->contents);
     return ResultWriter(std::move(impl));
@@ -248,7 +248,7 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
 
 ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void(const Record&)>& check) {
     const auto path = resolved(file);
-    require_result(path);  // refuse what is no result before touching anything
+    require_result(path);  // refuse a file that is not a result before changing anything
     auto impl = std::make_unique<Impl>(path);
     impl->contents = load(path);
     try {
@@ -333,7 +333,7 @@ void ResultWriter::finish(const About& more) {
             about.emplace_back(name, value);
     }
     durable::replace(impl_->file, hdf5_image(impl_->contents));
-    write_view(impl_->file, impl_->contents);  // before the journal goes: after a kill, repair makes the view whole
+    write_view(impl_->file, impl_->contents);  // before the journal is removed: after a kill, repair completes the view
     impl_->journal.remove();
     impl_->finished = true;
 }

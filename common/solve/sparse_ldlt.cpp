@@ -67,15 +67,15 @@ Schedule schedule(const Supernodes& tree) {
     }
     std::reverse(out.top.begin(), out.top.end());
     for (auto& s : out.subtrees) std::reverse(s.begin(), s.end());
-    // The largest first, that no thread begins it last.
+    // The largest first, so that no thread starts it last.
     std::stable_sort(out.subtrees.begin(), out.subtrees.end(),
                      [&](const auto& a, const auto& b) { return work[a.back()] > work[b.back()]; });
     return out;
 }
 
-// Where the update matrices of supernodes lie in one array, those no longer needed beneath later ones. Within a group
-// they form two stacks: supernodes of even depth and those of odd depth, so that parent and children, which are alive
-// at the same time, come to lie on different ones. That of a group's root stays.
+// Offsets of the update matrices of supernodes in one array, in which later ones overwrite those no longer needed.
+// Within a group they form two stacks, one for supernodes of even depth and one for odd depth: a parent and its
+// children, which are in use at the same time, are on different stacks. The matrix of a group's root is kept.
 struct UpdateStorage {
     std::vector<ptrdiff_t> at;
     ptrdiff_t size = 0;

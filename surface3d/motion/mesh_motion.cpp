@@ -7,7 +7,7 @@ namespace tubule::surface3d {
 namespace {
 
 // Measured choices: docs/decisions.md, "Surfaces in motion".
-constexpr double most = 4;          // density of triangles, wanted: so many times the mean, or its inverse
+constexpr double most = 4;  // bound of the wanted density of triangles, relative to the mean, and of its inverse
 constexpr double tolerance = 1e-5;  // of the velocity along the surface
 constexpr int most_iterations = 300;
 constexpr int sweeps = 3;     // nodal normals for their integrals: each leaves a twentieth on 320 triangles
@@ -79,8 +79,8 @@ VectorField tangential(const VectorField& v, const VectorField& normal) {
     return v - normal * along(v, normal).asDiagonal();
 }
 
-// Motions of the nodes along the surface. A tube's mesh does not run along the tube as a whole: on a straight one
-// nothing resists that, and on one that is nearly straight it is noise divided by the square of noise.
+// Tangential motions of the nodes. A uniform motion along a tube is excluded: nothing resists it on a straight tube,
+// and on a nearly straight one it would be amplified noise.
 struct AlongSurface {
     const VectorField& normal;
     VectorField running;  // of norm 1; zero on a closed surface
@@ -106,9 +106,9 @@ void meet_flux(const System& system, const Projection& project, const VectorFiel
     }
 }
 
-// What r does along the surface: r - (m nu, Z), with m such that nothing is left along the nodal normals. Leaving out
-// m, and testing with nodal tangents alone, would let the curvature vector of the mesh, which is not quite normal, pull
-// nodes indefinitely: a cell at rest deforms.
+// The tangential part of r: r - (m nu, Z), with m such that nothing is left along the nodal normals. Without m, testing
+// with nodal tangents alone, the curvature vector of the mesh, which is not exactly normal, would move nodes
+// indefinitely: a mesh at rest would deform.
 VectorField without_multiplier(const System& system, const Projection& project, const VectorField& normal,
                                const AlongSurface& along_surface, VectorField r) {
     for (int sweep = 0; sweep < sweeps; ++sweep) {

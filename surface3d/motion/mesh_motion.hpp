@@ -1,4 +1,4 @@
-// How the nodes move: with the surface in the direction of its normal, along it so that the triangles stay good.
+// Motion of the nodes: with the surface in the normal direction; along it such that the triangles keep their quality.
 #pragma once
 
 #include "common/solve/sparse.hpp"
@@ -10,11 +10,11 @@ namespace tubule::surface3d {
 
 // Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to a good one:
 // (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/(relaxation + te), with a multiplier m: theory.md (10.14). With a
-// = 1 and Euler steps, in the limit of no relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose
-// positions do not converge with the step. What pulls is taken where the matrices are, so that it knows nothing of how
-// nodes moved before: the pull of other positions would draw nodes, if relaxation is short, to where X is extrapolated
-// to, and motions along the surface would go on for ever. To follow the curvature, a is what a triangle has of INT
-// |B|^2, bounded, over the mean of all: triangles with more than their share contract.
+// = 1 and Euler steps, in the limit of zero relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose
+// positions do not converge with the step. The right-hand side is evaluated at X, like the matrices, so that it does
+// not depend on earlier motion of the nodes: evaluated at extrapolated positions with a short relaxation time, it would
+// sustain tangential motion indefinitely. To follow the curvature, a is INT |B|^2 of a triangle, bounded, relative to
+// the mean over all triangles: those above the mean contract.
 class MeshMotion {
 public:
     explicit MeshMotion(bool follows_curvature) : follows_curvature_(follows_curvature) {}

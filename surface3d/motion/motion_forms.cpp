@@ -6,7 +6,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Whether the density depends on H, on K: told from a point of no symmetry.
+// Whether the density depends on H, on K: evaluated at a generic point.
 struct Dependence {
     bool H, K;
 };
@@ -34,7 +34,7 @@ namespace {
 
 using Frame = Eigen::Matrix<double, 3, 2>;
 
-// What the forms of one cell are made of, stacked over its quadrature points: one column a function, one row a point
+// Building blocks of the forms of one cell, stacked over its quadrature points: one column a function, one row a point
 // (two or three where there are components in the tangent plane).
 struct CellTables {
     Eigen::MatrixXd phi, grad;  // functions of P_k, gradients

@@ -13,14 +13,14 @@ namespace tubule::surface3d {
 // Of the pressure's elements, on surfaces of this order: Taylor-Hood where the surface flows; 0 without a pressure.
 int pressure_order(const SurfaceLaw& law, int order);
 
-// Which fields a law has, and the numbers of their unknowns.
+// The fields of a law, and the numbers of their unknowns.
 struct MotionUnknowns : FieldUnknowns {
     MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending);
 
     int H = -1, K = -1, p = -1;  // first number of each, or -1 where there is none; the velocity begins at 0
 };
 
-// What a step is linearised about: the surface X* that is expected at its end, and what is known of its past. Over the
+// The state about which a step is linearised: the surface X* expected at its end, and its history. Over the
 // step, X = Xbar + te w and u_t = (u - ubar)/te: theory.md (10.4), backward differences of any order.
 struct StepBase {
     const CurvedMesh* mesh;              // X*
@@ -43,8 +43,8 @@ struct StepSystem {
         advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia
 };
 
-// H and K at the end of the step are unknowns, which their own evolution ties to u: so the bending force is implicit in
-// both: theory.md (10.5), (10.6), (10.7), (10.8).
+// H and K at the end of the step are unknowns, coupled to u by their evolution equations: the bending force is implicit
+// in both: theory.md (10.5), (10.6), (10.7), (10.8).
 void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 

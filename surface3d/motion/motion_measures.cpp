@@ -36,8 +36,8 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
     return of_cell.rowwise().sum();
 }
 
-// Of the narrowest place: the curvature around a neck is that which all nodes of a cell have, as single ones may be
-// off.
+// Of the narrowest place. The curvature around a neck must be shared by all nodes of a cell, as single nodes may be
+// inaccurate.
 void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
     m.neck_radius = std::numeric_limits<double>::infinity();
     for (int cell = 0; cell < mesh.triangles(); ++cell) {

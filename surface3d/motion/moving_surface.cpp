@@ -12,8 +12,8 @@ namespace {
 
 constexpr int most_corrections = 5;
 constexpr double kept = 1e-12;            // area and volume, relative
-constexpr double still_kept = 1e-8;       // a step that is further off is refused
-constexpr double slight_friction = 1e-4;  // of viscosity/area: where nothing else resists rigid motions
+constexpr double still_kept = 1e-8;       // a larger defect rejects the step
+constexpr double slight_friction = 1e-4;  // relative to viscosity/area; used if nothing else resists rigid motions
 
 }  // namespace
 
@@ -140,7 +140,7 @@ Eigen::MatrixXd MovingSurface::rigid_motions(const CurvedMesh& mesh) const {
     return out;
 }
 
-// (r, v) of these motions r: momentum and angular momentum of a velocity v, but for the density.
+// (r, v) of these motions r: momentum and angular momentum of a velocity v, except for the density.
 Eigen::MatrixXd MovingSurface::momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const {
     const Eigen::SparseMatrix<double> mass = mass_matrix(space_, mesh);
     const int n = nodes();
@@ -164,8 +164,8 @@ Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau
     return now.size() == 0 ? now : std::exp(-law_.friction / law_.inertia * tau) * now;
 }
 
-// Nothing but friction changes momentum and angular momentum, but the bending force of a mesh has a small resultant,
-// which would move a surface at rest faster and faster: a rigid motion cancels that. It changes no shape.
+// Only friction changes momentum and angular momentum, but the discrete bending force has a small resultant, which
+// would accelerate a surface at rest: a rigid motion cancels it without a change of shape.
 void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
     if (kept.size() == 0) return;
     const CurvedMesh m = mesh(to.X);
@@ -185,7 +185,7 @@ bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f
     return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
 }
 
-// Of what is kept; zero where nothing is.
+// Of the conserved quantities; zero if there are none.
 Extent MovingSurface::lack(const CurvedMesh& mesh) const {
     const Extent now = extent(space_, mesh);
     return {control_.area ? *control_.area - now.area : 0, control_.volume ? *control_.volume - now.volume : 0};

@@ -1,4 +1,4 @@
-// The generalised alpha method, which hardly damps waves that its steps follow.
+// The generalised alpha method, which hardly damps waves that its steps resolve.
 #include <cmath>
 
 #include "surface3d/motion/schemes/alpha_numbers.hpp"
@@ -8,7 +8,7 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr double fastest_waves = 0.9;    // the factor by which a short step damps them
-constexpr double miss_relaxation = 0.5;  // of what steps are expected to miss of area and volume, towards the last miss
+constexpr double miss_relaxation = 0.5;  // of the expected defect of area and volume in a step, towards the last one
 
 // Pressure and the multiplier of the volume at the time where a step was solved.
 struct Multipliers {
@@ -21,9 +21,9 @@ struct AlphaMemory : ListedMemory<AlphaMemory> {
     PastState past;
     VectorField X_rate;  // the rates that are carried on
     Eigen::VectorXd u_rate;
-    double lag = 0;  // they are those of so much before the time of the state
+    double lag = 0;  // by how much their time precedes that of the state
     Multipliers solved;
-    Extent missed;  // what the linear system of a step is expected to miss of area and volume
+    Extent missed;  // expected defect of area and volume after the linear system of a step
 
     template <class Fields, class Own>
     static void fields(Fields& f, Own& own, const MotionState& state) {
@@ -65,7 +65,7 @@ private:
     MotionStep next_step(const MotionState& from, const AlphaMemory& memory, double tau) {
         const AlphaNumbers a = alpha_numbers(tau, memory.lag, wave_factor(from, tau));
         const OneStage stage{a.level, a.te, from.X + a.kept * memory.X_rate, from.u + a.kept * memory.u_rate, a.error};
-        const double again = std::pow(tau / from.step, 3);  // what a step misses is of third order in it
+        const double again = std::pow(tau / from.step, 3);  // the defect of a step is of third order
         const Extent missed{again * memory.missed.area, again * memory.missed.volume};
         const StageSolution solved = solve(from, &memory.past, stage, tau, missed);
 
@@ -88,9 +88,9 @@ private:
         return std::move(done.step);
     }
 
-    // A wave of bending, of no tangential flow but what its stretching takes, is damped by 2 viscosity k^2/inertia, k
-    // the curvature across it, and by half of the friction. So this is what a step may damp the fastest waves by, in
-    // addition: long steps, which do not follow them, need it.
+    // A bending wave, with only the tangential flow that inextensibility requires, is damped by 2 viscosity
+    // k^2/inertia, k the curvature across it, and by half of the friction. A step may damp the fastest waves by this
+    // much in addition: long steps, which do not resolve them, need it.
     double wave_factor(const MotionState& from, double tau) {
         const SurfaceLaw& law = surface().law();
         if (law.inertia == 0) return 0;
