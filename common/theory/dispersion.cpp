@@ -122,7 +122,7 @@ Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m) {
     m = std::abs(m);
     const double R = tube.radius, Q = squared_wave_number(tube, q, m), G = stiffness(tube, m)(q);
     if (!law.inextensible) return {{-G}};
-    // A radius, or a place, that is kept.
+    // The radius (m = 0) or the position (m = 1), which are conserved.
     const bool rigid = q == 0 && m < 2;
     if (law.inertia == 0) return {{rigid || G == 0 ? 0.0 : -mobility(tube, law, q, m) * G}};
     // theory.md (5.12), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
@@ -138,7 +138,7 @@ Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m) {
 Growth growth(const UniformSphere& sphere, const MotionLaw& law, int l) {
     const double R = sphere.radius, Lam = l * (l + 1.0), L = Lam - 2, G = stiffness(sphere, l);
     if (!law.inextensible) return {{-G}};
-    if (l < 2) return {{0.0}};  // its size, which is kept, and its place
+    if (l < 2) return {{0.0}};  // size and position, which are conserved
     const double drag = law.friction * (Lam + 4) + 4 * law.viscosity * L / (R * R);
     if (law.inertia == 0) return {{-Lam * G / drag}};
     return {quadratic_roots(Lam + 4, drag, Lam * G)};
@@ -157,7 +157,7 @@ bool ill_posed_around(const UniformTube& tube) {
 
 std::vector<Band> growing_bands(const UniformTube& tube, int m) {
     const Stiffness G = stiffness(tube, m);
-    // The places in y = q^2 > 0 where G changes its sign.
+    // The zeros of G in y = q^2 > 0 at which it changes sign.
     std::vector<double> changes;
     if (G.q4 != 0) {
         const double sign = std::copysign(1.0, G.q4);
@@ -191,7 +191,7 @@ std::optional<FastestWave> fastest_wave(const UniformTube& tube, const MotionLaw
             if (rate(band.from + i * step) > rate(band.from + top * step)) top = i;
         double low = band.from + std::max(top - 1, 0) * step, high = band.from + std::min(top + 1, samples) * step;
         const double golden = (std::sqrt(5.0) - 1) / 2;
-        while (high - low > 1e-9 * band.to) {  // a maximum is flat: no narrower than that
+        while (high - low > 1e-9 * band.to) {  // rounding hides a maximum within less
             const double a = high - golden * (high - low), b = low + golden * (high - low);
             if (rate(a) >= rate(b))
                 high = b;

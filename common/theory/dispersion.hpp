@@ -53,7 +53,7 @@ struct Growth {
 };
 Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m);
 Growth growth(const UniformSphere& sphere, const MotionLaw& law, int l);
-// Of a sphere's tangential swirls, which leave its shape alone, of a law with inertia.
+// The rate of tangential swirls on a sphere, which do not change its shape, for a law with inertia.
 double toroidal_rate(const UniformSphere& sphere, const MotionLaw& law, int l);
 
 // M of theory.md (5.16), (5.18): laws without inertia move as a' = -M G a. With inertia, of a''.
@@ -70,7 +70,7 @@ struct Band {
 };
 std::vector<Band> growing_bands(const UniformTube& tube, int m);
 
-// The fastest growing wave of this m, over all q >= 0. Nothing if none grows, or if there is no fastest one (ill-posed,
+// The fastest growing wave of this m, over all q >= 0. Empty if none grows, or if there is no fastest one (ill-posed,
 // or infinite rates).
 struct FastestWave {
     double q = 0, rate = 0;
@@ -78,7 +78,7 @@ struct FastestWave {
 std::optional<FastestWave> fastest_wave(const UniformTube& tube, const MotionLaw& law, int m);
 
 // The fastest growing wave with m = 0 ... last of those that fit a length, q = 2 pi n/length, rigid motions and the
-// change of radius left out. Nothing if none grows, or as above.
+// change of radius left out. Empty if none grows, or as above.
 struct FittingWave {
     int n = 0, m = 0;
     double q = 0, rate = 0;
@@ -86,7 +86,7 @@ struct FittingWave {
 std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const MotionLaw& law, double length, int last);
 
 // Where waves of one m begin to grow as the tension changes: from `lowest` to `highest` none does. `q_...` is the wave
-// number that is neutral there, 0 for long waves. Nothing if some wave grows at any tension.
+// number that is neutral there, 0 for long waves. Empty if some wave grows at every tension.
 struct StableTensions {
     double lowest = -std::numeric_limits<double>::infinity(), highest = std::numeric_limits<double>::infinity();
     double q_lowest = 0, q_highest = 0;
@@ -95,7 +95,7 @@ std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m);
 // Of m = 0 ... last together.
 std::optional<StableTensions> common_stable_tensions(const UniformTube& tube, int last);
 
-// The f_KK (2 k42) above which no wave of m = 0 grows, all else kept. Nothing where long waves grow whatever it is.
+// The f_KK (2 k42) above which no wave of m = 0 grows, all else fixed. Empty if long waves grow for every f_KK.
 std::optional<double> least_f_KK(const UniformTube& tube);
 
 }  // namespace tubule::theory

@@ -12,7 +12,7 @@ namespace tubule::theory {
 namespace {
 
 constexpr int fewest = 6, most_points = 200;
-constexpr double rounding = 1e-9;  // relative error bars below that are no better than this
+constexpr double rounding = 1e-9;  // relative error bars below this count as equal
 
 struct Point {
     double t, log_a;
@@ -93,7 +93,7 @@ GrowthFit fit_growth(const std::vector<double>& times, const std::vector<double>
             stretches.push_back({fitted(points, from, to), change});
             smallest = std::min(smallest, stretches.back().fit.error);
         }
-    if (stretches.empty()) return fitted(points, 0, n);  // to and fro: no stretch goes as far
+    if (stretches.empty()) return fitted(points, 0, n);  // log a oscillates: no stretch changes that much
     const Stretch* best = nullptr;
     for (const Stretch& stretch : stretches)
         if (stretch.fit.error <= std::max(2 * smallest, rounding * std::abs(stretch.fit.rate)) &&

@@ -6,13 +6,13 @@
 namespace tubule::theory {
 
 // The stretch of the run where log a is straightest. Of all stretches of at least 6 points over which log a changes by
-// at least 1, or by a third of its whole range if that is less, those with the smallest error bar are taken, up to
-// twice the smallest, and of these the one over which log a changes most. At most 200 points are looked at, evenly
-// taken from all.
+// at least 1, or by a third of its whole range if that is less, those with an error bar up to twice the smallest one
+// are candidates; of these, the one over which log a changes most is chosen. At most 200 points are used, evenly
+// spaced by index.
 struct GrowthFit {
     double rate = 0;
-    // Standard error of the slope, plus twice the range of the slopes of the stretch's three thirds
-    // (once would be less than what a slope that peaks within the stretch loses: .44 for .6).
+    // Standard error of the slope, plus twice the range of the slopes of the stretch's three thirds. (Once that range
+    // underestimates the error where the slope peaks within the stretch: 0.44 instead of 0.6.)
     double error = 0;
     double from = 0, to = 0;  // times
     int points = 0;           // in it

@@ -32,7 +32,7 @@ struct Motion {
     UniformTube tube;
     double length;
     std::vector<Wave> waves;
-    std::vector<Coefficients> of;  // but for a radius that drifts
+    std::vector<Coefficients> of;  // unless the radius drifts
     bool drifts, tension_is_outcome;
 
     bool swings() const { return law.inertia != 0; }
@@ -219,8 +219,8 @@ std::optional<double> mean_rate(const Case& c, int n, int m, double from, double
     const auto at = ours - waves.begin();
     const auto states = waves_in_time(start->tube, law, start->length, waves, {from, to});
     const double rate = std::log(std::abs(states[1].amplitudes[at] / states[0].amplitudes[at])) / (to - from);
-    return std::isfinite(rate) ? std::optional(rate) : std::nullopt;  // else it has decayed below all numbers
-} catch (const std::invalid_argument&) {  // a wave without meaning, such as one that is infinitely fast
+    return std::isfinite(rate) ? std::optional(rate) : std::nullopt;  // else it has decayed below the smallest number
+} catch (const std::invalid_argument&) {  // an invalid wave, for example an infinitely fast one
     return std::nullopt;
 }
 

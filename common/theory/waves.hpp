@@ -23,10 +23,10 @@ struct WaveState {
 // The waves at each of `times` (ascending, from 0), to about 1e-10 of the largest amplitude.
 //   Gradient flow: the radius drifts, theory.md (5.3), unless the law keeps the volume; amplitudes are multiplied by
 //     exp INT s dt. The tension is that of the tube, constant.
-//   Inextensible membranes: the radius stays. Volume fixed: the tension is what keeps SUM Z a^2 constant, theory.md
-//     (5.14), and is given back; that of the tube does not matter. Volume free: tension_of_free_volume, constant.
+//   Inextensible membranes: the radius stays. Volume fixed: the tension keeps SUM Z a^2 constant, theory.md
+//     (5.14), and is returned; the tube's own tension is ignored. Volume free: tension_of_free_volume, constant.
 //   With inertia and m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
-// The equations leave out squares of amplitudes. Throws std::invalid_argument for waves without meaning (n = m = 0,
+// The equations neglect squares of amplitudes. Throws std::invalid_argument for invalid waves (n = m = 0,
 // repeated, all without amplitude, infinitely fast), SolveError if the radius vanishes or the integrator fails.
 std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& law, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times);
@@ -42,10 +42,10 @@ struct TubeStart {
     double length = 1;
     std::vector<Wave> waves;  // each once: those of a case that differ by their phase alone are added
 };
-std::optional<TubeStart> tube_start(const Case& c);  // nothing for other cases
+std::optional<TubeStart> tube_start(const Case& c);  // empty for other cases
 
-// The mean rate of a wave between two times by linear theory of the case: log(a(to)/a(from))/(to - from). Nothing where
-// that is not known: the volume is kept, so that all waves decide together, and the case lacks this one.
+// The mean rate of a wave between two times by linear theory of the case: log(a(to)/a(from))/(to - from). Empty if
+// unknown: at fixed volume all waves are coupled, and the case does not contain this one.
 std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to);
 
 }  // namespace tubule::theory

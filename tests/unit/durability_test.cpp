@@ -306,7 +306,7 @@ Child in_child(const std::function<void(const std::function<void()>&)>& work,
     return child;
 }
 
-// The result can be gone on with, if it has something to go on from.
+// The result can be resumed if it has a state to resume from.
 void expect_resumable(const fs::path& file, Model model) {
     if (!model.restart()) {
         EXPECT_THROW(ResultWriter::resume(file), std::runtime_error);

@@ -30,8 +30,8 @@ public:
     Peak largest() const;  // of all until the last rates
     // When one of them first became so large.
     std::optional<Peak> reached(double amplitude) const;
-    // Of the logarithm of the largest amplitude of this m at the last rates: what the curvature of s_m, by
-    // differences, makes of trapezoids.
+    // Error of the logarithm of the largest amplitude of this m at the last rates: that of the trapezoidal rule, from
+    // second differences of s_m.
     double error(int m) const { return errors_.empty() ? 0 : errors_[m - 1]; }
 
 private:

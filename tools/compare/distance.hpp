@@ -16,7 +16,7 @@ struct RigidMotion {
     RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
 };
 
-// Points of one surface have their nearest points on the other one; both ways count.
+// Distances of the points of each surface from the other surface, in both directions.
 struct Distance {
     double hausdorff = 0;                             // the largest distance of such a point
     double l2 = 0;                                    // root of the mean of both mean squares
@@ -25,14 +25,14 @@ struct Distance {
 };
 
 // Between `a` and `b` after `motion`. Nearest points are exact to rounding. The mean squares are by quadrature on every
-// element; the largest distance is that of its points and nodes, the 32 triangles that seem farthest being searched for
-// a larger one between. Throws std::invalid_argument if one is closed and the other one a tube, or their periods
+// element; the largest distance is over its points and nodes; in the 32 farthest triangles a larger one is
+// searched for in between. Throws std::invalid_argument if one is closed and the other one a tube, or their periods
 // differ.
 Distance distance(const Surface& a, const Surface& b, const RigidMotion& motion = {});
 
-// The motion of `b` for which the mean square of the distances from `a` to it is least, as far as a search from many
-// beginnings finds it: of closed surfaces translations and rotations, of tubes translations and rotations about z, of
-// two surfaces of revolution what keeps the axis. Throws as distance does.
+// The motion of `b` that minimises the mean square distance of `a` from it, as far as a search from many initial
+// guesses finds it: translations and rotations of closed surfaces, translations and rotations about z of tubes, motions
+// that preserve the axis for two surfaces of revolution. Throws as distance does.
 RigidMotion alignment(const Surface& a, const Surface& b);
 
 }  // namespace tubule::compare

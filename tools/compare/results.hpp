@@ -18,7 +18,7 @@ struct Outcome {
 };
 Outcome outcome(const Result& result);
 
-// E_ref as the run states it; 0 if it does not.
+// E_ref as stated by the run; 0 if it is not.
 double reference_energy(const Result& result);
 
 // The estimated error of the energy, relative to E_ref, as the run states it.

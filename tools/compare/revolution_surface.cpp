@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 // As for triangles; of the chord.
 constexpr double flat_enough = 0.05;
 constexpr int deepest = 8;
-// Chords are off by |X''| (to - from)^2 / 8; the second derivative is looked at in a few points, hence the factor.
+// The error of a chord is |X''| (to - from)^2 / 8; the second derivative is sampled at a few points, hence the factor.
 constexpr int looks = 4;
 constexpr double between_looks = 1.5;
 
@@ -39,7 +39,7 @@ std::array<S, 2> curve_at(const ProfileCurve& curve, const S& s) {
 
 struct RevolutionSurface::Nearest {
     double square = std::numeric_limits<double>::infinity(), s = 0;
-    Vector2d from;  // the point looked from, as the image sees it
+    Vector2d from;  // the query point, as the periodic image sees it
 };
 
 RevolutionSurface::RevolutionSurface(Revolution tube) : period_(tube.length) {
@@ -65,7 +65,7 @@ RevolutionSurface::RevolutionSurface(ProfileCurve curve) : period_(curve.length)
 
 RevolutionSurface::CurvePoint RevolutionSurface::evaluate(double s) const {
     using Second = Jet<double, 1, 2>;
-    // At the upper end of a period a spline begins again, at the height 0: stay below it.
+    // At the upper end of a period the spline starts again at height 0: stay below it.
     if (std::holds_alternative<Revolution>(profile_)) s = std::min(s, std::nextafter(1.0, 0.0));
     const auto [r, z] =
         std::visit([&](const auto& profile) { return curve_at(profile, Second::variable(s, 0)); }, profile_);

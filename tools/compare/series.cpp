@@ -11,9 +11,9 @@ namespace tubule::compare {
 namespace {
 
 constexpr double same_time = 1e-12;  // of the later one
-constexpr double halved = 4;         // by this at least the error falls if rows are half as far apart, at the ends, too
+constexpr double halved = 4;         // least factor by which the error falls if rows are half as far apart
 
-// What a run computes; series of other versions count as that.
+// Series of other versions count as quantities.
 SeriesUse use_of(const std::string& name) {
     const SeriesEntry* entry = find_series(name);
     return entry ? entry->use : SeriesUse::quantity;
@@ -126,7 +126,7 @@ Trace::Trace(const std::vector<double>& times, const std::vector<double>& values
     if (n > 2) left_out_[0] = left_out_[1], left_out_[n - 1] = left_out_[n - 2];
 }
 
-// How far off its neighbours would have row i; slopes that are not known come from them, too.
+// The error at row i of the interpolation without this row; unknown slopes are computed without it, too.
 double Trace::off_without(std::size_t i, bool slopes_known) const {
     if (slopes_known)
         return std::abs(

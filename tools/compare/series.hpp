@@ -22,7 +22,7 @@ public:
     double operator()(double t) const;  // begin() <= t <= end()
     bool has_row(double t) const;
     double slope(std::size_t row) const { return slope_[row]; }
-    // Of the interpolation at t, estimated: a quarter of what the neighbouring rows are off by when they are left out.
+    // Estimated error of the interpolation at t: a quarter of that at the neighbouring rows when each is left out.
     double error(double t) const;
 
 private:
@@ -42,15 +42,15 @@ struct SeriesDifference {
     std::vector<double> times, a, b;
     std::vector<double> unsure;  // estimated error of interpolation; 0 where both have a row
 
-    // The largest |A - B| - unsure, what interpolation does not explain, and when; that of times at which both have
-    // rows, and how many those are; the last one; the largest `unsure`.
+    // The largest |A - B| - unsure, which interpolation does not explain, and its time; the largest |A - B| at times at
+    // which both have rows, and the number of these; the last one; the largest `unsure`.
     double largest = 0, when = 0, largest_in_rows = 0;
     std::size_t rows_in_both = 0;
     double at_end = 0, largest_unsure = 0;
 };
 
-// What both results have of what a run computes (not of how it does), and "rate", d(E + E_kinetic)/dt: minus the
-// dissipation where it is known. Empty if they have no time in common.
+// The series of computed quantities that both results have (no effort, no diagnostics), and "rate", d(E +
+// E_kinetic)/dt: minus the dissipation where it is known. Empty if they have no time in common.
 std::vector<SeriesDifference> compare_series(const Result& a, const Result& b);
 
 // The largest relative change of a series since its first row; 0 if there is none.

@@ -19,8 +19,8 @@ struct Place {
     Eigen::Vector2d at = Eigen::Vector2d::Zero();
 };
 
-// A point of quadrature (weight: area) or, with weight 0, one more to look at; `reach` is how far, in coordinates, the
-// next samples are.
+// A quadrature point (weight: area) or, with weight 0, an additional sample; `reach` is the distance, in coordinates,
+// of the next samples.
 struct Sample {
     Place place;
     Eigen::Vector2d reach;
@@ -34,16 +34,16 @@ public:
     virtual ~Surface() = default;
 
     virtual double period() const = 0;  // in z; 0: closed
-    // A length over which the distance from a smooth surface may go up and down: of an element. 0: axisymmetric about
-    // z.
+    // The length over which the distance from a smooth surface may oscillate: that of an element. 0: axisymmetric
+    // about z.
     virtual double grain() const = 0;
 
     virtual Foot foot(const Eigen::Vector3d& x) const = 0;
     virtual Eigen::Vector3d at(const Place& place) const = 0;
-    virtual void confine(Place& place) const = 0;  // moves it to where the piece ends if it is beyond
+    virtual void confine(Place& place) const = 0;  // moves it back to the boundary of its piece if it is outside
 
-    // All over the surface, closely enough to see its own grain and this one, of another surface; where both are
-    // axisymmetric, on one meridian that stands for all.
+    // Over the whole surface, dense enough to resolve its own grain and this one, of another surface; where both are
+    // axisymmetric, on one meridian that represents all.
     virtual std::vector<Sample> samples(double grain) const = 0;
 };
 

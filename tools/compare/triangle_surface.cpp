@@ -14,8 +14,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Parts are divided until they bulge by no more than this part of their longest edge, and no deeper: Newton's method
-// then begins near enough.
+// Parts are divided until their bulge is at most this fraction of their longest edge, up to this depth: close enough
+// for Newton's method to converge.
 constexpr double flat_enough = 0.05;
 constexpr int deepest = 4;
 
@@ -106,7 +106,7 @@ struct TriangleSurface::Nearest {
     double square = std::numeric_limits<double>::infinity();
     int cell = -1;
     Vector2d at;
-    Vector3d from;  // the point looked from, as the image sees it
+    Vector3d from;  // the query point, as the periodic image sees it
 
     void consider(int c, const Vector2d& place, const Vector3d& point, const Vector3d& x) {
         const double away = (point - x).squaredNorm();
@@ -197,7 +197,7 @@ void TriangleSurface::look_at(const Part& part, const Vector3d& x, Nearest& near
     look_inside(part.cell, b[0] * part.corner[0] + b[1] * part.corner[1] + b[2] * part.corner[2], x, nearest);
 }
 
-// Newton's method on the polynomials, which go on beyond the triangle, then along the edges that it has crossed.
+// Newton's method on the polynomials, which continue beyond the triangle, then along the edges that it has crossed.
 void TriangleSurface::look_inside(int cell, Vector2d at, const Vector3d& x, Nearest& nearest) const {
     constexpr int most = 20;
     constexpr double longest = 0.5, done = 1e-9, margin = 0.5;

@@ -14,8 +14,8 @@ namespace tubule::compare {
 inline constexpr int max_coefficients = 15;
 using Coefficients = std::array<Eigen::Vector3d, max_coefficients>;
 
-// The nearest point is exact up to rounding: boxes of Bernstein coefficients, which hold the curved triangles, tell the
-// few that can be nearest, Newton's method finds the point on each and on its edges. A Place is a triangle and (xi,
+// The nearest point is exact up to rounding: boxes of Bernstein coefficients, which contain the curved triangles,
+// select the few candidates; Newton's method finds the point on each and on its edges. A Place is a triangle and (xi,
 // eta).
 class TriangleSurface final : public Surface {
 public:

@@ -19,7 +19,7 @@ namespace {
 constexpr int most_waves = 20;         // along a tube: shorter ones are not added
 constexpr int more_n = 2, most_m = 3;  // waves that are looked for beside those of the start
 constexpr int frames = 20;             // of the first part of the run, and of the rest
-constexpr double rounding = 0.01;      // of the noise: what is left of waves below says nothing of their rates
+constexpr double rounding = 0.01;      // fraction of the noise below which amplitudes say nothing about rates
 constexpr double e_folds = 6;          // from the noise to what is large
 
 constexpr double rough = 0.05;          // accuracy of the energy: few triangles are not worth finer steps

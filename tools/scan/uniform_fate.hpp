@@ -1,5 +1,5 @@
-// When a tube in gradient flow has become so uniform that its fate is known: the closed dispersion relation,
-// theory.md (5.6), says that all its waves only decay from here on, whatever the radius does on its way to rest.
+// Detects when a tube in gradient flow is so uniform that its outcome is known: by the closed dispersion relation,
+// theory.md (5.6), all its waves decay from now on, for every radius on the way to rest.
 #pragma once
 
 #include <optional>
@@ -18,8 +18,8 @@ public:
     // Empty where the relation does not apply: other models and shapes, a volume that is kept, an f with f_HK.
     static std::optional<UniformFate> of(const Case& c);
 
-    // Whether the waves are small, in amplitude and in energy, and each that the symmetry of the start allows loses
-    // against the radius, by a margin, at every radius from here to the one where the tube rests.
+    // Whether the waves are small, in amplitude and in energy, and each that the symmetry of the start allows decays
+    // relative to the radius, by a margin, at every radius from here to the one where the tube rests.
     bool decided(const TubeState& s) const;
 
 private:
