@@ -157,7 +157,7 @@ class Adding(unittest.TestCase):
         moving = case("axisym", "kind = 'tube'\nradius = 1.0\nlength = 2.0", more=MOVES)
         self.assertIn('"went-out"', self.refusal(moving + "[expect]\nstop = 'cold'\n"))
         result = self.result(moving)
-        with h5py.File(result, "r+") as file:  # as if it had ended so
+        with h5py.File(result, "r+") as file:  # as if it had stopped for this reason
             file["about"].attrs["stop"] = "went-out"
         self.assertIn("went-out", self.tubule("show", result))
         self.assertIn("went-out", self.picture(result))

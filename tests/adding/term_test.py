@@ -43,7 +43,7 @@ end = 1e-3
 
 
 def expected_start():
-    """Energies k20 INT (H-H0)^2 dS, k22 INT H^2 K dS of the perturbed tube, and E_ref of the asked accuracy.
+    """Energies k20 INT (H-H0)^2 dS, k22 INT H^2 K dS of the perturbed tube, and E_ref of the requested accuracy.
 
     Geometry of a graph r(z), theory.md (4.1), (4.2): H = (r''/g^2 - 1/r)/g, K = -r''/(r g^4), dS = 2 pi r g dz.
     The trapezoidal rule is exact to rounding for a smooth periodic integrand.
@@ -119,7 +119,7 @@ class FourTerms(unittest.TestCase):
         self.assertEqual(series["time"][0], 0)
         self.assertAlmostEqual(series["energy_22"][0], e22, delta=ACCURACY * reference)
         self.assertAlmostEqual(series["energy_20"][0], e20, delta=ACCURACY * reference)
-        self.assertGreater(abs(e22), 1e-2 * reference)  # so that the line above it says something
+        self.assertGreater(abs(e22), 1e-2 * reference)  # so that the comparison above is meaningful
         terms = sum(series[name] for name in ("energy_20", "energy_40", "energy_42", "energy_22"))
         np.testing.assert_allclose(terms, series["energy"], rtol=0, atol=1e-12 * reference)
         self.assertLess(series["energy"][-1], series["energy"][0])

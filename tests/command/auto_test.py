@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""tier = "auto": an axisymmetric run that goes on in three dimensions, in one file; disturbed and resumed.
+"""tier = "auto": an axisymmetric run that switches to three dimensions, in one file; interrupted and resumed.
 
 auto_test.py TUBULE CASES. A straight tube whose volume is free buckles: the wave n = 1, m = 1 grows at the rate of the
 dispersion relation (`tubule stability`), from the noise to the amplitude of the switch, and on.
@@ -27,7 +27,7 @@ E_REF = (1 + 2.5**2) * 2 * math.pi * LENGTH
 
 
 class Buckling(ProgramTest):
-    whole = None  # the file of the undisturbed run
+    whole = None  # the file of the uninterrupted run
 
     def setUp(self):
         super().setUp()
@@ -42,7 +42,7 @@ class Buckling(ProgramTest):
         end = about(self.result)
         self.assertEqual(end["choice"], "axisym, then surface3d")
         self.assertEqual(end["switch_mode"], 1)
-        # The rates are asked for to 1e-2; those of a straight tube come out to 1e-8 on any mesh.
+        # The requested accuracy of the rates is 1e-2; on a straight tube any mesh gives them to 1e-8.
         self.assertAlmostEqual(end["switch_time"], SWITCH, delta=1e-4 * SWITCH)
         self.assertAlmostEqual(end["switch_amplitude"], 1e-2, delta=1e-6)
         for words in self.printed:
@@ -57,10 +57,10 @@ class Buckling(ProgramTest):
         self.assertAlmostEqual(times[first - 1], SWITCH, delta=1e-4 * SWITCH)
         self.assertEqual(times[first - 1], times[first])
         self.assertTrue((np.diff(rows["wall_seconds"]) >= 0).all())
-        # The energy is the same but for the wave (second order: its square times E_ref at most) and both errors.
+        # The energies agree except for the wave (second order: at most its square times E_ref) and both errors.
         jump = abs(rows["energy"][first] - rows["energy"][first - 1])
         self.assertLess(jump, (1e-4 + 1e-3) * E_REF)
-        # The wave is there, in the normal direction, with the amplitude asked for.
+        # The wave is there, in the normal direction, with the requested amplitude.
         self.assertAlmostEqual(rows["r_max"][first], 1.01, delta=2e-4)
         self.assertAlmostEqual(rows["r_max"][first - 1], 1, delta=1e-9)
 
@@ -68,7 +68,8 @@ class Buckling(ProgramTest):
         out, _ = self.tubule("stability", self.result, "--fit", "1,1", "--csv")
         times, amplitudes = np.array([list(map(float, row)) for row in list(csv.reader(io.StringIO(out)))[1:]]).T
         self.assertEqual(list(times[1:]), [7.7, 7.8, 7.9, 8.0, 8.1, 8.2])
-        # A standing wave is two that wind the other way, half as high each; their root sum of squares is measured.
+        # A standing wave is the sum of two of half its amplitude, winding in opposite directions; the root of the sum of
+        # their squares is measured.
         self.assertAlmostEqual(amplitudes[0], 1e-2 / math.sqrt(2), delta=1e-4)
         # Rates fall with the square of the amplitude, which is .015 at the end.
         rate = math.log(amplitudes[-1] / amplitudes[0]) / (times[-1] - times[0])

@@ -55,7 +55,7 @@ class Charts(ProgramTest):
 
 class RealRuns(Charts):
     def test_a_chart_of_accuracies(self):
-        """Of three accuracies the smallest is the reference; the others keep theirs, as runs promise. Again: no run."""
+        """Of three accuracies the smallest is the reference; the others meet theirs. A second call runs nothing."""
         command = ("chart", self.case, "--vary", "accuracy.energy=1e-2,1e-4,1e-7")
         out, err = self.tubule(*command)
         self.assertEqual(err.count("finished"), 3)
@@ -89,7 +89,7 @@ class RealRuns(Charts):
         self.write("wp.toml", textwrap.dedent(chart_text))
         out, _ = self.tubule("chart", "wp.toml", "-o", "wp.svg", "--quiet")
         rows = self.rows("wp.csv")
-        self.assertEqual([row["series"] for row in rows], ["asked", "asked"])  # the study was not asked for
+        self.assertEqual([row["series"] for row in rows], ["asked", "asked"])  # the study was not requested
         for row, asked in zip(rows, (1e-3, 1e-5)):
             self.assertLess(float(row["error"]), asked)
         self.assertIn("reference: fine.hdf", out)
@@ -133,7 +133,7 @@ class Refusals(Charts):
 
 
 class Outcomes(Charts):
-    """By a program that stands in for ours, whose errors and failures are known."""
+    """With a fake program, whose errors and failures are known."""
 
     def setUp(self):
         super().setUp()
@@ -168,7 +168,7 @@ class Outcomes(Charts):
         self.runner(jobs).run(jobs[:2])
         self.runner(jobs).run(jobs)
         self.assertEqual(sorted(self.ran(), key=int), ["4", "8", "16"])
-        self.runner(jobs[:1]).table.write(jobs[:1])  # fewer are asked for: the others keep their names
+        self.runner(jobs[:1]).table.write(jobs[:1])  # fewer are requested: the others keep their names
         self.assertEqual([row["settings"] for row in self.rows("t.csv")], ["elements=4", "elements=8", "elements=16"])
 
     def test_another_case_is_another_run(self):

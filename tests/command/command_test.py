@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The program `tubule` as its users meet it: exit statuses, messages, files.
+"""The program `tubule` as its users see it: exit statuses, messages, files.
 
 command_test.py TUBULE
 """
@@ -46,7 +46,7 @@ class Run(ProgramTest):
             self.assertEqual(len(file["frames"]), 2)
         changed = series(self.result)["energy_42"][0]
         self.tubule("run", self.case)
-        # k42 is a factor of its term; the meshes of both runs hold the start within the asked accuracy, 1e-6 E_ref.
+        # k42 is a factor of its term; the meshes of both runs hold the start within the requested accuracy, 1e-6 E_ref.
         self.assertAlmostEqual(changed, 4 * series(self.result)["energy_42"][0], delta=2e-4)
 
     def test_several_cases(self):
@@ -133,7 +133,7 @@ class Expect(ProgramTest):
         self.assertRegex(lines[0], r"case.toml: not as expected: energy at the end is .*, expected 100 within 1$")
         self.assertRegex(lines[1], r"energy_42 at t = 0.03 is .*, expected -7 within 0.001$")
         self.assertIn("finished", out)
-        self.tubule("run", self.case)  # only asked for, it counts
+        self.tubule("run", self.case)  # it counts only if requested
 
     def test_wrong_stop(self):
         self.write("case.toml", QUICK + '[expect]\nstop = "pinch-off"\n')

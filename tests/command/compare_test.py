@@ -63,16 +63,16 @@ class Runs(Compare):
         self.fine = self.made("fine", QUICK)
 
     def test_two_accuracies(self):
-        """Each run states its error, and keeps it: they are no further apart than both together."""
+        """Each run meets its stated error: the two differ by no more than the sum of both."""
         found = self.compared(self.coarse, self.fine)
         energy = {entry["name"]: entry for entry in found["series"]}["energy"]
         stated = found["a"]["stated_error"] + found["b"]["stated_error"]
         self.assertLess(energy["largest"] / energy["scale"], stated)
-        self.assertGreater(energy["largest"] / energy["scale"], 1e-9)  # they are two runs
+        self.assertGreater(energy["largest"] / energy["scale"], 1e-9)  # the runs are not identical
         self.assertEqual([frame["time"] for frame in found["frames"]], [0, 0.01, 0.05, 0.2])
         for frame in found["frames"]:
             self.assertLess(frame["l2"], frame["hausdorff"])
-            # r varies by 0.2 and its energy by E_ref = 24.5: shapes agree about as energies do.
+            # r varies by 0.2 and the energy by E_ref = 24.5: shapes agree about as well as energies.
             self.assertLess(frame["hausdorff"], 10 * stated)
 
     def test_at_common_rows_nothing_is_interpolated(self):
@@ -199,7 +199,7 @@ class Shapes(Compare):
         self.assertGreater(self.compared(one, moved)["frames"][0]["hausdorff"], 2)
         (aligned,) = self.compared(one, moved, "--align")["frames"]
         self.assertAlmostEqual(aligned["hausdorff"], 0.1, delta=2e-4)
-        # Only where the centre goes is determined: a sphere fits in any orientation.
+        # Only the motion of the centre is determined: a sphere fits in any orientation.
         np.testing.assert_allclose(aligned["moved"], [-3, 0, 0], atol=1e-4)
 
     def test_a_frame_of_tier_1_and_its_mesh(self):

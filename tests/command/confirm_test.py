@@ -66,7 +66,7 @@ class Confirm(ProgramTest):
         self.assertEqual((flattens["verdict"], flattens["outcome"]), ("symmetry-broken", "asymmetric"))
         self.assertEqual((flattens["n"], flattens["m"]), ("0", "2"))
         self.assertAlmostEqual(float(flattens["fastest_rate_m2"]), flattening_rate(0), delta=1e-6)
-        # Linear theory leaves out squares of the amplitude 0.1; and its tension falls while the wave is used up.
+        # Linear theory neglects squares of the amplitude 0.1, and its tension falls while the wave decays.
         self.assertAlmostEqual(float(flattens["rate"]) / flattening_rate(0), 1, delta=0.15)
         self.assertAlmostEqual(float(flattens["rate"]) / float(flattens["linear_rate"]), 1, delta=0.15)
         # SUM (Q - 1) a^2 is kept, theory.md (5.14): no more than all of it can go from the wave to the ellipse, where
@@ -74,7 +74,7 @@ class Confirm(ProgramTest):
         most = AMPLITUDE * math.sqrt((X - 1) / 3)
         self.assertTrue(0.7 * most < float(flattens["amplitude"]) < 1.1 * most, flattens["amplitude"])
 
-        # Once more: nothing is run again, and words and JSON tell the same.
+        # A second call runs nothing; text and JSON agree.
         before = {path: path.stat().st_mtime_ns for path in (self.folder / "scan_confirm").glob("*.hdf")}
         self.assertEqual(len(before), 2)
         out, _ = self.tubule("confirm", self.scan, *FEW, "--quiet", status=1)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""`tubule equilibrium`: its table, its result, results as starts, what it refuses. Argument: the program."""
+"""`tubule equilibrium`: its table, its result, results as starts, refusals. Argument: the program."""
 import subprocess
 import unittest
 from pathlib import Path

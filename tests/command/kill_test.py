@@ -16,7 +16,7 @@ from program import ACCURACY, E_REF, QUICK, SLOW, ProgramTest, about, series
 
 
 class Kill(ProgramTest):
-    whole = None  # series of the undisturbed run
+    whole = None  # series of the uninterrupted run
 
     def setUp(self):
         super().setUp()
@@ -94,7 +94,7 @@ class Kill(ProgramTest):
         for kill in range(20):
             process = self.start("run", self.case, "--resume", "--quiet")
             self.addCleanup(process.kill)
-            while True:  # until it has got further than the run before; looked at while it stands still
+            while True:  # until it has advanced beyond the previous run; inspected while it is stopped
                 time.sleep(pause.uniform(0.005, 0.03))
                 self.assertIsNone(process.poll(), f"the run ended before kill {kill}")
                 process.send_signal(signal.SIGSTOP)
@@ -173,7 +173,7 @@ output = %s
 
 
 class Surface(ProgramTest):
-    """The same of tier surface3d. All steps are given, so that a resumed run takes those of an undisturbed one."""
+    """The same of tier surface3d. All steps are given, so that a resumed run takes the same ones."""
 
     def setUp(self):
         super().setUp()

@@ -61,7 +61,7 @@ energy = 1e-8
 [equilibrium]
 """
 
-ACCURACY, E_REF = 1e-6, 24.5  # E_ref is printed by the program; tests/axisym holds it against its definition
+ACCURACY, E_REF = 1e-6, 24.5  # E_ref is printed by the program; tests/axisym checks it against its definition
 
 
 def series(result):
@@ -104,7 +104,7 @@ class ProgramTest(unittest.TestCase):
         return out, err
 
     def refused(self, *arguments):
-        """What the program says when it refuses the arguments, which changes no file."""
+        """The message with which the program refuses the arguments; no file may change."""
         before = self.files()
         out, err = self.tubule(*arguments, status=2)
         self.assertEqual(out, "")

@@ -73,7 +73,7 @@ class ScanTest(ProgramTest):
         return self.tubule("scan", *arguments, "-o", self.result, status=status)
 
     def assert_same_points(self, one, other):
-        """All but the times that the points took."""
+        """Everything except the times that the points took."""
         for name, data in one.items():
             if name.endswith("_seconds"):
                 continue
@@ -132,7 +132,7 @@ class Outcomes(ScanTest):
         self.assertIn("time-limit", self.tubule("show", self.result, "--csv")[0])
 
     def test_surfaces(self):
-        """Tier 2 by the same way; two threads compute what one computes."""
+        """The same for tier 2; two threads give the result of one."""
         surface = """tier = "surface3d"
 [energy]
 k20 = 1.0
@@ -218,7 +218,7 @@ class Boundary(ScanTest):
         low, high = crossings[edges.index([0, 2])]  # k42 = 0, amplitudes 0.3 and 0.4
         self.assertAlmostEqual(high - low, 0.1 / 2**8, places=12)
         self.assertTrue(low < 0.38104 and high > 0.38103, (low, high))
-        # All that was found is known to whoever resumes.
+        # A resumed scan knows all results.
         out, _ = self.tubule("scan", *asked, "--boundary", "pinched", "--refine", "8", "--set", "accuracy.energy=1e-4",
                              "--resume", "-o", self.result)
         self.assertIn("nothing to resume", out)
@@ -357,7 +357,7 @@ class Kill(ScanTest):
         self.assertEqual(about(self.result)["stop"], "finished")
 
     def test_a_boundary_goes_on(self):
-        """What is followed after a kill is what would have been followed without."""
+        """After a kill the scan follows the same boundary as without."""
         fine = ("--over", f"{AMPLITUDE}=0.2:0.5:16", "--over", f"{K42}=1e-5:1e-2:16:log", "--boundary", "outcome")
         self.scan("case.toml", *fine)
         whole = points(self.result)

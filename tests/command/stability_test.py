@@ -121,7 +121,7 @@ class Stability(ProgramTest):
     def test_models(self):
         fluid = self.write("fluid.toml", FLUID)
         one = self.json(fluid)["models"][0]
-        # A single wave is frozen by area and volume: that decides the tension: theory.md (5.15).
+        # Area and volume fix the amplitude of a single wave, which determines the tension: theory.md (5.15).
         frozen = next(w for w in one["waves"] if (w["m"], w["n"]) == (0, 1))
         self.assertAlmostEqual(frozen["rate"], 0, delta=1e-9)
         self.assertEqual(len(next(w for w in one["waves"] if (w["m"], w["n"]) == (1, 1))["roots"]), 3)
@@ -163,7 +163,7 @@ class Stability(ProgramTest):
         case = self.write("cell.toml", CAPSULE)
         out, _ = self.tubule("stability", case)
         self.assertIn("at rest", out)
-        # As `tubule equilibrium` has them.
+        # As in `tubule equilibrium`.
         self.tubule("equilibrium", "--quiet", case, "--set", "equilibrium.modes=2")
         known = series(self.folder / "cell.hdf")
         for source in (case, self.folder / "cell.hdf"):

@@ -131,7 +131,7 @@ class Structure(unittest.TestCase):
 
 
 class Outline(unittest.TestCase):
-    """The reader of C++ sees what is there: else the tests above would pass for nothing."""
+    """The reader of C++ finds functions and classes; otherwise the tests above would pass trivially."""
 
     def test_functions(self):
         text = '\n'.join(['namespace a {', 'struct B {', '    B() : x{1}, y(2) {', '        f("}");', '    }',

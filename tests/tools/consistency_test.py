@@ -56,7 +56,7 @@ class Rows(unittest.TestCase):
         slow = {100: 1.5e-3, 400: 1e-3}  # order log2(1.5) = .585
         self.assertEqual(row(slow).complaints(), ["falls with order 0.58 only"])
         self.assertEqual(row(slow, must_fall=False).complaints(), [])
-        self.assertEqual(row(slow, error=4e-4).complaints(), [])  # the reference is no better
+        self.assertEqual(row(slow, error=4e-4).complaints(), [])  # the reference is not more accurate
         self.assertEqual(row(slow, error=3e-4).complaints(), ["falls with order 0.58 only"])
 
     def test_tier_1_alone(self):
@@ -106,7 +106,7 @@ class Suite(unittest.TestCase):
         return status, out.getvalue(), err.getvalue()
 
     def test_a_scene(self):
-        """The cheapest one, as it is; and with bounds that it does not meet."""
+        """The cheapest scene, unchanged, and with bounds that it violates."""
         (scene,) = [scene for scene in SCENES if scene.name == "spheroid-at-rest"]
         status, out, err = self.called("--only", scene.name)
         self.assertEqual((status, err), (0, ""))

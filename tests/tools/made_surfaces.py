@@ -1,4 +1,4 @@
-"""What the tests of surfaces in files share."""
+"""Shared by the tests of surfaces in files."""
 import subprocess
 import tempfile
 import unittest

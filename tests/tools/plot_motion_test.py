@@ -303,7 +303,7 @@ end = 0.01
 
 
 class Render(InFolder):
-    """tools/render without ParaView, and what it would ask of one."""
+    """tools/render without ParaView, and the commands it would pass to it."""
 
     def render(self, *arguments):
         command = [sys.executable, "-B", PLOT.parent / "render", *arguments]
@@ -360,12 +360,12 @@ class Render(InFolder):
     def test_failures_of_paraview(self):
         file = write(self.folder / "a.hdf", times=(0, 1))
         (self.folder / "a").mkdir()
-        (self.folder / "a/000000.png").touch()  # of an earlier run: no sign of success
+        (self.folder / "a/000000.png").touch()  # from an earlier run: not a success
         self.fake("pvpython", "exit 0")
         done = self.render(file)
         self.assertEqual(done.returncode, 1)
         self.assertIn("xvfb", done.stderr)
-        self.fake("pvpython", "exit 2")  # it has said why
+        self.fake("pvpython", "exit 2")  # it has reported the reason
         done = self.render(file)
         self.assertEqual((done.returncode, done.stderr), (2, ""))
 

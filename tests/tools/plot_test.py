@@ -338,7 +338,7 @@ class Pictures(InFolder):
 
 
 class Curves(InFolder):
-    """Profiles that are no graphs, or flow."""
+    """Profiles that are not graphs, or that flow."""
 
     def test_outside_of_a_sphere_is_farther_from_its_centre(self):
         section = curves.Section(results.Frame(0.0, **ball(0.0, 401)), 2.0)  # radius 2 inches
