@@ -88,10 +88,10 @@ class Kill(ProgramTest):
         self.assertEqual(process.returncode, 0)
         self.assert_ends_like_the_undisturbed_run()
 
-    def test_twenty_kills_lose_nothing(self):
+    def test_eight_kills_lose_nothing(self):
         pause = random.Random(20)
         known = []  # rows that must stay
-        for kill in range(20):
+        for kill in range(8):
             process = self.start("run", self.case, "--resume", "--quiet")
             self.addCleanup(process.kill)
             while True:  # until it has advanced beyond the previous run; inspected while it is stopped
