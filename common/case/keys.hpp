@@ -210,9 +210,12 @@ void keys(Keys& k, Expect& expect, double end) {
             at_end.push_back(value);
             continue;
         }
-        if (moments.empty() || moments.back().time != *value.time) moments.push_back({*value.time, {}});
+        const auto given = [&](const Expectation& other) { return other.series == value.series; };
+        if (moments.empty() || moments.back().time != *value.time || std::ranges::any_of(moments.back().values, given))
+            moments.push_back({*value.time, {}});  // a table has each series once
         moments.back().values.push_back(value);
     }
+    for (Moment& moment : moments) std::ranges::sort(moment.values, {}, &Expectation::series);  // as a table has them
 
     Choices<Stop> stops;
     for (const StopKind& kind : stop_kinds) stops.emplace_back(kind.name, kind.reason);

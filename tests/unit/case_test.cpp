@@ -624,6 +624,14 @@ TEST(EffectiveToml, ReadsBackExactly) {
     EXPECT_EQ(again.expect.values[3].time, 0.3);
 }
 
+// Two tables [[expect.at]] of one time, each with the same series, stay two.
+TEST(EffectiveToml, KeepsWhatIsExpectedTwice) {
+    const std::string at = "\n[[expect.at]]\ntime = 0.1\nenergy = {value = 1, abs = 1}\n";
+    const std::string text = effective_toml(parse_case(good + at + at, {}, "case.toml"));
+    EXPECT_EQ(effective_toml(parse_case(text, {}, "again.toml")), text);
+    EXPECT_NE(text.find("time = 0.1", text.find("time = 0.1") + 1), std::string::npos);
+}
+
 TEST(NearMiss, AllowsOneSlipInThreeLetters) {
     EXPECT_EQ(near_miss("Length", {"radius", "length"}), "length");  // letter case
     EXPECT_EQ(near_miss("k24", {"k20", "k42"}), "k42");              // neighbours swapped
