@@ -49,10 +49,11 @@ def broken_text(rng, text, encoding="utf-8"):
 
 
 def changed_values(rng, table):
+    """Most often a case that still means something, with other numbers."""
     table = copy.deepcopy(table)
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
         if table:
-            toml.change(rng, table)
+            toml.bend(rng, table) if rng.random() < 0.9 else toml.change(rng, table)
     return toml.dump(table).encode("utf-8", "surrogateescape")
 
 
@@ -68,8 +69,8 @@ def override(rng, table):
 def made(rng):
     """A case as bytes, and what --set adds."""
     text, table = rng.choice(sources())
-    contents = broken_text(rng, text) if rng.random() < 0.25 else changed_values(rng, table)
-    return contents, [override(rng, table)] if rng.random() < 0.2 else []
+    contents = broken_text(rng, text) if rng.random() < 0.15 else changed_values(rng, table)
+    return contents, [override(rng, table)] if rng.random() < 0.15 else []
 
 
 def refusal(done, contents):

@@ -1,7 +1,8 @@
-"""Damaged results of every kind: what flipped bits, lost and swapped blocks, and a cut end do to them.
+"""Damaged results of every kind: what flipped bits, lost and swapped blocks, and a cut end do to them, and to the journal of
+a run that was killed.
 
 Every command that reads results says that the file is damaged, or gives what the sound file gives: no crash, no hang,
-no changed number."""
+no changed number. Of a damaged journal the rows before the damage are left."""
 
 
 from samples import LOCK, samples
@@ -46,7 +47,7 @@ def commands(kind):
         yield "compare", "case.hdf", "case.hdf", "--csv", "--no-shapes"
     if kind in ("tube", "curve"):
         yield "stability", "case.hdf", "--csv", "--modes=0", "--rates=1"
-    if kind not in ("scan", "equilibrium"):
+    if kind not in ("scan", "equilibrium", "killed"):
         yield "run", "case.toml", "-o", "case.hdf", "--resume"
 
 
@@ -65,21 +66,37 @@ def of_the_sound_file(box, sample, arguments):
         return ANSWERS[sample.kind, arguments]
 
 
+def resumed(box):
+    """Of a killed run: --resume goes on with what is left, or refuses."""
+    if box.run("run", "case.toml", "--quiet", "--resume", statuses=(0, 2)).status == 0:
+        last = box.run("show", "case.hdf", "--csv", statuses=(0,)).out.splitlines()[-1]
+        if not last.startswith("0.2,"):
+            raise Finding("changed", f"resumed, the run ends with {last}")
+    return "resumed"
+
+
 def one(rng, box):
     sample = rng.choice(samples(box.program))
     sample.put(box)
-    kind, contents = damaged(rng, sample.result)
+    name, sound = rng.choice([("case.hdf", sample.result)] + [("case.hdf.journal", sample.journal)] * bool(sample.journal))
+    kind, contents = damaged(rng, sound)
     asked = list(commands(sample.kind))
     arguments = asked[0] if rng.random() < 0.5 else rng.choice(asked)
     expected = of_the_sound_file(box, sample, arguments)
-    result = box.write("case.hdf", contents)
+    damage = f"{kind} in {name} of {sample.kind}"
+    result = box.write(name, contents)
+    if sample.journal and rng.random() < 0.2:
+        return resumed(box)
     done = answer(box, arguments)
     if done.status == 2:
         if "case.hdf" not in done.err:
-            raise Finding("no-place", f"{kind} in {sample.kind}: refused without its name: {done.err[:500]}")
+            raise Finding("no-place", f"{damage}: refused without its name: {done.err[:500]}")
         if result.read_bytes() != contents:
-            raise Finding("written", f"{kind} in {sample.kind}: refused, yet changed")
+            raise Finding("written", f"{damage}: refused, yet changed")
         return "refused"
-    if done.out != expected:
-        raise Finding("changed", f"{kind} in {sample.kind}: {arguments[0]} differs from that of the sound file\n{done.err}")
+    if name.endswith("journal") and arguments == asked[0]:  # CSV
+        if not expected.startswith(done.out):
+            raise Finding("changed", f"{damage}: the rows are no first rows of those of the sound file")
+    elif not name.endswith("journal") and done.out != expected:
+        raise Finding("changed", f"{damage}: {arguments[0]} differs from that of the sound file\n{done.err}")
     return "harmless"

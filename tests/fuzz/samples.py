@@ -4,6 +4,7 @@ import functools
 import subprocess
 import tempfile
 import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,10 +51,14 @@ class Sample:
     kind: str
     case: bytes  # of a scan, its base
     result: bytes
+    journal: bytes | None = None
 
     def put(self, box):
-        """case.toml and case.hdf in a sandbox."""
-        return box.write("case.toml", self.case), box.write("case.hdf", self.result)
+        """case.toml and case.hdf in a sandbox, and the journal of a run that was killed."""
+        box.write("case.toml", self.case)
+        box.write("case.hdf", self.result)
+        if self.journal:
+            box.write("case.hdf.journal", self.journal)
 
 
 LOCK = threading.Lock()
@@ -73,4 +78,16 @@ def made(program):
             run([program, "run", f"{name}.toml", "--quiet"])
         run([program, *SCAN])
         kinds = [*CASES, "scan"]
-        return [Sample(kind, CASES.get(kind, TUBE).encode(), Path(folder, f"{kind}.hdf").read_bytes()) for kind in kinds]
+        finished = [Sample(kind, CASES.get(kind, TUBE).encode(), Path(folder, f"{kind}.hdf").read_bytes()) for kind in kinds]
+        return [*finished, killed(program, Path(folder))]
+
+
+def killed(program, folder):
+    """A run that was killed when its journal had some rows."""
+    (folder / "slow.toml").write_text(SLOW)
+    result, journal = folder / "slow.hdf", folder / "slow.hdf.journal"
+    with subprocess.Popen([program, "run", "slow.toml", "--quiet"], cwd=folder) as process:
+        while process.poll() is None and not (journal.exists() and journal.stat().st_size > 20000):
+            time.sleep(0.001)
+        process.kill()
+    return Sample("killed", SLOW.encode(), result.read_bytes(), journal.read_bytes())

@@ -49,10 +49,23 @@ NO_NUMBERS = (float("nan"), float("inf"), -float("inf"), True, "", "1", "sphere"
 
 
 def near(rng, number):
-    """A number as somebody might have meant it: of the same size, or far off."""
-    if isinstance(number, int) and rng.random() < 0.7:
-        return number + rng.choice((-2, -1, 1, 2, 10))
-    return rng.choice((number * rng.uniform(0.5, 2), number * 10 ** rng.uniform(-6, 6), -number, number * 10 ** rng.uniform(-1, 1)))
+    """A number as somebody might have meant it: of the same size, or far off; whole where it was."""
+    if isinstance(number, int):
+        return max(number + rng.choice((-2, -1, 1, 2, 10)), rng.choice((0, 1)))
+    factor = rng.choices((rng.uniform(0.5, 2), 10 ** rng.uniform(-6, 6), -1), (8, 3, 1))[0]
+    return number * factor
+
+
+def bend(rng, table):
+    """Changes one number of the table to one near it."""
+    numbers = [path for path in places(table) if not {"expect", "about", "output"} & set(path) and is_number(holder(table, path)[path[-1]])]
+    if numbers:
+        path = rng.choice(numbers)
+        holder(table, path)[path[-1]] = near(rng, holder(table, path)[path[-1]])
+
+
+def is_number(entry):
+    return isinstance(entry, (int, float)) and not isinstance(entry, bool)
 
 
 def change(rng, table):
@@ -60,8 +73,8 @@ def change(rng, table):
     path = rng.choice(list(places(table)))
     where, name = holder(table, path), path[-1]
     old = where[name]
-    what = rng.choice((*["near"] * 8, "number", "other", "remove", "rename", "again", "swap"))
-    if what == "near" and isinstance(old, (int, float)) and not isinstance(old, bool):
+    what = rng.choice(("near", "number", "other", "remove", "rename", "again", "swap"))
+    if what == "near" and is_number(old):
         where[name] = near(rng, old)
     elif what == "number":
         where[name] = rng.choice(NUMBERS)
