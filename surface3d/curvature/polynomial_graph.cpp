@@ -3,7 +3,6 @@
 #include <Eigen/Householder>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <numeric>
 
 namespace tubule::surface3d {

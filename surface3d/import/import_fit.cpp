@@ -5,9 +5,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 
+#include "surface3d/mesh/reference_triangle.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 
 namespace tubule::surface3d {
@@ -42,7 +42,7 @@ struct Locality {
     bool free;           // need not pass through the vertex
 };
 
-// A fast decay trades averaging for locality: on irregular samples of an ellipsoid and a bumpy sphere errors of
+// Fast decay trades averaging for locality: on irregular samples of an ellipsoid and a bumpy sphere errors of
 // position, normal and curvature are half to a quarter of those of decay 1; from 12 on systems become ill-conditioned.
 Locality interpolating(int degree) {
     return {degree, std::size_t(1.5 * monomials(degree)), 6, false};
@@ -196,21 +196,6 @@ double mean_edge(const TriangleMesh& mesh) {
     return sum / (3 * double(mesh.triangles.size()));
 }
 
-// Barycentric coordinates of the nodes of a P_k triangle, times k, in CurvedMesh's order.
-std::vector<std::array<int, 3>> node_indices(int k) {
-    std::vector<std::array<int, 3>> out{{k, 0, 0}, {0, k, 0}, {0, 0, k}};
-    for (int edge = 0; edge < 3; ++edge) {
-        for (int i = 1; i < k; ++i) {
-            std::array<int, 3> index{};
-            index[edge] = k - i, index[(edge + 1) % 3] = i;
-            out.push_back(index);
-        }
-    }
-    if (k == 3) out.push_back({1, 1, 1});
-    if (k == 4) out.insert(out.end(), {{2, 1, 1}, {1, 2, 1}, {1, 1, 2}});
-    return out;
-}
-
 [[noreturn]] void fail(const ImportedMesh& imported, std::size_t triangle, const std::string& message) {
     throw MeshError(
         fmt::format("{}: {}: {}; the mesh is too coarse or too rough there for a smooth surface "
@@ -239,7 +224,7 @@ Vector3d curved_point(const TriangleMesh& mesh, const std::vector<Patch>& patche
 CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, const std::vector<Patch>& patches,
                        int k) {
     CurvedMesh out{.order = k, .nodes = mesh.points, .cells = {}, .period = 0, .shifts = {}};
-    const auto indices = node_indices(k);
+    const auto indices = lattice(k);
     std::map<std::array<int, 3>, int> edge_nodes;  // (low vertex, high vertex, how far from the low one)
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const auto& corner = mesh.triangles[t];
@@ -265,7 +250,7 @@ CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, c
 
 // The flat triangles between the nodes of the curved ones, k^2 in each, those of a cell together.
 TriangleMesh node_triangles(const CurvedMesh& surface) {
-    const auto indices = node_indices(surface.order);
+    const auto indices = lattice(surface.order);
     const int k = surface.order;
     std::map<std::array<int, 3>, int> number;
     for (int a = 0; a < int(indices.size()); ++a) number[indices[a]] = a;

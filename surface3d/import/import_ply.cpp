@@ -5,8 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <memory>
-#include <optional>
+#include <type_traits>
 
 #include "surface3d/import/import_formats.hpp"
 #include "surface3d/import/import_text.hpp"
@@ -15,31 +14,33 @@ namespace tubule::surface3d {
 
 namespace {
 
-enum class Scalar { i8, u8, i16, u16, i32, u32, f32, f64 };
-
-std::optional<Scalar> scalar_type(std::string_view name) {
-    constexpr std::array<std::array<std::string_view, 2>, 8> names{{{"char", "int8"},
-                                                                    {"uchar", "uint8"},
-                                                                    {"short", "int16"},
-                                                                    {"ushort", "uint16"},
-                                                                    {"int", "int32"},
-                                                                    {"uint", "uint32"},
-                                                                    {"float", "float32"},
-                                                                    {"double", "float64"}}};
-    for (std::size_t i = 0; i < names.size(); ++i) {
-        if (name == names[i][0] || name == names[i][1]) return Scalar(i);
-    }
-    return {};
+// A type of numbers: its two names, and how its bytes are read.
+struct Scalar {
+    std::string_view name, alias;
+    std::size_t size;
+    double (*value)(const char* bytes);
+    bool is_real;
+};
+template <class T>
+constexpr Scalar scalar(std::string_view name, std::string_view alias) {
+    const auto value = [](const char* bytes) {
+        T out;
+        std::memcpy(&out, bytes, sizeof(T));
+        return static_cast<double>(out);
+    };
+    return {name, alias, sizeof(T), value, std::is_floating_point_v<T>};
 }
-
-bool is_real(Scalar type) {
-    return type == Scalar::f32 || type == Scalar::f64;
-}
+constexpr Scalar scalars[] = {scalar<std::int8_t>("char", "int8"),    scalar<std::uint8_t>("uchar", "uint8"),
+                              scalar<std::int16_t>("short", "int16"), scalar<std::uint16_t>("ushort", "uint16"),
+                              scalar<std::int32_t>("int", "int32"),   scalar<std::uint32_t>("uint", "uint32"),
+                              scalar<float>("float", "float32"),      scalar<double>("double", "float64")};
 
 struct Property {
     std::string name;
-    Scalar type;
-    std::optional<Scalar> count;  // of a list
+    const Scalar* type;
+    const Scalar* count;  // of a list, else null
+
+    const Scalar& first() const { return count ? *count : *type; }  // of its numbers in the file
 };
 
 struct Element {
@@ -56,14 +57,14 @@ struct Header {
 Property read_property(const TextReader& reader) {
     const std::vector<Word>& words = reader.words();
     const auto type = [&](std::size_t i) {
-        const auto known = scalar_type(words[i].text);
-        if (!known) reader.fail(words[i], fmt::format("unknown type '{}'", words[i].text.substr(0, 20)));
-        return *known;
+        for (const Scalar& known : scalars)
+            if (words[i].text == known.name || words[i].text == known.alias) return &known;
+        reader.fail(words[i], fmt::format("unknown type '{}'", words[i].text.substr(0, 20)));
     };
     const bool list = words.size() > 1 && words[1].text == "list";
     if (words.size() != (list ? 5 : 3)) reader.fail_line("a property needs a type and a name");
-    if (!list) return {std::string(words[2].text), type(1), {}};
-    if (is_real(type(2))) reader.fail(words[2], "the length of a list must have an integer type");
+    if (!list) return {std::string(words[2].text), type(1), nullptr};
+    if (type(2)->is_real) reader.fail(words[2], "the length of a list must have an integer type");
     return {std::string(words[4].text), type(3), type(2)};
 }
 
@@ -111,30 +112,18 @@ public:
           ascii_(format == "ascii"),
           swap_((format == "binary_big_endian") != (std::endian::native == std::endian::big)) {}
 
-    Value next(Scalar type, const std::string& what) {
+    Value next(const Scalar& type, const std::string& what) {
         if (ascii_) {
             const Word word = text_.next_word(what);
-            return {is_real(type) ? text_.number(word) : double(text_.integer(word)), word.place};
+            return {type.is_real ? text_.number(word) : double(text_.integer(word)), word.place};
         }
-        switch (type) {
-            case Scalar::i8:
-                return bytes<std::int8_t>(what);
-            case Scalar::u8:
-                return bytes<std::uint8_t>(what);
-            case Scalar::i16:
-                return bytes<std::int16_t>(what);
-            case Scalar::u16:
-                return bytes<std::uint16_t>(what);
-            case Scalar::i32:
-                return bytes<std::int32_t>(what);
-            case Scalar::u32:
-                return bytes<std::uint32_t>(what);
-            case Scalar::f32:
-                return bytes<float>(what);
-            case Scalar::f64:
-                return bytes<double>(what);
-        }
-        throw std::logic_error("PLY type");
+        if (data_.size() - position_ < type.size) fail({0, 0, data_.size()}, "the file ends; expected " + what);
+        std::array<char, sizeof(double)> raw;
+        const auto end = std::copy_n(data_.data() + position_, type.size, raw.begin());
+        if (swap_) std::reverse(raw.begin(), end);
+        const Value value{type.value(raw.data()), {0, 0, position_}};
+        position_ += type.size;
+        return value;
     }
 
     // Throws MeshError if anything except white space follows.
@@ -151,19 +140,6 @@ public:
     }
 
 private:
-    template <class T>
-    Value bytes(const std::string& what) {
-        if (data_.size() - position_ < sizeof(T)) {
-            fail({0, 0, data_.size()}, "the file ends; expected " + what);
-        }
-        std::array<char, sizeof(T)> raw;
-        std::memcpy(raw.data(), data_.data() + position_, sizeof(T));
-        if (swap_) std::reverse(raw.begin(), raw.end());
-        const Value value{double(std::bit_cast<T>(raw)), {0, 0, position_}};
-        position_ += sizeof(T);
-        return value;
-    }
-
     const std::string& name_;
     std::string_view data_;
     TextReader& text_;
@@ -174,8 +150,8 @@ private:
 void read_vertex(Body& body, const Element& element, const std::string& what, FileMesh& mesh) {
     Eigen::Vector3d& point = mesh.points.emplace_back();
     for (const Property& property : element.properties) {
-        const Value value = body.next(property.count.value_or(property.type), what);
-        for (double i = 0; property.count && i < value.value; ++i) body.next(property.type, what);
+        const Value value = body.next(property.first(), what);
+        for (double i = 0; property.count && i < value.value; ++i) body.next(*property.type, what);
         if (property.count || property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
         if (!std::isfinite(value.value)) body.fail(value.place, "a coordinate is not a finite number");
         point[property.name[0] - 'x'] = value.value;
@@ -188,7 +164,7 @@ bool is_corner_list(const Property& p) {
 
 void read_face(Body& body, const Element& element, const std::string& what, FileMesh& mesh) {
     for (const Property& property : element.properties) {
-        const Value count = body.next(property.count.value_or(property.type), what);
+        const Value count = body.next(property.first(), what);
         if (!property.count) continue;
         const bool corners = is_corner_list(property);
         if (corners && count.value < 3) {
@@ -196,7 +172,7 @@ void read_face(Body& body, const Element& element, const std::string& what, File
         }
         if (corners) mesh.faces.emplace_back();
         for (double i = 0; i < count.value; ++i) {
-            const Value value = body.next(property.type, what);
+            const Value value = body.next(*property.type, what);
             if (corners) mesh.faces.back().push_back({std::int64_t(value.value), value.place});
         }
     }
@@ -213,7 +189,7 @@ void check_header(const TextReader& reader, const Header& header) {
         for (const Property& p : element.properties) {
             if (element.name == "vertex" && !p.count) coordinates += p.name == "x" || p.name == "y" || p.name == "z";
             if (element.name == "face" && is_corner_list(p)) {
-                if (is_real(p.type)) reader.fail_line("the vertex indices of faces must have an integer type");
+                if (p.type->is_real) reader.fail_line("the vertex indices of faces must have an integer type");
                 ++corner_lists;
             }
         }
@@ -245,8 +221,8 @@ FileMesh read_ply(const std::string& name, std::string_view data) {
                 read_face(body, element, what, mesh);
             } else {
                 for (const Property& property : element.properties) {
-                    const Value value = body.next(property.count.value_or(property.type), what);
-                    for (double j = 0; property.count && j < value.value; ++j) body.next(property.type, what);
+                    const Value value = body.next(property.first(), what);
+                    for (double j = 0; property.count && j < value.value; ++j) body.next(*property.type, what);
                 }
             }
         }

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "surface3d/import/import_formats.hpp"
 #include "surface3d/import/import_text.hpp"
