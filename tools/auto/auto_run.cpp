@@ -23,7 +23,7 @@ namespace {
 constexpr int parts = 48, halvings = 12;
 // A wave this many times the noise has grown, and is handed over with the largest one.
 constexpr double grown = 2;
-// Of the logarithm of an amplitude: what the switch is late or early by, in e-folds, is worth a word.
+// Error of the logarithm of an amplitude, in e-folds, above which the time of the switch is reported as uncertain.
 constexpr double uncertain = 0.3;
 
 // The wall time of all parts together.
@@ -64,7 +64,7 @@ std::set<double> times_for_rates(const Case& c) {
     return out;
 }
 
-// What the profile with which a run in three dimensions begins has beside its waves.
+// Stored with the profile from which a run in three dimensions starts, besides its waves.
 struct Switch {
     int m = 0;                               // of the wave that has become too large
     double reference_energy = 0, error = 0;  // of the part before
@@ -82,7 +82,7 @@ std::string percent(double amplitude) {
     return fmt::format("{:.3g} of the radius", amplitude);
 }
 
-// What is not known for certain about the rates, in words; empty if there is nothing to say.
+// Warnings about uncertain rates; empty if there are none.
 std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
     std::string out;
     const auto say = [&](const std::string& words) { out += (out.empty() ? "" : "; ") + words; };
@@ -169,7 +169,7 @@ private:
 class AutoRun {
 public:
     AutoRun(const Case& c, const Choice& choice, RunObserver& file)
-        : case_(c), file_(file), clock_(c), choice_(choice), names_(auto_series_names(c, choice)) {}
+        : case_(c), file_(file), clock_(c), choice_(choice), names_(joined_series_names(c, choice.axisymmetric)) {}
 
     RunSummary in_three_dimensions(const Restart* restart);
     RunSummary axisymmetric(const Restart* restart);
@@ -288,10 +288,6 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
 }
 
 }  // namespace
-
-std::vector<std::string> auto_series_names(const Case& c, const Choice& choice) {
-    return joined_series_names(c, choice.axisymmetric);
-}
 
 RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished) {

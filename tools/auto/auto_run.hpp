@@ -1,18 +1,12 @@
 // A case of tier "auto": axisymmetric while that is adequate, in three dimensions where it is not.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "common/case/case.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/run.hpp"
 #include "tools/auto/choice.hpp"
 
 namespace tubule {
-
-// Names of the series of the file, "time" first.
-std::vector<std::string> auto_series_names(const Case& c, const Choice& choice);
 
 // `choice` is that for the case. An axisymmetric start is run in tier axisym, with the growth rates of waves around the
 // axis at many times. Where the noise of the case grows to auto.largest by them, the run is made again until then, and

@@ -9,8 +9,8 @@
 
 namespace tubule {
 
-// Series of a run that begins axisymmetric: those that both tiers have, momenta that vanish by symmetry, and `tier`,
-// 1 or 2. One that begins in three dimensions has all of that tier, and `tier`.
+// Names of the series, "time" first. Of a run that begins axisymmetric: those that both tiers have, momenta that vanish
+// by symmetry, and `tier`, 1 or 2. One that begins in three dimensions has all of that tier, and `tier`.
 std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymmetric);
 
 // A tier's rows as those of the file.

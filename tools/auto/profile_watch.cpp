@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-
 #include "common/run/run_pairs.hpp"
 #include "tools/auto/waves.hpp"
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <stdexcept>
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
@@ -17,7 +16,7 @@ namespace {
 constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
-// Inertia left out.
+// Without inertia.
 axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Meridian& profile) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;

@@ -2,7 +2,6 @@
 // them on it.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "common/case/case.hpp"

@@ -2,7 +2,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 
 #include "common/geometry/profile_point.hpp"
 #include "tools/compare/distance.hpp"
@@ -17,28 +16,28 @@ using Eigen::Vector3d;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t coarse_samples = 150, fine_samples = 3000;
-constexpr std::size_t tried_closely = 4;  // of the beginnings, besides those that turn nothing
-constexpr double as_good = 1.01;          // mean squares that differ by less are told apart by the angle
+constexpr std::size_t tried_closely = 4;  // initial guesses that are refined, besides those without a rotation
+constexpr double as_good = 1.01;          // mean squares within this factor count as equal: the smallest rotation wins
 constexpr int most_steps = 30, last_steps = 12;
-// By how much of itself a step must lower the mean square for another one to follow, in three rounds: where that is
-// least is found to the root of it.
+// Relative decrease of the mean square in a step below which the iteration ends, in three rounds. The position of the
+// minimum is accurate to the square root of it.
 constexpr double coarse_gain = 1e-4, fine_gain = 1e-8, last_gain = 1e-13;
 constexpr int shifts_tried = 12;      // along a tube, and turns about its axis
-constexpr double same_moment = 0.05;  // relative difference below which two axes of inertia are not told apart
-constexpr int turns_tried = 8;        // about an axis that alone is known
+constexpr double same_moment = 0.05;  // relative difference below which two moments of inertia count as equal
+constexpr int turns_tried = 8;        // about a single known axis
 
-// What a motion may be made of: translations, then rotations about x, y, z.
+// The free components of a motion (1, else 0): translations, then rotations about x, y, z.
 Vector6 freedom(const Surface& a, const Surface& b) {
     Vector6 out = Vector6::Ones();
     if (a.period() > 0) {
         out[3] = out[4] = 0;
-        if (a.grain() == 0 || b.grain() == 0) out[5] = 0;  // a turn changes nothing
+        if (a.grain() == 0 || b.grain() == 0) out[5] = 0;  // a rotation about z changes nothing
     }
     if (a.grain() == 0 && b.grain() == 0) out << 0, 0, 1, 0, 0, 0;
     return out;
 }
 
-// Points of quadrature, about this many, evenly picked.
+// About this many of the quadrature points, evenly spaced by index.
 std::vector<Sample> some(const std::vector<Sample>& samples, std::size_t count) {
     const std::size_t step = std::max<std::size_t>(samples.size() / count, 1);
     std::vector<Sample> out;
@@ -141,7 +140,8 @@ Matrix3d turn(double angle, const Vector3d& axis) {
     return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
 }
 
-// Rotations in the axes of inertia: that keep them, or what of them can be told.
+// Candidate rotations in the frame of the axes of inertia: those that preserve the axes, or samples where axes are
+// not unique.
 std::vector<Matrix3d> turns(const Vector3d& moments) {
     const double near = same_moment * moments[2];
     const bool low = moments[1] - moments[0] < near, high = moments[2] - moments[1] < near;
@@ -171,7 +171,7 @@ std::vector<Matrix3d> turns(const Vector3d& moments) {
     return out;
 }
 
-// Where to begin: motions of `a` towards `b`.
+// Initial guesses: motions of `a` towards `b`.
 std::vector<RigidMotion> beginnings(const Surface& a, const Surface& b, const std::vector<Sample>& samples) {
     const bool lone_meridian = a.grain() == 0 && b.grain() == 0;
     const Inertia from = inertia(samples, lone_meridian), to = inertia(quadrature_points(b, a), lone_meridian);
@@ -219,14 +219,14 @@ RigidMotion alignment(const Surface& a, const Surface& b) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = 0; i < fits.size(); ++i)
         fits[i] = fitted(few, b, free, size, fits[i].motion, most_steps, coarse_gain);
-    // What is symmetric fits in many ways; the one that turns it least is meant.
+    // A symmetric shape fits in many ways: the smallest rotation is chosen.
     const double enough =
         as_good * std::min_element(fits.begin(), fits.end(), better)->mean_square + 1e-20 * size * size;
     const Fit* best = nullptr;
     for (const Fit& fit : fits)
         if (fit.mean_square <= enough && (!best || fit.motion.rotation.trace() > best->motion.rotation.trace() + 1e-6))
             best = &fit;
-    // Where the surfaces are not the same, where the distance is least depends on the weights: all of them in the end.
+    // For surfaces that differ, the minimum depends on the weights: the last fit uses all points.
     const RigidMotion near = fitted(many, b, free, size, best->motion, most_steps, fine_gain).motion;
     return fitted(all, b, free, size, near, last_steps, last_gain).motion.inverse();
 }

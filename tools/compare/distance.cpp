@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "common/geometry/profile_point.hpp"
 #include "tools/compare/same_kind.hpp"
@@ -15,14 +14,14 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t pieces_searched = 32;
-constexpr int halvings = 12;  // of the step of the search: largest distances are flat, so their error is its square
+constexpr int halvings = 12;  // of the search step; the error of the maximum is quadratic in it
 
 struct OneWay {
     double largest = 0, mean_square = 0, area = 0;
     Vector3d where;
 };
 
-// A larger distance near a sample, by steps to and fro that are halved when none helps.
+// A local maximum of the distance near a sample, by coordinate steps that are halved when none increases it.
 double climb(const Surface& from, const Surface& to, const RigidMotion& motion, Place place, Vector2d reach,
              double value) {
     static const Vector2d ways[] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}};
@@ -53,7 +52,8 @@ OneWay one_way(const Surface& from, const Surface& to, const RigidMotion& motion
     }
     out.mean_square /= out.area;
 
-    // The farthest sample of each piece, the farthest pieces first; a surface of revolution is one piece of many.
+    // The farthest sample of each piece, the farthest pieces first. A surface of revolution is one piece: its samples
+    // are separated by distance.
     std::vector<std::size_t> order(samples.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) { return away[i] > away[j]; });

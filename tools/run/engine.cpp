@@ -5,6 +5,7 @@
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
 #include "tools/auto/auto_run.hpp"
+#include "tools/auto/joined_file.hpp"
 
 namespace tubule {
 namespace {
@@ -55,7 +56,7 @@ private:
 class Automatic : public Engine {
 public:
     explicit Automatic(const Case& c) : case_(c), choice_(choice_for(c)) {}
-    std::vector<std::string> series_names() const override { return auto_series_names(case_, choice_); }
+    std::vector<std::string> series_names() const override { return joined_series_names(case_, choice_.axisymmetric); }
     void check_restart(const Record& record) const override {
         if (record.mesh)
             surface3d::check_restart(case_, record);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -428,7 +427,7 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
 
 ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     const auto path = fs::weakly_canonical(file);
-    load(path);  // refuses what is no scan before anything is touched
+    load(path);  // refuses a file that is not a scan before anything is changed
     auto impl = std::make_unique<Impl>(path);
     impl->stored = load(path);
     if (!same_scan(impl->stored.result.scan, scan))
@@ -458,7 +457,7 @@ void ScanWriter::point(const PointResult& p) {
     impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
     ++c.sequence;
     keep(c.result, p);
-    // For those who look in meanwhile, as often as takes less than 2 % of the time.
+    // For concurrent readers, as often as takes less than 2 % of the time.
     if (Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
         impl_->write();
 }

@@ -48,8 +48,8 @@ std::optional<double> shortest_unduloid(const Case& c) {
     return period ? std::optional(*period * std::abs(c.energy.H0) - 4) : std::nullopt;
 }
 
-// The straight tube that rests: of a gradient flow with free volume that of radius 1/|H0| where no term but k20 has a
-// say in it, else that of the start. Nothing where a fixed volume makes the tension an outcome.
+// The straight tube at rest. Gradient flow with free volume: radius 1/|H0|, if no term but k20 affects it. Otherwise
+// the straight tube of the start; nothing if a fixed volume makes the tension an unknown.
 std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.equilibrium) return std::nullopt;
@@ -82,14 +82,9 @@ std::optional<double> driven_most(const Case& c, int m) {
         if (n >= first) most = std::max(most, -G(n * longest));
     return std::abs(most) > 1e-12 * std::abs(G.q0) ? most : 0;  // without k42 they are neutral at q R = 1, not beyond
 }
-std::optional<double> pearling(const Case& c) {
-    return driven_most(c, 0);
-}
-std::optional<double> buckling(const Case& c) {
-    return driven_most(c, 1);
-}
-std::optional<double> rings(const Case& c) {
-    return driven_most(c, 2);
+template <int m>
+std::optional<double> waves_around(const Case& c) {
+    return driven_most(c, m);
 }
 
 std::vector<std::size_t> some_of(std::size_t size) {
@@ -105,9 +100,9 @@ const std::vector<Threshold>& thresholds() {
     static const std::vector<Threshold> all{
         {"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
         {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
-        {"pearling", "straight tube, m = 0 neutral", pearling},
-        {"buckling", "straight tube, m = 1 neutral", buckling},
-        {"rings", "straight tube, m = 2 neutral", rings}};
+        {"pearling", "straight tube, m = 0 neutral", waves_around<0>},
+        {"buckling", "straight tube, m = 1 neutral", waves_around<1>},
+        {"rings", "straight tube, m = 2 neutral", waves_around<2>}};
     return all;
 }
 
