@@ -1,6 +1,9 @@
 #include "axisym/curve/curve_attempt.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "axisym/curve/curve_series.hpp"
 
@@ -8,6 +11,9 @@ namespace tubule::axisym {
 namespace {
 
 constexpr int steps_between_looks = 10;
+constexpr double error_per_defect =
+    0.7;                               // of the energy balance; docs/decisions.md, "How large is the error of a curve"
+constexpr double hopeless_rise = 0.1;  // of E_ref: of a run that is not asked for an accuracy
 
 }  // namespace
 
@@ -34,22 +40,29 @@ const Snapshot& CurveAttempt::observe(double t, const double* y, const double* r
 
 void CurveAttempt::begin() {
     const CurveBegin at = begin_state(setup_);
-    make_flow(at.y, at.rate, 0, at.first_step);
+    make_flow(at.y, at.rate, at.time, at.first_step);
     const Snapshot s = measure(*setup_.motion, at.shown.data(), at.rate.data());
-    total_start_ = s.total();
+    past_.total_start = s.total();
+    past_.total_least = past_.total_start;
+    compare(0, s);
     trace.add(0, s.o.energy, 0);
+    add_to_trace(at.time);
     write_row(0, s, at.shown.data());
     write_frame(0, s, at.shown.data(), at.rate.data());
+    // The steps that lead from the curve to the first unknowns dissipate the difference.
+    past_.dissipated = past_.total_start - now_.total();
 }
 
 void CurveAttempt::resume(const Record& restart) {
     const CurveRestart state = curve_restart(restart);
-    total_start_ = state.total_start, dissipated_before_ = state.dissipated, error = state.error;
+    past_.total_start = state.total_start, past_.dissipated = state.dissipated, error = state.error;
+    least_symbol = state.least_symbol;
     summary.reference_energy = state.reference_energy;
     trace = pair_memory(restart).own;
     outputs_.go_on_from(restart.time);
     out_.go_on_from(restart.time);
     make_flow(state.y, state.rate, restart.time, 0);
+    past_.total_least = now_.total();
     add_to_trace(restart.time);
 }
 
@@ -68,6 +81,7 @@ void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& ra
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
     flow_ = std::make_unique<Flow>(std::move(system), y, rate, time, setup_.control(first_step));
     observe(time, flow_->x(), flow_->v());
+    keep_good();
 }
 
 void CurveAttempt::add_to_trace(double t) {
@@ -100,16 +114,56 @@ std::optional<StopReport> CurveAttempt::step() {
                           "try another accuracy, discretisation.elements or parametrisation"};
     if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
     const Snapshot s = observe(t, flow_->x(), flow_->v());
+    if (auto rise = find_rise(s)) return rise;
+    least_symbol = std::min(least_symbol, s.o.symbol);
     add_to_trace(t);
-    if (const auto difference = coarser_ ? coarser_->trace.difference(t, s.o.energy) : std::nullopt)
-        error = std::max(error, error_now_ = *difference);
+    compare(t, s);
     write_outputs(t);
     write_row(t, s, flow_->x());
     out_.progress(t, s.o.energy, flow_->step_size());
     if (outcome == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(s, t);
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
+    keep_good();
     out_.safeguard([this] { return record(); });
     return check(t);
+}
+
+// The error is the difference from the coarser run, and a part of the energy that is unaccounted for, as the runs of a
+// pair may have errors of their steps in common. That part is often too large: it alone never asks for a finer run.
+void CurveAttempt::compare(double t, const Snapshot& s) {
+    if (!coarser_) return;
+    const double asked = settings_given(setup_.c) ? std::numeric_limits<double>::infinity()
+                                                  : setup_.c.accuracy.energy * summary.reference_energy;
+    const double unbalanced = t > 0 ? std::min(error_per_defect * std::abs(defect(t, s)), asked) : 0;
+    error_now_ = std::max(coarser_->trace.difference(t, s.o.energy).value_or(error_now_), unbalanced);
+    error = std::max(error, error_now_);
+}
+
+// No law of motion lets the total energy rise: what it rises by is an error. Where that is large, the run goes back to
+// the last good step.
+std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
+    const bool asked = out_.reported() && !settings_given(setup_.c);
+    const double rise = s.total() - past_.total_least,
+                 allowed = (asked ? setup_.c.accuracy.energy : hopeless_rise) * summary.reference_energy;
+    if (!(rise <= allowed)) {
+        past_.dissipated = dissipated(past_.time);
+        make_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time, 0);
+        return StopReport{
+            Stop::resolution_lost, past_.time,
+            fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
+                        rise / summary.reference_energy),
+            "ask for more accuracy; check that the energy resists bending where H = H0"};
+    }
+    error = std::max(error, rise);
+    past_.total_least = std::min(past_.total_least, s.total());
+    return std::nullopt;
+}
+
+void CurveAttempt::keep_good() {
+    const int n = setup_.motion->layout().size;
+    past_.y = Eigen::Map<const Eigen::VectorXd>(flow_->x(), n);
+    past_.rate = Eigen::Map<const Eigen::VectorXd>(flow_->v(), n);
+    past_.time = flow_->time();
 }
 
 // IDA sees only guards that change their sign later.
@@ -149,9 +203,8 @@ void CurveAttempt::write_outputs(double until) {
 
 void CurveAttempt::write_row(double t, const Snapshot& s, const double* y) {
     if (!out_.wants_row(t)) return;
-    const double defect = s.total() - total_start_ + dissipated(t);
     out_.row(t, setup_.series.values(
-                    {t, s, y, *setup_.motion, *flow_, defect, error_now_, summary.elements, out_.seconds()}));
+                    {t, s, y, *setup_.motion, *flow_, defect(t, s), error_now_, summary.elements, out_.seconds()}));
 }
 
 void CurveAttempt::write_frame(double t, const Snapshot& s, const double* y, const double* rate) {
@@ -164,10 +217,11 @@ Record CurveAttempt::record(double t, const Snapshot& s, const double* y, const 
                              Eigen::Map<const Eigen::VectorXd>(y, n),
                              Eigen::Map<const Eigen::VectorXd>(rate, n),
                              setup_.settings,
-                             total_start_,
+                             past_.total_start,
                              dissipated(t),
                              error,
-                             summary.reference_energy};
+                             summary.reference_energy,
+                             least_symbol};
     Record out = curve_record(t, *setup_.motion, state, s.o.energy);
     add_to_record(out, trace, coarser_);
     return out;

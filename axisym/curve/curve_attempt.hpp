@@ -28,14 +28,26 @@ public:
 
     RunSummary summary;
     EnergyTrace trace;
-    double error = 0;  // largest difference of the energy from the coarser run's, absolute
+    double error = 0;  // largest over the run, absolute: see compare() and find_rise()
+    double least_symbol = std::numeric_limits<double>::max();  // over the run: theory.md (2.14)
 
 private:
+    struct Past {
+        double total_start = 0, dissipated = 0;  // before this flow began
+        double total_least = 0;                  // of all steps
+        Eigen::VectorXd y, rate;                 // of the last good step
+        double time = 0;
+    };
+
     const Snapshot& observe(double t, const double* y, const double* rate);
     void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
     std::optional<StopReport> check_start() const;
     std::optional<StopReport> step();
+    std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);
+    void compare(double t, const Snapshot& s);
+    double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t); }
+    void keep_good();
     double what_may_change(double t) const;
     void add_to_trace(double t);
 
@@ -44,7 +56,7 @@ private:
     void write_frame(double t, const Snapshot& s, const double* y, const double* rate);
     Record record(double t, const Snapshot& s, const double* y, const double* rate) const;
     Record record() const { return record(flow_->time(), now_, flow_->x(), flow_->v()); }
-    double dissipated(double t) const { return dissipated_before_ + flow_->dissipated(t); }
+    double dissipated(double t) const { return past_.dissipated + flow_->dissipated(t); }
 
     CurveSetup setup_;
     const RunClock& clock_;
@@ -55,7 +67,7 @@ private:
     double observed_at_ = std::numeric_limits<double>::quiet_NaN();
     Snapshot now_;
     CurveStall stall_;
-    double total_start_ = 0, dissipated_before_ = 0;  // before this flow began
+    Past past_;
     double error_now_ = 0;
 };
 

@@ -24,6 +24,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_pair", s.settings.pair), f.number("restart_role", s.settings.is_coarser);
     f.number("restart_total_start", s.total_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
+    f.number("restart_least_symbol", s.least_symbol);
 }
 
 // One point of the profile, with curvatures and flow.

@@ -14,7 +14,7 @@ struct CurveRestart {
     std::vector<double> breaks;
     Eigen::VectorXd y, rate;
     CurveSettings settings;
-    double total_start = 0, dissipated = 0, error = 0, reference_energy = 0;
+    double total_start = 0, dissipated = 0, error = 0, reference_energy = 0, least_symbol = 0;
 };
 
 // Numbers energy, length (of a period, or 0); sampled from pole to pole or over a period, in order along the profile:

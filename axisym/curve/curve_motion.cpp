@@ -510,6 +510,7 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
             last = size;
         }
     }
+    s.time = 2 * h;
     s.rate.array() *= differential().array();  // the others jumped from a guess
     return s;
 }

@@ -78,6 +78,7 @@ public:
     // Euler steps of length h. Throws SolveError if Newton's method fails.
     struct Start {
         Eigen::VectorXd y, rate;
+        double time = 0;  // that the steps have taken
     };
     Start consistent(const Eigen::VectorXd& y0, double h) const;
 

@@ -2,14 +2,30 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "axisym/curve/curve_attempt.hpp"
 
 namespace tubule::axisym {
 namespace {
 
+constexpr int most_failures = 2;    // pairs of runs that fail, after which nothing else is tried
+constexpr double too_early = 1e-6;  // of time.end: runs that fail so soon say nothing of each other's error
+
+bool failed(const StopReport& stop) {
+    return exit_code(stop.reason) == exit_code(Stop::solver_failed);
+}
+
 // Whether the energies of two runs of a pair can be compared.
-bool comparable(const StopReport& coarse, const StopReport& fine) {
-    return coarse.reason == fine.reason || can_go_on(fine.reason);
+bool comparable(const StopReport& coarse, const StopReport& fine, double end) {
+    if (can_go_on(fine.reason)) return true;
+    return coarse.reason == fine.reason && (!failed(fine) || std::min(coarse.time, fine.time) > too_early * end);
+}
+
+// Whether a flow may have been ill-posed without being seen to be: the two runs of a pair are at least half as far
+// apart as the finer one is from that. A symbol that cannot change its sign may come as close to 0 as it likes.
+bool may_be_ill_posed(const Bending& energy, double coarse, double fine) {
+    return std::ranges::any_of(energy.k, [](double k) { return k < 0; }) && fine < 2 * std::abs(coarse - fine);
 }
 
 class CurveRuns : public PairedRuns {
@@ -29,24 +45,33 @@ public:
     void show_start() override { attempt(settings_, nullptr).begin(); }
     RunSummary& run_coarser() override { return run(coarser(settings_), nullptr); }
     RunSummary& run_reported(const EndedRun& coarser) override { return run(settings_, &coarser); }
-    EndedRun ended() override { return {run_->trace, run_->summary.stop}; }
+    EndedRun ended() override { return {run_->trace, run_->summary.stop, run_->least_symbol}; }
 
     double error(const EndedRun& other) override {
         RunSummary& s = run_->summary;
         if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
             s.warnings.push_back("too few elements for a coarser run to compare with: the error is unknown");
-        else if (!comparable(other.stop, s.stop))
+        else if (!comparable(other.stop, s.stop, case_.time.end))
             s.warnings.push_back(
                 fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is unknown",
                             other.stop.time, name(other.stop.reason)));
+        else if (kind_of(s.stop.reason).exit_code == 0 &&
+                 may_be_ill_posed(case_.energy, other.least_symbol, run_->least_symbol))
+            s.warnings.push_back(fmt::format(
+                "the principal symbol fell to {:.2g}, in the coarser run of the pair to {:.2g}: the flow may be "
+                "ill-posed, and the error is unknown",
+                run_->least_symbol, other.least_symbol));
         else
             return run_->error;
         return s.reference_energy;
     }
 
     bool refine(const tubule::RunSummary& last) override {
-        if (last.as_accurate_as_asked || settings_given(case_) || !can_be_finer(settings_)) return false;
-        settings_ = finer(settings_, last.estimated_error / case_.accuracy.energy);
+        const bool good = last.as_accurate_as_asked && !failed(last.stop);
+        if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
+        if (failed(last.stop) && ++failures_ > most_failures) return false;
+        const bool known = last.estimated_error < 1;
+        settings_ = finer(settings_, known ? last.estimated_error / case_.accuracy.energy : 1);
         return true;
     }
 
@@ -80,6 +105,7 @@ private:
     const Beginning start_;
     std::optional<CurveSettings> begun_;  // of the run that was interrupted
     CurveSettings settings_;              // of the run to be reported
+    int failures_ = 0;                    // of pairs
     std::optional<CurveAttempt> run_;     // the last one
 };
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "axisym/curve/curve_frame.hpp"
+#include "common/run/output_times.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -13,7 +14,7 @@ namespace {
 // Measured choices: docs/decisions.md, "Curves in motion".
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
-constexpr double seam_size = 0.15, seam_per_accuracy = 5;
+constexpr double seam_size = 0.15, seam_per_accuracy = 5, seam_order = 2;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
@@ -41,8 +42,9 @@ double gauge_of(const Case& c, double energy, double area) {
 std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, double accuracy) {
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
-    const double shrunk = std::pow(first_curve_elements * size, 2);  // faster than the rest, of lower order
-    const double at_seam = std::min(seam_size * size, seam_per_accuracy * accuracy * shrunk);
+    // Faster than the rest, for the error is of first order there: the difference of a pair must exceed it.
+    const double shrunk = std::pow(first_curve_elements * size, seam_order);
+    const double at_seam = std::min(seam_size / first_curve_elements, seam_per_accuracy * accuracy) * shrunk;
     return seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam);
 }
 
@@ -116,6 +118,7 @@ TimeControl CurveSetup::control(double first_step) const {
     control.absolute = 0.1 * settings.tolerance;
     control.max_order = c.discretisation.time_order;
     control.first_step = first_step;
+    control.growth = step_growth_of(settings);
     control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);
     control.two_iterations = true;
     return control;
@@ -128,15 +131,17 @@ CurveBegin begin_state(const CurveSetup& setup) {
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     std::optional<CurveMotion::Start> consistent;
-    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast.
-    double h = 1e-10 * std::min(setup.c.time.end, 1.0);
+    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast; and over before
+    // the first output.
+    double h = std::min(1e-10 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
+                        0.1 * OutputTimes(setup.c).next());
     for (int tries = 0; !consistent; ++tries) try {
             consistent = setup.motion->consistent(y, h);
         } catch (const SolveError&) {
             if (tries == 4) throw;
             h *= 10;
         }
-    CurveBegin out{consistent->y, consistent->rate, consistent->y, h};
+    CurveBegin out{consistent->y, consistent->rate, consistent->y, consistent->time, h};
     out.shown.head(space.size()) = y.head(space.size());
     return out;
 }

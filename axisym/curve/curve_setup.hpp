@@ -45,7 +45,7 @@ struct CurveSetup {
 // Unknowns and rates at the start: those to compute from, and those to show, with the exact curve.
 struct CurveBegin {
     Eigen::VectorXd y, rate, shown;
-    double first_step = 0;
+    double time = 0, first_step = 0;  // when the unknowns are those to compute from
 };
 // Throws SolveError where the equations have no solution.
 CurveBegin begin_state(const CurveSetup& setup);

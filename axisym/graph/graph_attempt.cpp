@@ -121,6 +121,7 @@ void GraphAttempt::begin() {
     transport.total = transport.spatial =
         transport.space().project(start) - transport.space().prolong(stage_->space, x);
     make_flow(x, stage_->forms.rate(x), 0, 0);
+    error_.carry_on(*stage_, now_.o);  // so far that of the first mesh
     past_.energy_start = now_.o.energy;
     write(0, now_.o, flow_->x(), flow_->v());
 }
@@ -152,6 +153,27 @@ bool GraphAttempt::must_give_up(const Observation& o) {
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
     gave_up = settings_.may_give_up && error_.is_curable(settings_, allowed);
     return gave_up;
+}
+
+// Gradient flow does not let the energy rise: what it rises by is an error. Where that is more than the error known and
+// more than the error asked for, the run goes back to the last good state.
+std::optional<StopReport> GraphAttempt::find_rise(const Observation& o) {
+    const double rise = o.energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
+    if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.carry_on(*stage_, o);
+    if (rise <= std::max(asked, stated_over_computed * error_.now())) {
+        error_.largest = std::max(error_.largest, rise / stated_over_computed);
+        good_.least_energy = std::min(good_.least_energy, o.energy);
+        return std::nullopt;
+    }
+    error_.latest = {rise, 0};
+    gave_up = settings_.may_give_up && settings_.free_time;
+    const Eigen::VectorXd x = good_.x;
+    make_flow(x, stage_->forms.rate(x), good_.time, 0);
+    return StopReport{
+        Stop::resolution_lost, good_.time,
+        fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
+                    rise / summary.reference_energy),
+        "ask for more accuracy; check that the energy resists bending where H = H0"};
 }
 
 std::optional<StopReport> GraphAttempt::find_lost_accuracy(double t) const {
@@ -247,6 +269,7 @@ StopReport GraphAttempt::failure(const std::string& what) const {
 
 std::optional<StopReport> GraphAttempt::recover() {
     const std::string said = flow_->failure();
+    if (auto pause = clock_.find_pause(good_.time)) return pause;
     if (++good_.failures > most_failures) return failure("the time integrator gave up: " + said);
     const Eigen::VectorXd x = good_.x;
     make_flow(x, stage_->forms.rate(x), good_.time, 0);
@@ -281,6 +304,7 @@ std::optional<StopReport> GraphAttempt::step() {
     if (outcome == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
     const Observation o = observe(t, flow_->x(), flow_->v());
     stage_->transport.add_step(t - before, flow_->x(), flow_->v());
+    if (const auto rise = find_rise(o)) return rise;
     const bool due = error_.due(o);
     if ((due || outcome != Flow::Outcome::step) && must_give_up(o)) return given_up;
     write_outputs(t, o);

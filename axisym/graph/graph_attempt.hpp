@@ -43,7 +43,8 @@ private:
     struct Good {
         Eigen::VectorXd x;
         double time = 0;
-        int failures = 0;  // of the integrator since
+        double least_energy = std::numeric_limits<double>::infinity();  // so far
+        int failures = 0;                                               // of the integrator since
     };
     // What is known of the end of the last step.
     struct Now {
@@ -60,6 +61,7 @@ private:
 
     std::optional<StopReport> step();
     bool must_give_up(const Observation& o);
+    std::optional<StopReport> find_rise(const Observation& o);
     std::optional<StopReport> check(Flow::Outcome outcome, const Observation& o);
     std::optional<StopReport> find_lost_accuracy(double t) const;
     std::optional<StopReport> check_start() const;

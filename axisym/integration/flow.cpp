@@ -152,6 +152,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     require(IDASetNonlinConvCoef(s.ida, control.newton), "the Newton tolerance");
     require(IDASetDeltaCjLSetup(s.ida, 0.1), "the lifetime of the Jacobian");
     require(IDASetInitStep(s.ida, control.first_step), "the first step");
+    require(IDASetEtaMax(s.ida, control.growth), "the growth of steps");
     s.jacobian = SUNSparseMatrix(n, n, s.system.pattern->nonZeros(), CSC_MAT, s.context);
     set_pattern(*s.system.pattern, s.jacobian);
     s.solver = SUNLinSol_KLU(s.x, s.jacobian, s.context);

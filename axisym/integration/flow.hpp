@@ -16,6 +16,7 @@ struct TimeControl {
     double absolute = 1e-9;  // added to that, times the unknown's scale
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
+    double growth = 2;       // a step is at most so many times as long as the one before; at least 2
     double newton = 0.01;    // tolerance of the iteration, relative to that of the error test
     // At least two iterations. IDA accepts one where earlier ones converged quickly; then constraints hold only to
     // the error of the step, because they are nonlinear.

@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace tubule {
 namespace {
+
+constexpr double rounding = 1e-12;  // of E_ref: no energy is known better
 
 // Of a run that is not refined any more, although it may be less accurate than asked.
 void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
@@ -22,6 +26,7 @@ void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
 RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
     for (;;) {
         RunSummary& s = runs.next();
+        s.estimated_error = std::max(s.estimated_error, rounding);
         s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
         if (can_go_on(s.stop.reason)) return s;
         if (!runs.refine(s)) {

@@ -50,7 +50,7 @@ double EnergyTrace::through_neighbours(double t, int after) const {
 }
 
 std::optional<double> EnergyTrace::difference(double t, double energy) const {
-    if (empty() || t > end()) return std::nullopt;
+    if (empty() || t > end() || (t > time_[0] && t < time_[1])) return std::nullopt;
     return std::abs(energy - (*this)(t));
 }
 

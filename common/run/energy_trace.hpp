@@ -20,7 +20,8 @@ public:
     // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
     // too near to them.
     double operator()(double t) const;
-    // How far another run's energy is from this one's, absolute; nothing after the end.
+    // How far another run's energy is from this one's, absolute; nothing after the end, and nothing within the first
+    // step, as the energy of a start that is not smooth falls like a root of the time.
     std::optional<double> difference(double t, double energy) const;
 
     // Of a record (common/result/record.hpp), under names that begin so.

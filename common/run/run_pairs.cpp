@@ -12,11 +12,12 @@ constexpr const char* role = "restart_role";
 struct Saved {
     EnergyTrace own, coarser;
     int coarser_stop = -1;  // there is no coarser run
-    double coarser_time = 0;
+    double coarser_time = 0, coarser_symbol = 0;
 };
 template <class Fields, class Memory>
 void pair_fields(Fields&& f, Memory& m) {
     f.number("restart_coarser_stop", m.coarser_stop), f.number("restart_coarser_time", m.coarser_time);
+    f.number("restart_coarser_symbol", m.coarser_symbol);
     EnergyTrace::fields(f, m.own, "restart_trace"), EnergyTrace::fields(f, m.coarser, "restart_coarser_trace");
 }
 
@@ -27,7 +28,7 @@ void add_to_record(Record& record, const EnergyTrace& own, const EndedRun* coars
     saved.own = own;
     if (coarser)
         saved.coarser = coarser->trace, saved.coarser_stop = static_cast<int>(coarser->stop.reason),
-        saved.coarser_time = coarser->stop.time;
+        saved.coarser_time = coarser->stop.time, saved.coarser_symbol = coarser->least_symbol;
     pair_fields(RecordWriter(record), saved);
 }
 
@@ -37,8 +38,9 @@ PairMemory pair_memory(const Record& record) {
     saved.own.cut_after(record.time);
     PairMemory out{std::move(saved.own), std::nullopt};
     if (saved.coarser_stop >= 0 && saved.coarser_stop < static_cast<int>(stop_kinds.size()))
-        out.coarser =
-            EndedRun{std::move(saved.coarser), {static_cast<Stop>(saved.coarser_stop), saved.coarser_time, "", ""}};
+        out.coarser = EndedRun{std::move(saved.coarser),
+                               {static_cast<Stop>(saved.coarser_stop), saved.coarser_time, "", ""},
+                               saved.coarser_symbol};
     return out;
 }
 

@@ -14,6 +14,7 @@ namespace tubule {
 struct EndedRun {
     EnergyTrace trace;
     StopReport stop;
+    double least_symbol = 0;  // of a curve: how near its flow came to being ill-posed, theory.md (2.14)
 };
 
 // Which run of a pair a record belongs to (its number restart_role; 0: the run that is reported), and what it needs of

@@ -122,9 +122,11 @@ void report(const Case& c, const RunSummary& s, const std::filesystem::path& fil
     fmt::print("{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
     if (!s.stop.advice.empty()) fmt::print("    {}\n", s.stop.advice);
     for (const std::string& warning : s.warnings) fmt::print("    warning: {}\n", warning);
-    if (s.reference_energy > 0)
+    if (s.reference_energy > 0 && s.estimated_error < 1)
         fmt::print("    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
                    s.estimated_error, s.reference_energy, c.accuracy.energy);
+    else if (s.reference_energy > 0)
+        fmt::print("    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
     for (const auto& [key, value] : s.details)
         if (key == "choice" || key == "reason") fmt::print("    {}: {}\n", key, std::get<std::string>(value));
     fmt::print("    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
