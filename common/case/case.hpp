@@ -59,7 +59,7 @@ struct Discretisation {
 // The same of tier surface3d.
 struct SurfaceDiscretisation {
     std::optional<int> elements;  // about how many triangles
-    std::optional<int> order;     // of the elements: 2, 3, 4; element_order() tells the default
+    std::optional<int> order;     // of the elements: 2, 3, 4; default: element_order()
     MeshKind mesh = MeshKind::uniform;
     // Of a shape at rest:
     Recovery recovery = Recovery::patch;

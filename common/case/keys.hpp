@@ -1,4 +1,4 @@
-// What a case file may say. Every table describes its keys once, as a template over a visitor `Keys`:
+// The keys of a case file. Every table describes its keys once, as a template over a visitor `Keys`:
 // Reader (reader.hpp) reads and checks a file with it, Writer (write.cpp) writes one. The verbs:
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
 //   absent     a key that belongs to other cases, and why it must not be here
@@ -121,7 +121,7 @@ void keys(Keys& k, Discretisation& d) {
         {{"graph", Parametrisation::graph}, {"even", Parametrisation::even}, {"material", Parametrisation::material}});
 }
 
-// What a case may say with a time scheme.
+// The keys that a time scheme accepts.
 template <class Keys>
 void keys_of_scheme(Keys& k, SurfaceDiscretisation& d, const SchemeEntry& scheme) {
     const auto absent = [&](const char* key, const char* what) {

@@ -11,7 +11,7 @@ namespace tubule {
 
 // Applies "a.b.0.c=value": tables that are missing are made, a list takes the index behind its last entry as
 // a new entry, and a value that is no TOML is a string. What it inserts has the text "--set ..." as its source,
-// so that later complaints name it. Throws CaseError when the override makes no sense by itself.
+// so that later errors name it. Throws CaseError when the override is invalid by itself.
 void apply_override(toml::table& root, const std::string& set);
 
 // The entry of a table or list under a name or index; null where there is none.

@@ -10,8 +10,8 @@
 
 namespace tubule {
 
-// Bad input. The message starts with "file:line:column: " (or "--set key=value: " where an override is to
-// blame), and says what is wrong, what is allowed and, for a near miss, what was probably meant.
+// Bad input. The message starts with "file:line:column: " (or "--set key=value: " if an override
+// caused it), and says what is wrong, what is allowed and, for a near miss, what was probably meant.
 struct CaseError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };

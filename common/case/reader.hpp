@@ -118,7 +118,7 @@ public:
         }
     }
 
-    // `key` is relative to this table, "" the table itself; where it is absent, what holds it is to blame.
+    // `key` is relative to this table, "" the table itself; if it is absent, the enclosing table is reported.
     template <class Complain>
     void check(const std::string& key, const Complain& complain) {
         if (pass_ == Pass::names) return;

@@ -24,11 +24,11 @@ enum class Recovery {
 enum class MeshKind {
     uniform,   // triangles of about equal size
     graded,    // small where the curvature varies within a short distance
-    irregular  // uniform, then disturbed at random: to see that nothing hangs on regular neighbours
+    irregular  // uniform, then randomly perturbed: for tests that nothing relies on a regular mesh
 };
 
-// A time scheme that moves a surface: its name in a case, and what a case may say with it. A new scheme is a line of
-// `schemes` and a file in surface3d/motion/schemes/ (see its README).
+// A time scheme that moves a surface: its name in a case, and which keys a case may give with it. A new scheme is a
+// line of `schemes` and a file in surface3d/motion/schemes/ (see its README).
 struct SchemeEntry {
     std::string_view name;
     bool default_with_inertia = false, default_without_inertia = false;  // where a case names no scheme

@@ -81,7 +81,7 @@ public:
     void array(const std::string& name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
     void array(const std::string& name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;
     void array(const std::string& name, Eigen::Matrix3Xd& values, std::optional<Eigen::Index> count = {}) const;
-    // `count` rows or none: what only some runs have is written all the same.
+    // `count` rows, or none: fields that only some runs have are always written.
     template <class Values>
     void optional_array(const std::string& name, Values& values, std::optional<Eigen::Index> count = {}) const {
         const Array* found = find_array(record_, name);

@@ -63,7 +63,7 @@ struct CaseText {
     std::vector<std::string> sets;  // overrides "key=value"
 };
 
-// Writes a result so that every row and frame handed over survives a kill at any later moment:
+// Writes a result such that every row and frame passed to it survives a kill at any later moment:
 // each goes to an append-only journal NAME.hdf.journal first; NAME.hdf itself is only ever replaced
 // as a whole (write aside, rename). Non-finite numbers and impossible names are refused with
 // std::invalid_argument, I/O errors and a second writer of the same file with std::runtime_error naming
@@ -71,11 +71,11 @@ struct CaseText {
 // journal.
 class ResultWriter {
 public:
-    // Begins a new result: NAME.hdf is there when this returns, still without rows. An old result of that
+    // Starts a new result: NAME.hdf exists when this returns, without rows. An old result of that
     // name is replaced; a file that is not a result is kept (std::runtime_error). `series` must contain "time".
     static ResultWriter create(const std::filesystem::path& file, const CaseText& c, const About& about,
                                const std::vector<std::string>& series);
-    // Goes on with a result from its newest restart record (checkpoint or last frame, whichever is later);
+    // Resumes a result from its newest restart record (checkpoint or last frame, whichever is later);
     // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
     // restart_record() gives it. Throws std::runtime_error if there is none, and whatever `check` throws of it, with
     // the file as it was.

@@ -1,4 +1,4 @@
-// Normal and curvatures that the moving surface is driven by.
+// Normal and curvatures that determine the force on a moving surface.
 #pragma once
 
 #include "surface3d/fem/surface_space.hpp"
@@ -7,9 +7,9 @@ namespace tubule::surface3d {
 
 class Projection;
 
-// Nodal values, theory.md (10.1), (10.2). H nu is the weak Laplacian of the position: unlike all recoveries
-// that look at the normal or at patches alone, it feels every wave that the mesh can hold, so that the bending force
-// restores them. K is that of the gradient of the continuous normal.
+// Nodal values, theory.md (10.1), (10.2). H nu is the weak Laplacian of the position: unlike recoveries
+// from the normal or from patches alone, it sees every wave that the mesh can represent, so that the bending force
+// acts on it. K is that of the gradient of the continuous normal.
 struct MotionFields {
     VectorField normal;
     Eigen::VectorXd H, K;

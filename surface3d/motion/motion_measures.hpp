@@ -1,4 +1,4 @@
-// What is measured of a moving surface: energies, balances, shape and mesh.
+// Measurements of a moving surface: energies, balances, shape and mesh.
 #pragma once
 
 #include "surface3d/curvature/bending_force.hpp"

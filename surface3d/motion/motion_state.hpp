@@ -29,15 +29,15 @@ struct MotionState {
     Eigen::VectorXd u;  // velocity as in MotionUnknowns, component by component
     Eigen::VectorXd p;  // pressure, at the nodes of its own order
     double lambda = 0;  // multiplier of the volume
-    // Of the scheme that made the step; none at the start, and of schemes that need none. Steps share it: it is never
-    // changed, a step makes its own.
+    // Of the scheme that made the step; null at the start, and for schemes that need none. Steps share it: it is never
+    // modified, each step creates its own.
     std::shared_ptr<const SchemeMemory> memory;
 };
 
 struct MotionStep {
     MotionState state;
     double error = 0;       // of the positions over this step along the normal, largest, estimated
-    double correction = 0;  // energy that keeping area and volume took
+    double correction = 0;  // energy spent on the correction of area and volume
 };
 
 // Whether positions, velocities and multipliers are finite.

@@ -1,5 +1,5 @@
-// A surface in motion on one mesh, without a time scheme: its fields, the motion of its nodes, and what is kept, area,
-// volume and momenta. Time schemes are built on it, and what is measured of a state is found with it.
+// A surface in motion on one mesh, without a time scheme: its fields, the motion of its nodes, and the conserved area,
+// volume and momenta. Time schemes and measurements are built on it.
 #pragma once
 
 #include <optional>
@@ -15,27 +15,27 @@
 
 namespace tubule::surface3d {
 
-// What is kept on the way, and how the mesh moves.
+// What is conserved, and how the mesh moves.
 struct MotionControl {
-    std::optional<double> area = {}, volume = {};  // kept to rounding, where the law has the multiplier
+    std::optional<double> area = {}, volume = {};  // conserved to rounding, where the law has the multiplier
     double relaxation = 0.1;                       // time in which the mesh becomes even
-    bool follow_curvature = false;                 // or one whose triangles are small where the surface is curved
-    // Where 1 - (INT H)^2/(A INT H^2) is less, area and volume are one condition to the accuracy of the mesh: lambda is
-    // left out, as the pressure stands for it, and the area alone is kept to rounding.
+    bool follow_curvature = false;                 // or small triangles where the surface is curved
+    // If 1 - (INT H)^2/(A INT H^2) is smaller, area and volume are the same condition to the accuracy of the mesh:
+    // lambda is omitted, the pressure takes its place, and only the area is conserved to rounding.
     double least_variation = 1e-8;
     double smoothing = 0;  // of schemes that smooth curvatures: eps of a - eps Lap a = a_h, a length squared
 };
 
 class MovingSurface {
 public:
-    // A law that does not resist rigid motions gets a slight friction, and these are held at zero.
+    // A law that does not resist rigid motions gets a slight friction, and rigid motions are set to zero.
     MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control);
 
-    // At rest, corrected to the area and volume that are kept: a short step would make up for the defect of a new mesh
-    // at high speed. SolveError where they cannot be kept to 1e-8.
+    // A state at rest, corrected to the conserved area and volume: otherwise a short first step would correct the
+    // defect of a new mesh at high speed. SolveError if they cannot be met to 1e-8.
     MotionState start(const CurvedMesh& mesh);
-    // The same with a velocity as in MotionState, with which nodes begin to move, too: a first step from nodes at rest
-    // would not bend the surface. With a rigid motion added that makes `momenta` what is given, if anything is.
+    // The same with a velocity as in MotionState, with which the nodes start to move, too: a first step from nodes at
+    // rest would not bend the surface. If `momenta` is not empty, a rigid motion is added to obtain these.
     MotionState start(const CurvedMesh& mesh, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta = {});
 
     const SurfaceSpace& space() const { return space_; }
@@ -50,30 +50,30 @@ public:
     MotionFields fields(const CurvedMesh& mesh);
     // (u.nu, phi) of a velocity as in MotionState.
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
-    // Of the nodes, where that of the surface along the normal is given by `flux`; `fields` are the last ones.
+    // The velocity of the nodes for the normal velocity of the surface given by `flux`; `fields` are the last ones.
     VectorField mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields, const Eigen::VectorXd& flux,
                               double te);
     // At the nodes of the mesh: velocities of the surface, pressures.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
     Eigen::VectorXd pressure_at_nodes(const MotionState& state) const;
 
-    // Momentum and angular momentum except for the density (a tube: about its axis alone), which friction alone
-    // changes; empty where there is no inertia.
+    // Momentum and angular momentum except for the density (of a tube: about its axis only), which only friction
+    // changes; empty without inertia.
     Eigen::VectorXd momenta(const MotionState& state) const;
-    Eigen::VectorXd momenta_after(const MotionState& from, double tau) const;  // what friction leaves of them
-    // Adds the rigid motion that makes them `kept`, to positions for a time te.
+    Eigen::VectorXd momenta_after(const MotionState& from, double tau) const;  // after the loss by friction
+    // Adds the rigid motion that makes them equal to `kept`; to positions for a time te.
     void keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const;
-    // Columns r of (r, v) for every rigid motion v that the law leaves open: what is to be zero of a velocity.
+    // Columns r of the conditions (r, v) = 0 that exclude the rigid motions left undetermined by the law.
     Eigen::MatrixXd open_rigid_motions(const CurvedMesh& mesh) const;
 
-    // Whether area and volume are one condition to the accuracy of the mesh.
+    // Whether area and volume are the same condition to the accuracy of the mesh.
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
-    // The rates of area and volume with which `begin` comes, in a time `span`, to those that are kept: linear about the
-    // surface `at`, as seen from the expected `end`, with `missed` more, which a step like this is known to miss.
+    // The rates of area and volume that take `begin` to the conserved values in a time `span`: linearised about the
+    // surface `at`, as seen from the expected `end`, plus `missed`, which a step like this is expected to miss.
     Extent rate_to_keep(const CurvedMesh& at, const VectorField& begin, const VectorField& end, double span,
                         const Extent& missed) const;
-    // Displacements along nu and H nu to the area and volume that are kept, and what was lacking before. SolveError
-    // where they cannot be kept to 1e-8.
+    // Corrects area and volume to the conserved values by displacements along nu and H nu; returns the previous defect.
+    // SolveError if they cannot be met to 1e-8.
     struct Correction {
         VectorField displacement;
         Extent lacking;
