@@ -57,7 +57,7 @@ Result read_start(const Case& c, const ResultFrame& from) {
     try {
         return read_result(std::filesystem::path(c.path).parent_path() / from.path);
     } catch (const std::runtime_error& error) {
-        throw CaseError(fmt::format("{}: shape.path: {}", c.path, error.what()));
+        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
     }
 }
 
@@ -67,18 +67,18 @@ struct MakeMeridian {
     Meridian operator()(const Exact& shape) const {
         return meridian(shape);
     }
-    Meridian operator()(const MeshFile&) const { throw CaseError(c.path + ": a mesh is not a profile"); }
+    Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
     Meridian operator()(const ResultFrame& from) const {
         const Result result = read_start(c, from);
         const int count = static_cast<int>(result.frames.size()),
                   number = from.frame < 0 ? count + from.frame : from.frame;
         if (number < 0 || number >= count)
-            throw CaseError(fmt::format("{}: shape.frame must be one of the {} frames of {}, not {}", c.path, count,
-                                        from.path, from.frame));
+            throw complaint(c, "shape.frame",
+                            fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
         try {
             return frame_meridian(result.frames[number]);
         } catch (const std::invalid_argument& error) {
-            throw CaseError(fmt::format("{}: shape.path: {}", c.path, error.what()));
+            throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }
     }
 };

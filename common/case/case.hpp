@@ -1,6 +1,7 @@
 // A case as plain, validated data. See docs/case_files.md for the keys.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
@@ -107,9 +108,10 @@ struct Expect {
 
 // Many fields: one for each table of a case file.
 struct Case {
-    std::string path;               // where it was read from, for messages
-    std::string text;               // the file, verbatim
-    std::vector<std::string> sets;  // --set key=value overrides, in order
+    std::string path;                           // where it was read from, for messages
+    std::string text;                           // the file, verbatim
+    std::vector<std::string> sets;              // --set key=value overrides, in order
+    std::map<std::string, std::string> places;  // of the keys, "file:line:column" or "--set ...": see complaint()
 
     Tier tier = Tier::axisym;
     std::string title, source;

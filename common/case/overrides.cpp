@@ -8,29 +8,23 @@
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/case/toml_input.hpp"
 
 namespace tubule {
 
 namespace {
 
-// A TOML snippet as a node whose source is the override; in a table, since a node lives in one.
-toml::table parse_snippet(const std::string& value, const std::string& source) {
-    return toml::parse("value = " + value, std::string_view(source));
-}
-
+// A value in TOML, or as a string if it is none, as a node whose source is the override; in a table, since a node lives
+// in one.
 toml::table parse_value(const std::string& text, const std::string& source) {
     const bool meant_as_toml = !text.empty() && std::string_view("[{\"'").find(text.front()) != std::string_view::npos;
     try {
-        toml::table parsed = parse_snippet(text, source);
+        toml::table parsed = parse_toml("value = " + text, source);
         if (parsed.size() == 1) return parsed;  // else the text holds a line break and more keys
-    } catch (const toml::parse_error& error) {
-        if (meant_as_toml) throw CaseError(fmt::format("{}: not valid TOML: {}", source, error.description()));
+    } catch (const CaseError&) {
+        if (meant_as_toml) throw;
     }
-    try {
-        return parse_snippet(toml_string(text), source);
-    } catch (const toml::parse_error& error) {
-        throw CaseError(fmt::format("{}: not valid TOML: {}", source, error.description()));
-    }
+    return parse_toml("value = " + toml_string(text), source);
 }
 
 // Puts the value into a table or list. `where` is the path of the parent, `name` the key or index in it.
@@ -65,13 +59,16 @@ void apply_override(toml::table& root, const std::string& set) {
     const bool gap = std::find(names.begin(), names.end(), "") != names.end();
     if (equals == std::string::npos || gap)
         throw CaseError(source + ": must have the form key=value, such as --set energy.k42=0.06");
+    if (names.size() > most_key_parts)
+        throw CaseError(
+            fmt::format("{}: the key has {} parts; at most {} are read", source, names.size(), most_key_parts));
 
     toml::node* at = &root;
     for (std::size_t i = 0; i + 1 < names.size(); ++i) {
         const std::span<const std::string> where(names.data(), i);
         toml::node* next = child(*at, names[i]);
         const char* empty = list_index(names[i + 1]) ? "[]" : "{}";
-        at = next ? next : &insert(*at, where, names[i], parse_snippet(empty, source), source);
+        at = next ? next : &insert(*at, where, names[i], parse_value(empty, source), source);
     }
     const std::span<const std::string> where(names.data(), names.size() - 1);
     insert(*at, where, names.back(), parse_value(set.substr(equals + 1), source), source);

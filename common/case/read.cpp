@@ -2,23 +2,24 @@
 
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-
+#include "common/case/input_file.hpp"
 #include "common/case/overrides.hpp"
 #include "common/case/reader.hpp"
 
 namespace tubule {
+namespace {
+
+void note_places(const toml::node& node, const std::string& path, std::map<std::string, std::string>& places) {
+    if (!path.empty()) places[path] = place(node.source());
+    const std::string prefix = path.empty() ? "" : path + ".";
+    if (const auto* table = node.as_table())
+        for (const auto& [key, value] : *table) note_places(value, prefix + std::string(key.str()), places);
+}
+
+}  // namespace
 
 Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path) {
-    toml::table root;
-    try {
-        root = toml::parse(text, std::string_view(path));
-    } catch (const toml::parse_error& error) {
-        throw CaseError(fmt::format("{}: not valid TOML: {}", place(error.source()), error.description()));
-    }
+    toml::table root = parse_toml(text, path);
     for (const std::string& set : sets) apply_override(root, set);
 
     Case c;
@@ -33,6 +34,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         if (sets.empty() || message.starts_with("--set ")) throw;
         throw CaseError(fmt::format("{} (with --set {})", message, fmt::join(sets, " --set ")));
     }
+    note_places(root, "", c.places);
     if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;
     if (root.contains("expect") && !c.expect.stop) c.expect.stop = Stop::finished;
@@ -40,12 +42,13 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
 }
 
 Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets) {
-    std::error_code none;
-    if (std::filesystem::is_directory(path, none)) throw CaseError(path.string() + ": is a directory, not a case file");
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw CaseError(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    return parse_case(text, sets, path.string());
+    return parse_case(read_input(path, megabyte), sets, path.string());
+}
+
+CaseError complaint(const Case& c, const std::string& key, const std::string& what) {
+    std::string held = key;
+    while (!held.empty() && !c.places.contains(held)) held.erase(held.find('.') == held.npos ? 0 : held.rfind('.'));
+    return CaseError(fmt::format("{}: {} {}", held.empty() ? c.path : c.places.at(held), key, what));
 }
 
 }  // namespace tubule

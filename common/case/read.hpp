@@ -22,6 +22,10 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
 // The same for a text in memory; `path` names it in messages.
 Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path);
 
+// What is wrong with a key, "shape.path" say, that only a later stage can find out, with its place or, where it is
+// absent, that of its table.
+CaseError complaint(const Case& c, const std::string& key, const std::string& what);
+
 // The case as TOML text that stands alone: overrides applied, defaults written out. Comments are not kept.
 std::string effective_toml(const Case& c);
 

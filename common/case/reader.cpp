@@ -44,12 +44,6 @@ std::string meant(const std::string& word, const std::vector<std::string>& names
 
 }  // namespace
 
-std::string place(const toml::source_region& source) {
-    const std::string path = source.path ? *source.path : "";  // TOML++ drops an empty one
-    if (path.starts_with("--set ")) return path;
-    return fmt::format("{}:{}:{}", path, source.begin.line, source.begin.column);
-}
-
 std::string Reader::where(const toml::node& node) const {
     return place(node.source());
 }

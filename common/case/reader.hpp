@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/case/keys.hpp"
+#include "common/case/toml_input.hpp"
 
 namespace tubule {
 
@@ -154,8 +155,5 @@ private:
     std::vector<std::string> names_;
     bool (*accepts_)(std::string_view) = nullptr;
 };
-
-// "file:line:column", or "--set key=value" for what an override brought.
-std::string place(const toml::source_region& source);
 
 }  // namespace tubule

@@ -46,6 +46,31 @@ std::string toml_string(std::string_view text) {
     return result + '"';
 }
 
+std::string valid_utf8(std::string_view text) {
+    std::string valid;
+    for (std::size_t i = 0; i < text.size();) {
+        const auto byte = [&](std::size_t k) {
+            return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0;
+        };
+        const unsigned first = byte(0), second = byte(1);
+        std::size_t length = first < 0x80   ? 1
+                             : first < 0xc2 ? 0
+                             : first < 0xe0 ? 2
+                             : first < 0xf0 ? 3
+                             : first < 0xf5 ? 4
+                                            : 0;
+        for (std::size_t k = 1; k < length; ++k)
+            if ((byte(k) & 0xc0) != 0x80) length = 0;
+        // Longer than needed, half of a surrogate pair, or beyond the last character.
+        if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) || (first == 0xf0 && second < 0x90) ||
+            (first == 0xf4 && second >= 0x90))
+            length = 0;
+        valid += length > 0 ? text.substr(i, length) : "?";
+        i += std::max<std::size_t>(length, 1);
+    }
+    return valid;
+}
+
 std::vector<std::string> split(std::string_view text, char separator) {
     std::vector<std::string> parts(1);
     for (const char c : text) {
@@ -67,8 +92,11 @@ std::optional<std::string> near_miss(std::string_view word, const std::vector<st
     std::optional<std::string> nearest;
     std::size_t smallest = 0;
     for (const std::string& name : names) {
+        const auto [shorter, longer] = std::minmax(word.size(), name.size());
+        const std::size_t most = 2 * std::max<std::size_t>(1, longer / 3);
+        if (2 * (longer - shorter) > most) continue;  // the distance is no less
         const std::size_t distance = edit_distance(word, name);
-        if (distance > 2 * std::max<std::size_t>(1, std::max(word.size(), name.size()) / 3)) continue;
+        if (distance > most) continue;
         if (!nearest || distance < smallest) nearest = name, smallest = distance;
     }
     return nearest;

@@ -11,6 +11,9 @@ namespace tubule {
 // A TOML basic string, quotes included, that reads back as `text`.
 std::string toml_string(std::string_view text);
 
+// The text with '?' for every byte that is not part of a UTF-8 character: names of files can hold any bytes.
+std::string valid_utf8(std::string_view text);
+
 // "a.b" gives {"a", "b"}; "" gives {""}.
 std::vector<std::string> split(std::string_view text, char separator);
 

@@ -9,8 +9,15 @@ namespace tubule {
 
 namespace {
 
+// With the digits that read back exactly; without a fraction as an integer, but -0, which as an integer has no sign.
+template <class T>
+std::string toml_number(T value) {
+    const std::string digits = fmt::format("{}", value);
+    return digits == "-0" ? "-0.0" : digits;
+}
+
 // The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML requires, then its
-// tables. Numbers are written with the digits that read back exactly.
+// tables.
 class Writer {
 public:
     static constexpr bool required = true;
@@ -20,9 +27,9 @@ public:
     template <class T>
     void number(const std::string& key, const T& value, const Range& = {}, bool = false) {
         if constexpr (std::is_same_v<T, typename without_optional<T>::type>)
-            line(key, fmt::format("{}", value));
+            line(key, toml_number(value));
         else if (value)
-            line(key, fmt::format("{}", *value));
+            line(key, toml_number(*value));
     }
 
     template <class T>
@@ -41,7 +48,9 @@ public:
         if (!value.empty()) line(key, toml_string(value));
     }
     void increasing(const std::string& key, const std::vector<double>& values, const Range&) {
-        if (!values.empty()) line(key, fmt::format("[{}]", fmt::join(values, ", ")));
+        std::vector<std::string> numbers;
+        for (const double value : values) numbers.push_back(toml_number(value));
+        if (!values.empty()) line(key, fmt::format("[{}]", fmt::join(numbers, ", ")));
     }
 
     void absent(const std::string&, const std::string&) {}

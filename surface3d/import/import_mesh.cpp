@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <unordered_map>
 
+#include "common/case/input_file.hpp"
+#include "common/case/read.hpp"
 #include "surface3d/import/import_formats.hpp"
 #include "surface3d/import/import_text.hpp"
 
@@ -17,14 +15,18 @@ namespace tubule::surface3d {
 
 namespace {
 
-constexpr std::size_t corners_max = 1000;  // of a polygon: the cost of triangulation is cubic
+constexpr std::size_t corners_max = 1000;             // of a polygon: the cost of triangulation is cubic
+constexpr std::size_t largest_file = 512 * megabyte;  // several million triangles
+// The size of a mesh whose areas, squared, are far from the limits of numbers.
+constexpr double smallest_size = 1e-30, largest_size = 1e30;
 
 std::string contents(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw MeshError(fmt::format("{}: {}", path.string(), std::strerror(errno)));
-    if (std::filesystem::is_directory(path)) throw MeshError(path.string() + ": is a directory");
-    std::string data{std::istreambuf_iterator<char>(file), {}};
-    if (file.bad()) throw MeshError(path.string() + ": reading failed before the end of the file");
+    std::string data;
+    try {
+        data = read_input(path, largest_file);
+    } catch (const CaseError& error) {
+        throw MeshError(error.what());
+    }
     if (data.empty()) throw MeshError(path.string() + ": is empty");
     return data;
 }
@@ -166,8 +168,14 @@ ImportedMesh read_mesh(const std::filesystem::path& path, double weld) {
         throw MeshError(fmt::format("{}: weld must be a number >= 0, not {}", path.string(), weld));
     const FileMesh file = read_file(path);
     if (file.faces.empty()) throw MeshError(path.string() + ": the file contains no faces");
+    if (file.points.empty()) throw MeshError(path.string() + ": the file contains no vertices");
     double size = 0;
     for (const Eigen::Vector3d& x : file.points) size = std::max(size, x.lpNorm<Eigen::Infinity>());
+    if (!(size > smallest_size && size < largest_size))
+        throw MeshError(
+            fmt::format("{}: the largest coordinate is {:g}; it must be between {:g} and {:g}: choose "
+                        "another unit of length",
+                        path.string(), size, smallest_size, largest_size));
     if (weld > 0 && weld < 1e-15 * size) {
         throw MeshError(fmt::format("{}: weld = {:g} is below the rounding error of coordinates as large as {:g}",
                                     path.string(), weld, size));

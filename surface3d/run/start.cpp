@@ -106,17 +106,13 @@ std::filesystem::path beside(const Case& c, const std::string& path) {
     return std::filesystem::path(c.path).parent_path() / path;
 }
 
-[[noreturn]] void refuse(const Case& c, const std::string& what) {
-    throw CaseError(fmt::format("{}: {}", c.path, what));
-}
-
-// What `make` makes of a mesh of the case at `path`, which may turn out to be unusable.
+// What `make` makes of a mesh of the case, which may turn out to be unusable: the complaint then begins with `blame`.
 template <class MakeOne>
-auto usable(const std::string& path, const MakeOne& make) {
+auto usable(const std::string& blame, const MakeOne& make) {
     try {
         return make();
     } catch (const MeshError& error) {
-        throw CaseError(fmt::format("{}: shape.path: {}", path, error.what()));
+        throw CaseError(fmt::format("{}: {}", blame, error.what()));
     }
 }
 
@@ -124,11 +120,12 @@ Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
     try {
         result = read_result(beside(c, from.path));
     } catch (const std::runtime_error& error) {
-        refuse(c, fmt::format("shape.path: {}", error.what()));
+        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
     }
     const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
     if (number < 0 || number >= count)
-        refuse(c, fmt::format("shape.frame must be one of the {} frames of {}, not {}", count, from.path, from.frame));
+        throw complaint(c, "shape.frame",
+                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
     return result.frames[number];
 }
 
@@ -143,17 +140,18 @@ struct Prepare {
     const Case& c;
 
     void refuse_what_needs_a_shape() const {
-        if (c.surface.mesh != MeshKind::uniform || c.surface.elements)
-            refuse(c, "discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+        const std::string absent = "must be absent: the triangles come from shape.path";
+        if (c.surface.mesh != MeshKind::uniform) throw complaint(c, "discretisation.mesh", absent);
+        if (c.surface.elements) throw complaint(c, "discretisation.elements", absent);
         if (c.surface.recovery == Recovery::exact)
-            refuse(
-                c,
-                "discretisation.recovery must not be \"exact\": a surface made of triangles is known only at points");
+            throw complaint(c, "discretisation.recovery",
+                            "must not be \"exact\": a surface made of triangles is known only at points");
     }
     template <class Base, class Map>
     Prepared on(const Base& base, const Map& map) const {
         if (std::is_same_v<Base, Torus> && c.surface.mesh == MeshKind::graded)
-            refuse(c, "discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
+            throw complaint(c, "discretisation.mesh",
+                            "must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
         return {meshes_of(c, base, map)};
     }
 
@@ -172,15 +170,16 @@ struct Prepare {
     }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
-        const auto imported = std::make_shared<ImportedMesh>(usable(c.path, [&] {
+        const std::string blame = complaint(c, "shape.path", "cannot be used").what();
+        const auto imported = std::make_shared<ImportedMesh>(usable(blame, [&] {
             ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld);
             close_mesh(mesh);
             return mesh;
         }));
         const ByOrder<Fit> fits = std::make_shared<std::map<int, Fit>>();
-        const auto fit = [=, path = c.path, smoothing = file.smoothing](int order) -> const Fit& {
+        const auto fit = [=, smoothing = file.smoothing](int order) -> const Fit& {
             return once(fits, order, [&] {
-                return usable(path, [&] { return fit_surface(*imported, {order, smoothing}); });
+                return usable(blame, [&] { return fit_surface(*imported, {order, smoothing}); });
             });
         };
         std::vector<std::string> notes = imported->notes;
@@ -205,7 +204,7 @@ struct Prepare {
             const auto& [r, z, length] = std::get<ProfilePoints>(profile);
             return (*this)(WavedProfile{profile_curve(r, z, length), {}, {}});
         } catch (const std::invalid_argument& error) {
-            refuse(c, fmt::format("shape.path: {}: {}", from.path, error.what()));
+            throw complaint(c, "shape.path", fmt::format("cannot be used: {}: {}", from.path, error.what()));
         }
     }
     Prepared of_spline(const Revolution& tube) const {

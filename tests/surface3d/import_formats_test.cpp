@@ -2,7 +2,9 @@
 // columns and bytes are counted by hand.
 #include "surface3d/import/import_formats.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
@@ -253,11 +255,22 @@ TEST(ReadMesh, RefusesWhatIsNoMeshFile) {
         }
         return "accepted";
     };
-    EXPECT_EQ(message("none.obj"), "none.obj: No such file or directory");
+    EXPECT_EQ(message("none.obj"), "none.obj: cannot be opened: No such file or directory");
     EXPECT_EQ(message("scan.vtk"), "scan.vtk: the extension must be .obj, .off, .ply or .stl");
     std::filesystem::create_directory(directory.path() / "folder.obj");
-    EXPECT_EQ(message("folder.obj"), "folder.obj: is a directory");
+    EXPECT_EQ(message("folder.obj"), "folder.obj: is a directory, not a file");
     directory.write("empty.ply", "");
+    directory.write("bare.off", "OFF 0 1 0\n3 0 1 2\n");
+    EXPECT_EQ(message("bare.off"), "bare.off: the file contains no vertices");
+    for (const char* size : {"1e100", "1e160", "1e-100"}) {  // the cube of their areas is no number
+        directory.write("far.obj", fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nf 1 2 3\n", size));
+        EXPECT_EQ(message("far.obj").find("far.obj: the largest coordinate is 1e"), 0u);
+    }
+    ASSERT_EQ(mkfifo((directory.path() / "pipe.obj").c_str(), 0600), 0);
+    EXPECT_EQ(message("pipe.obj"), "pipe.obj: is a pipe or a device, not a file: save its contents to a file first");
+    directory.write("huge.obj", "");
+    std::filesystem::resize_file(directory.path() / "huge.obj", 1ull << 40);  // takes no room on the disk
+    EXPECT_EQ(message("huge.obj"), "huge.obj: is larger than 512 MB, the most that is read");
     EXPECT_EQ(message("empty.ply"), "empty.ply: is empty");
     directory.write("a.obj", three + "f 1 2 3\n");
     EXPECT_EQ(message("a.obj", -1), "a.obj: weld must be a number >= 0, not -1");

@@ -187,14 +187,19 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
         return "accepted";
     };
     EXPECT_EQ(refusal("kind = \"torus\"\nradius = 2\ntube_radius = 1\n", {"discretisation.mesh=graded"}),
-              "case.toml: discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, not \"graded\"");
-    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n").find("case.toml: shape.path: "), 0u);
+              "--set discretisation.mesh=graded: discretisation.mesh must be \"uniform\" or \"irregular\" for a torus, "
+              "not \"graded\"");
+    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n"),
+              "case.toml:6:8: shape.path cannot be used: none.obj: cannot be opened: No such file or directory");
     EXPECT_EQ(refusal("kind = \"result\"\npath = \"none.hdf\"\n"),
-              "case.toml: shape.path: cannot open none.hdf: No such file or directory");
-    EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.elements=100"}),
-              "case.toml: discretisation.mesh and .elements must be absent: the triangles come from shape.path");
+              "case.toml:6:8: shape.path cannot be used: cannot open none.hdf: No such file or directory");
+    for (const char* key : {"discretisation.elements=100", "discretisation.mesh=graded"})
+        EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {key}),
+                  fmt::format("--set {}: {} must be absent: the triangles come from shape.path", key,
+                              std::string(key).substr(0, std::string(key).find('='))));
     EXPECT_EQ(refusal("kind = \"file\"\npath = \"none.obj\"\n", {"discretisation.recovery=exact"}),
-              "case.toml: discretisation.recovery must not be \"exact\": a surface made of triangles is known only at "
+              "--set discretisation.recovery=exact: discretisation.recovery must not be \"exact\": a surface made of "
+              "triangles is known only at "
               "points");
 }
 

@@ -1,6 +1,7 @@
 // Case files: every refusal with its place and its words, the accepted forms, overrides, writing back; and the
 // tube that a case describes. Lines and columns are counted by hand in the text below.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -312,9 +313,49 @@ TEST(CaseRefusal, Files) {
         return "accepted";
     };
     const std::filesystem::path folder = testing::TempDir();
-    EXPECT_EQ(message(folder), folder.string() + ": is a directory, not a case file");
+    EXPECT_EQ(message(folder), folder.string() + ": is a directory, not a file");
+    EXPECT_EQ(message("/dev/zero"), "/dev/zero: is a pipe or a device, not a file: save its contents to a file first");
+    const std::filesystem::path pipe = folder / "pipe.toml", huge = folder / "huge.toml";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    EXPECT_EQ(message(pipe), pipe.string() + ": is a pipe or a device, not a file: save its contents to a file first");
+    std::ofstream(huge) << "# ";
+    std::filesystem::resize_file(huge, 1ull << 40);  // takes no room on the disk
+    EXPECT_EQ(message(huge), huge.string() + ": is larger than 1 MB, the most that is read");
+    for (const auto& made : {pipe, huge}) std::filesystem::remove(made);
     const std::filesystem::path absent = folder / "no_such_case.toml";
     EXPECT_EQ(message(absent), absent.string() + ": cannot be opened: No such file or directory");
+}
+
+// toml++ overflows the stack with a key of some ten thousand parts.
+TEST(CaseRefusal, KeysOfManyParts) {
+    const auto message = [](const std::string& text, const std::vector<std::string>& sets = {}) -> std::string {
+        try {
+            parse_case(text, sets, "x.toml");
+        } catch (const CaseError& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    const auto key = [](int parts, const std::string& part) {
+        std::string text = part;
+        for (int i = 1; i < parts; ++i) text += "." + part;
+        return text;
+    };
+    const std::string refused = ": a key has more than 32 parts";
+    for (const std::string part : {"a", "\"a.b\"", "'a'", "a \t", R"("\"")"}) {
+        const std::string many = key(100000, part);
+        for (const std::string before : {"", "[", "[[", "x = {y = 1, ", "x = [{", "x = {y = \"\"\"a\"\"\"\", ",
+                                         "x = '''\n'\n'''\n", "x = \"\"\"\\\"\"\"\"\"\n", "# '\n"})
+            EXPECT_TRUE(message(before + many + " = 1").ends_with(refused)) << before << part;
+        EXPECT_TRUE(message(key(32, part) + " = 1").starts_with("x.toml:1:1: unknown key ")) << part;
+    }
+    EXPECT_EQ(message("a = 1\n  " + key(33, "b") + " = 2"), "x.toml:2:66" + refused);
+    EXPECT_TRUE(message("", {key(1000, "a") + "=1"}).ends_with("=1: the key has 1000 parts; at most 32 are read"));
+    EXPECT_TRUE(message("", {"x={" + key(1000, "a") + "=1}"}).ends_with(refused));
+    // Dots of comments, strings and numbers are none of a key.
+    const std::string dots(1000, '.');
+    EXPECT_TRUE(message("# " + dots + "\nx = [\"" + dots + "\", '''\n" + dots + "''', 0.1, 0.1]")
+                    .starts_with("x.toml:2:1: unknown key x"));
 }
 
 TEST(CaseRefusal, Overrides) {

@@ -2,33 +2,23 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <set>
 
+#include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/case/toml_input.hpp"
 
 namespace tubule {
 namespace {
 
 constexpr std::size_t most_points = 1'000'000;  // all are kept in memory
+constexpr std::size_t largest_table = 32 * megabyte;
 constexpr int most_halvings = 30;
-
-std::string read_text(const std::filesystem::path& path) {
-    std::error_code none;
-    if (std::filesystem::is_directory(path, none)) throw CaseError(path.string() + ": is a directory");
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw CaseError(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::string trimmed(const std::string& text) {
     const auto first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
@@ -285,7 +275,9 @@ Axis parse_axis(const std::string& over) {
 Axis parse_table(const std::string& text, const std::string& path) {
     Axis axis;
     int number = 0;
-    for (const std::string& line : split(text, '\n')) {
+    for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {
+        end = std::min(text.find('\n', begin), text.size());
+        const std::string line = text.substr(begin, end - begin);
         ++number;
         if (trimmed(line).empty() || trimmed(line).front() == '#') continue;
         const std::vector<std::string> cells = split_list(line);
@@ -297,6 +289,8 @@ Axis parse_table(const std::string& text, const std::string& path) {
             throw CaseError(fmt::format("{}:{}: {} values for {} keys", path, number, cells.size(), axis.keys.size()));
         } else {
             axis.values.push_back(cells);
+            if (axis.size() > most_points)
+                throw CaseError(fmt::format("{}:{}: more than {} points", path, number, most_points));
         }
     }
     if (axis.values.empty()) throw CaseError(fmt::format("{}: no points: a line of keys, then one line a point", path));
@@ -305,21 +299,20 @@ Axis parse_table(const std::string& text, const std::string& path) {
 
 namespace {
 
-toml::table parsed(const std::string& text, const std::string& path) {
-    try {
-        return toml::parse(text, std::string_view(path));
-    } catch (const toml::parse_error& error) {
-        throw CaseError(fmt::format("{}:{}:{}: not valid TOML: {}", path, error.source().begin.line,
-                                    error.source().begin.column, error.description()));
-    }
-}
-
 // The command's values replace those of the file for the same key, and are another axis else.
 std::vector<Axis> axes_of(const std::vector<std::string>& of_file, const std::vector<std::string>& of_command) {
     std::vector<Axis> axes;
-    for (const std::string& over : of_file) axes.push_back(parse_axis(over));
-    for (const std::string& over : of_command) {
+    std::size_t values = 0;
+    const auto parsed = [&](const std::string& over) {
         Axis axis = parse_axis(over);
+        values += axis.size();
+        if (values > 2 * most_points)
+            throw CaseError(fmt::format("--over {}: more than {} values in all", over, 2 * most_points));
+        return axis;
+    };
+    for (const std::string& over : of_file) axes.push_back(parsed(over));
+    for (const std::string& over : of_command) {
+        Axis axis = parsed(over);
         const auto end = axes.begin() + static_cast<std::ptrdiff_t>(of_file.size());
         const auto same = std::find_if(axes.begin(), end, [&](const Axis& a) { return a.keys == axis.keys; });
         if (same != end)
@@ -344,14 +337,14 @@ void refuse_no_points_and_too_many(const Scan& scan) {
 Scan read_scan(const ScanChoices& choices) {
     Scan scan;
     scan.path = choices.file;
-    const std::string text = read_text(choices.file);
-    const toml::table root = parsed(text, choices.file);
+    const std::string text = read_input(choices.file, megabyte);
+    const toml::table root = parse_toml(text, choices.file);
     ScanFile file;
     if (root.contains("case")) {
         file = read_scan_file(root, choices.file);
         scan.text = text;
         scan.case_path = file.case_path;
-        scan.case_text = read_text(file.case_path);
+        scan.case_text = read_input(file.case_path, megabyte);
     } else if (root.contains("over") || root.contains("points")) {
         throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
     } else {
@@ -364,7 +357,7 @@ Scan read_scan(const ScanChoices& choices) {
 
     scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
-    if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_text(points), points));
+    if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
     refuse_no_points_and_too_many(scan);
 
     const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;

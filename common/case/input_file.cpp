@@ -1,0 +1,47 @@
+#include "common/case/input_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include "common/case/read.hpp"
+
+namespace tubule {
+
+std::string read_input(const std::filesystem::path& path, std::size_t most) {
+    const auto refuse = [&](const std::string& why) { throw CaseError(fmt::format("{}: {}", path.string(), why)); };
+    // Without O_NONBLOCK, opening a pipe would wait for somebody who writes into it.
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0) refuse(fmt::format("cannot be opened: {}", std::strerror(errno)));
+    const std::unique_ptr<const int, void (*)(const int*)> closer(&fd, [](const int* open) { ::close(*open); });
+    struct stat info {};
+    if (::fstat(fd, &info) != 0) refuse(fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (S_ISDIR(info.st_mode)) refuse("is a directory, not a file");
+    if (!S_ISREG(info.st_mode)) refuse("is a pipe or a device, not a file: save its contents to a file first");
+
+    const auto expected = static_cast<std::size_t>(info.st_size);
+    const std::string too_large = fmt::format("is larger than {} MB, the most that is read", most / megabyte);
+    if (expected > most) refuse(too_large);
+
+    std::string text;
+    for (std::size_t size = 0;;) {  // until the end: it may have grown since, and some file systems state no size
+        text.resize(std::max(expected, size) + 4096);
+        const ssize_t n = ::read(fd, text.data() + size, text.size() - size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) refuse(fmt::format("cannot be read: {}", std::strerror(errno)));
+        size += static_cast<std::size_t>(n);
+        if (size > most) refuse(too_large);
+        if (n > 0) continue;
+        text.resize(size);
+        break;
+    }
+    return text;
+}
+
+}  // namespace tubule

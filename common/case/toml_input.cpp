@@ -1,0 +1,76 @@
+#include "common/case/toml_input.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <string_view>
+
+#include "common/case/read.hpp"
+
+namespace tubule {
+namespace {
+
+// The position behind the string that begins at `from`; a string that its line does not close ends with the line.
+std::size_t end_of_string(std::string_view text, std::size_t from) {
+    const char quote = text[from];
+    const std::string three(3, quote);
+    const bool of_lines = text.substr(from).starts_with(three);
+    for (std::size_t i = from + (of_lines ? 3 : 1); i < text.size(); ++i) {
+        if (text[i] == '\\' && quote == '"') {
+            ++i;
+        } else if (!of_lines && (text[i] == quote || text[i] == '\n')) {
+            return text[i] == quote ? i + 1 : i;
+        } else if (of_lines && text.substr(i).starts_with(three)) {
+            i += 3;  // up to two more quotes belong to its contents
+            for (int more = 0; more < 2 && i < text.size() && text[i] == quote; ++more) ++i;
+            return i;
+        }
+    }
+    return text.size();
+}
+
+// toml++ handles nested values up to a depth of its own, but walks down the parts of a key without any: a key of some
+// ten thousand parts overflows the stack.
+void refuse_long_keys(std::string_view text, const std::string& path) {
+    std::size_t parts = 1;
+    for (std::size_t i = 0; i < text.size();) {
+        const char c = text[i];
+        if (c == '#') {
+            i = std::min(text.find('\n', i), text.size());
+        } else if (c == '"' || c == '\'') {
+            i = end_of_string(text, i);
+        } else {
+            const bool in_key = std::isalnum(static_cast<unsigned char>(c)) ||
+                                std::string_view("-_ \t.").find(c) != std::string_view::npos;
+            parts = c == '.' ? parts + 1 : in_key ? parts : 1;
+            ++i;
+        }
+        if (parts <= most_key_parts) continue;
+        toml::source_region where;
+        const std::string_view before = text.substr(0, i);
+        where.begin.line = static_cast<toml::source_index>(1 + std::count(before.begin(), before.end(), '\n'));
+        where.begin.column = static_cast<toml::source_index>(i - (before.rfind('\n') + 1));
+        where.path = std::make_shared<const std::string>(path);
+        throw CaseError(fmt::format("{}: a key has more than {} parts", place(where), most_key_parts));
+    }
+}
+
+}  // namespace
+
+std::string place(const toml::source_region& source) {
+    const std::string path = source.path ? *source.path : "";  // TOML++ drops an empty one
+    if (path.starts_with("--set ")) return path;
+    return fmt::format("{}:{}:{}", path, source.begin.line, source.begin.column);
+}
+
+toml::table parse_toml(const std::string& text, const std::string& path) {
+    refuse_long_keys(text, path);
+    try {
+        return toml::parse(text, std::string_view(path));
+    } catch (const toml::parse_error& error) {
+        throw CaseError(fmt::format("{}: not valid TOML: {}", place(error.source()), error.description()));
+    }
+}
+
+}  // namespace tubule
