@@ -92,7 +92,7 @@ std::optional<std::string> near_miss(std::string_view word, const std::vector<st
     std::optional<std::string> nearest;
     std::size_t smallest = 0;
     for (const std::string& name : names) {
-        const auto [shorter, longer] = std::minmax(word.size(), name.size());
+        const auto [shorter, longer] = std::minmax({word.size(), name.size()});
         const std::size_t most = 2 * std::max<std::size_t>(1, longer / 3);
         if (2 * (longer - shorter) > most) continue;  // the distance is no less
         const std::size_t distance = edit_distance(word, name);

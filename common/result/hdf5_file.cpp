@@ -122,6 +122,8 @@ void get_series(hid_t file, Contents& contents) {
 }
 
 void require_parts(hid_t file) {
+    if (has(file, "scan") && has(file, "axes"))
+        throw std::runtime_error("is the result of a scan: this needs the result of a run");
     for (const char* part : {"case", "about", "series", "frames"})
         if (!has(file, part)) throw std::runtime_error(fmt::format("not a Tubule result: /{} is missing", part));
     for (const char* part : {"id", "sequence", "about_begun"})

@@ -320,10 +320,13 @@ void Journal::bytes(Entry kind, std::uint64_t sequence, std::span<const std::byt
 
 std::vector<std::byte> read_journal(const std::filesystem::path& result) {
     const auto path = journal_path(result);
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe must not be waited for
     if (fd < 0 && errno == ENOENT) return {};
     if (fd < 0) durable::fail("open", path, errno);
     const std::unique_ptr<const int, void (*)(const int*)> closer(&fd, [](const int* open) { ::close(*open); });
+    struct stat info {};
+    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode))
+        throw std::runtime_error(fmt::format("{}: not a regular file", path.string()));
 
     const auto read_from = [&](std::size_t offset, std::span<std::byte> into) {
         ssize_t n = 0;

@@ -1,11 +1,12 @@
 #include "common/solve/progress.hpp"
 
-#include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+
+#include "common/solve/message.hpp"
 
 namespace tubule {
 namespace {
@@ -28,16 +29,13 @@ double ProgressStyle::interval() const {
 
 void ProgressStyle::show(std::size_t marks, const std::string& words) const {
     if (terminal)
-        fmt::print(out, "\r[{}{}] {}\x1b[K", std::string(marks, '#'), std::string(bar_width - marks, '.'), words);
+        say(out, "\r[{}{}] {}\x1b[K", std::string(marks, '#'), std::string(bar_width - marks, '.'), words);
     else
-        fmt::print(out, "{}\n", words);
-    std::fflush(out);
+        say(out, "{}\n", words);
 }
 
 void ProgressStyle::wipe() const {
-    if (!terminal) return;
-    std::fputs("\r\x1b[K", out);
-    std::fflush(out);
+    if (terminal) put_words(out, "\r\x1b[K");
 }
 
 std::string duration(double seconds) {

@@ -4,9 +4,13 @@
 command_test.py TUBULE
 """
 import json
+import os
+import re
+import shlex
 import sys
 import tomllib
 import unittest
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -122,6 +126,32 @@ class Refused(ProgramTest):
         self.assertIn("nowhere.hdf", self.refused("show", "nowhere.hdf"))
         self.assertIn("case.toml", self.refused("show", "case.toml"))
         self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
+        self.assertIn("nowhere.hdf: no such file", self.refused("confirm", "nowhere.hdf"))
+
+    def test_names_that_no_result_can_have(self):
+        scan = ("scan", self.case, "--over", "energy.k42=0,0.1")
+        for command in (("run", self.case), scan):
+            long = "x" * 300
+            self.assertIn(f"{long}: cannot be written: File name too long", self.refused(*command, "-o", long))
+            self.assertIn("x.hdf.journal: is the name of the journal of x.hdf",
+                          self.refused(*command, "-o", "x.hdf.journal"))  # fmt: skip
+
+    def test_pipes_devices_and_files_of_any_size(self):
+        os.mkfifo(self.folder / "pipe")
+        with open(self.folder / "huge", "w") as file:
+            file.truncate(2**40)
+        by_points = ("scan", self.case, "--points")
+        of_file = ("--set", "shape={kind=\"result\",path=\"pipe\"}")
+        for command in (["check"], ["run"], ["scan"], ["stability"], ["equilibrium"], by_points, ["show"], ["plot"],
+                        ["compare", "pipe"], ["confirm"], ["run", self.case, *of_file, "--set"]):  # fmt: skip
+            for name in ("pipe", "/dev/zero", "huge"):
+                if command[-1] == "--set":
+                    name = f"shape.path={name}"
+                with self.subTest(command=command, name=name):
+                    self.refused(*command, name)
+        self.tubule("run", self.case, "--quiet")
+        os.mkfifo(self.folder / "case.hdf.journal")
+        self.assertIn("case.hdf.journal: not a regular file", self.refused("show", self.result))
 
 
 class Expect(ProgramTest):
@@ -205,6 +235,28 @@ class Check(ProgramTest):
         self.assertEqual(again.split("\n", 1)[1], out.split("\n", 1)[1])
         self.assertEqual(self.files(), {"case.toml", "again.toml"})
 
+    def test_what_it_prints_prints_itself_again(self):
+        """Whatever the sign of zero, the digits, the characters of texts and the name of the file."""
+        awkward = """
+            about.title = "\\t\\"\\\\ \\u0001 \\u007f\\né"
+            shape.mode.0.phase = -0.0
+            shape.mode.1.amplitude = 8.361757361286462e-6
+            time.output = [-0.0, 5e-324, 1.0e-7, 0.1]
+            expect = {energy = {value = -0.0, abs = 1e22}, at = [{time = 0.1, r_min = {value = 1, rel = 0.1}}]}
+        """
+        sets = [part for line in awkward.strip().splitlines() for part in ("--set", line.strip().replace(" = ", "=", 1))]
+        self.write("again.toml", self.tubule("check", self.case, *sets)[0])
+        once = self.tubule("check", "again.toml")[0]
+        self.write("again.toml", once)
+        self.assertEqual(self.tubule("check", "again.toml")[0], once)
+        case = tomllib.loads(once)
+        self.assertEqual(str(case["shape"]["mode"][0]["phase"]), "-0.0")
+        self.assertEqual(case["shape"]["mode"][1]["amplitude"], 8.361757361286462e-6)
+        for name in (b"two\nlines = 1", b"\xff\xfe"):
+            path = os.fsencode(self.folder) + b"/" + name
+            os.rename(self.write("plain.toml", QUICK), path)
+            tomllib.loads(self.tubule("check", os.fsdecode(path))[0])
+
     def test_all_bad_cases_are_told(self):
         one = self.write("one.toml", QUICK.replace("kind", "knid"))
         two = self.write("two.toml", QUICK.replace("0.5", '"much"'))
@@ -225,6 +277,26 @@ class Others(ProgramTest):
         for subcommand in ("run", "check", "show", "plot"):
             self.assertIn(subcommand, out)
         self.assertEqual(self.tubule(), (out, ""))
+
+    def test_help_of_each_command_has_examples_that_work(self):
+        """And names the exit statuses and pages of docs/. `confirm` is left out: it computes in three dimensions."""
+        root = Path(__file__).parents[2]
+        (self.folder / "cases").symlink_to(root / "cases")
+        readme = (root / "README.md").read_text()
+        commands = re.findall(r"(?m)^  (\w+) ", self.tubule("--help")[0].split("Subcommands:")[1].split("Exit status")[0])
+        self.assertEqual(len(commands), 10)
+        for command in commands:
+            out, _ = self.tubule(command, "--help")
+            examples = re.findall(r"(?m)^  (tubule .*)$", out)
+            self.assertTrue(examples, command)
+            for status in re.findall(r"(?m)^  (\d+) ", out.split("Exit status:")[1]):
+                self.assertIn(f"| {status} | ", readme)
+            pages = re.search(r"(?m)^More: (.*)$", out)[1].split()
+            for page in pages:
+                self.assertTrue((root / page).is_file(), page)
+            for example in examples if command != "confirm" else ():
+                with self.subTest(example=example):
+                    self.tubule(*shlex.split(example)[1:])
 
     def test_plot(self):
         self.tubule("run", self.case)

@@ -149,6 +149,9 @@ class Runs(Compare):
     def test_refusals(self):
         self.assertIn("nowhere.hdf", self.refused("compare", "nowhere.hdf", self.fine))
         self.assertIn("case.toml", self.refused("compare", self.fine, self.case))
+        self.tubule("scan", self.case, "--over", "time.end=1e-3,2e-3", "--quiet", "-o", "scan.hdf")
+        self.assertIn("scan.hdf: is the result of a scan: this needs the result of a run",
+                      self.refused("compare", self.fine, "scan.hdf"))  # fmt: skip
         self.assertIn("required", self.refused("compare", self.fine))
         self.assertIn("did you mean 'energy'; it must be one of", self.refused("compare", self.fine, self.fine, "--tolerance=enregy=1"))
         for bad in ("energy", "energy=", "energy=-1", "energy=much", "energy=nan"):

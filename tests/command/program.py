@@ -91,10 +91,9 @@ class ProgramTest(unittest.TestCase):
     def files(self):
         return {path.name for path in self.folder.iterdir()}
 
-    def start(self, *arguments):
-        return subprocess.Popen(
-            [PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+    def start(self, *arguments, **options):
+        return subprocess.Popen([PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True, **options)  # fmt: skip
 
     def tubule(self, *arguments, status=0):
         """Runs the program to its end; what it printed on stdout, on stderr."""

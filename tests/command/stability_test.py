@@ -236,6 +236,12 @@ class Stability(ProgramTest):
                 self.assertIn(word, text)
             picture.unlink()
 
+    def test_a_tube_that_vanishes_has_rates_at_this_instant(self):
+        """Radius 1 shrinks at a rate of 1e9; the case ends long after."""
+        out, _ = self.tubule("stability", self.tube, "--tension", "1e9")
+        self.assertRegex(out, "the radius changes at the rate -1e.09 and cannot be followed to t = ")
+        self.assertNotIn("factor", out)
+
     def test_bad_input_is_refused(self):
         result = self.folder / "tube.hdf"
         self.tubule("run", "--quiet", self.tube)
@@ -257,6 +263,11 @@ class Stability(ProgramTest):
         self.refuses("a picture is written as", self.tube, "--plot", "waves.txt")
         self.refuses("apply only to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")
         self.refuses("missing.hdf", self.folder / "missing.hdf")
+        for option in ("--tension", "--Re", "--gamma"):
+            for number in ("nan", "inf", "1e999"):
+                model = () if option == "--tension" else ("--model", "stokes")
+                self.refuses(f"{number} is not a finite number", self.tube, option, number, *model)
+        self.refuses("is not a finite number: tension 1e+308", self.tube, "--tension", "1e308")
         self.tubule("stability", self.tube, "--model", "solid", status=2)
         self.tubule("stability", self.tube, "--modes", "-1", status=2)
 

@@ -380,6 +380,18 @@ TEST(Progress, quietIsQuiet) {
     EXPECT_EQ(screen.text(), "");
 }
 
+TEST(Progress, aFullDiskDoesNotMatter) {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> full(std::fopen("/dev/full", "w"), std::fclose);
+    for (const bool terminal : {false, true}) {
+        Screen screen;
+        ProgressStyle style = screen.style(terminal);
+        style.out = full.get();
+        Progress progress(0, 1, style);
+        screen.now += 100;
+        EXPECT_NO_THROW(progress(0.5, 1, 0.1));
+    }
+}
+
 TEST(Progress, startsWhereAResumedRunDoes) {
     Screen screen;
     Progress progress(1, 3, screen.style(false));

@@ -9,8 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/python.hpp"
+#include "tools/command/text.hpp"
 
 namespace tubule {
 
@@ -56,7 +59,7 @@ int chart(const ChartOptions& options) {
     try {
         return become("chart", script_arguments(options));
     } catch (const std::runtime_error& error) {
-        fmt::print(stderr, "{}\n", error.what());
+        say(stderr, "{}\n", error.what());
         return 4;
     }
 }
@@ -90,11 +93,15 @@ void add_chart(CLI::App& app, int& exit_status) {
                      "this directory). The data are written beside the first, .csv")
         ->allow_extra_args(false);
     command->add_option("--jobs", o->jobs, "runs at a time (default 1, for times that can be compared)");
-    command->add_option("--limit", o->limit, "seconds after which a run is given up (default 600)");
+    command->add_option("--limit", o->limit, "seconds after which a run is given up (default 600)")
+        ->check(refuse_infinite);
     command->add_flag("--study", o->study, "also what the chart marks as a study: long runs");
     command->add_flag("--again", o->again, "repeat runs that the data hold already");
     command->add_flag("--draw", o->draw, "run nothing: draw what the data hold");
     command->add_flag("--quiet", o->quiet, "no lines of progress");
+    end_help(*command, {"tubule chart cases/decay.toml --vary accuracy.energy=1e-2,1e-4,1e-6 -o decay.svg"},
+             {{0}, {2}, {4, "a run, the data or the picture failed"}, {130, "interrupted; the same command continues"}},
+             {"charts"});
     command->callback([o, &exit_status] { exit_status = chart(*o); });
 }
 

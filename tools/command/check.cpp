@@ -2,13 +2,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
+#include "tools/command/streams.hpp"
 
 namespace tubule {
 
@@ -18,16 +21,23 @@ struct CheckOptions {
     std::vector<std::string> cases, sets;
 };
 
+// On one line, in UTF-8: the output must be a case whatever its file is called.
+std::string shown_path(const std::string& path) {
+    std::string shown = valid_utf8(path);
+    for (char& c : shown)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+    return shown;
+}
+
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
 int check(const CheckOptions& options) {
     int status = 0;
     for (const std::string& path : options.cases) {
         try {
             const Case c = read_case(path, options.sets);
-            fmt::print("# OK {}\n{}\n", path, effective_toml(c));
+            print_answer(fmt::format("# OK {}\n{}\n", shown_path(path), effective_toml(c)));
         } catch (const CaseError& error) {
-            std::fflush(stdout);
-            fmt::print(stderr, "{}\n", error.what());
+            say(stderr, "{}\n", error.what());
             status = 2;
         }
     }
@@ -42,6 +52,8 @@ void add_check(CLI::App& app, int& exit_status) {
     command->add_option("CASE", options->cases, "case files")->required();
     command->add_option("--set", options->sets, "override a key, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
+    end_help(*command, {"tubule check cases/peanut.toml", "tubule check cases/peanut.toml --set accuracy.energy=1e-6"},
+             {{0, "all cases are valid"}, {2}}, {"case_files"});
     command->callback([options, &exit_status] { exit_status = check(*options); });
 }
 

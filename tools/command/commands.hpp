@@ -36,4 +36,7 @@ struct RunOptions {
 int run_cases(const RunOptions& options);
 std::filesystem::path result_path(const RunOptions& options, const Case& c);
 
+// Refuses, before anything is computed, a name that no result can have. Throws CaseError.
+void check_output(const std::filesystem::path& file);
+
 }  // namespace tubule

@@ -15,9 +15,12 @@
 #include <vector>
 
 #include "common/case/text.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/python.hpp"
+#include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 #include "tools/compare/results.hpp"
 
@@ -338,14 +341,11 @@ int run_compare(const CompareOptions& options) {
     try {
         c = compared(options);
     } catch (const std::exception& error) {
-        fmt::print(stderr, "tubule compare: {}\n", error.what());
+        say(stderr, "tubule compare: {}\n", error.what());
         return bad_input;
     }
     const Text out = options.json ? json_text(c) : options.csv ? csv(c) : words(c);
-    if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0) {
-        fmt::print(stderr, "tubule compare: cannot write the output\n");
-        return bad_input;
-    }
+    print_answer({out.data(), out.size()});
     if (!options.pictures.empty())
         if (const int status = draw_by_script("compare", "compare.py", options.pictures, to_string(json_text(c))))
             return status;
@@ -375,6 +375,9 @@ void add_compare(CLI::App& app, int& exit_status) {
     command->add_flag("--json", o->json, "all of it as JSON, with the series over time")->excludes(csv_flag);
     command->add_option("--plot", o->pictures, "picture to write, .png, .svg or .pdf; may be repeated")
         ->allow_extra_args(false);
+    end_help(*command, {"tubule compare figure.hdf figure.hdf --tolerance energy=1e-4"},
+             {{0}, {1, "a difference is beyond its tolerance"}, {2}, {4, "the picture could not be drawn"}},
+             {"compare"});
     command->callback([o, &exit_status] { exit_status = run_compare(*o); });
 }
 

@@ -17,8 +17,11 @@
 
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
@@ -168,6 +171,7 @@ void check(const ConfirmOptions& options) {
         refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
         refuse(fmt::format("--end must be above 0, not {}", *options.choices.end));
+    if (!fs::exists(options.scan)) throw CaseError(options.scan + ": no such file");
     if (!is_scan(options.scan)) throw CaseError(options.scan + ": is not a result of tubule scan");
 }
 
@@ -231,17 +235,17 @@ int confirm_scan(const ConfirmOptions& options) {
     for (std::size_t i = 0; i < points.size(); ++i) {
         Point& p = points[i];
         if (!options.quiet)
-            fmt::print(stderr, "{} of {}: point {}, {}\n", i + 1, points.size(), p.pick.point, fmt::join(p.sets, ", "));
+            say(stderr, "{} of {}: point {}, {}\n", i + 1, points.size(), p.pick.point, fmt::join(p.sets, ", "));
         const int status = run_in_3d(p, folder);
         if (status == exit_code(Stop::interrupted) || status == 2) return status;
         try {
             p.answer = confirm::answer(p.axisymmetric, read_result(p.file));
         } catch (const std::runtime_error& error) {  // given up without a result
-            fmt::print(stderr, "{}: {}\n", p.file, error.what());
+            say(stderr, "{}: {}\n", p.file, error.what());
         }
     }
     const std::string out = options.csv ? csv(points) : options.json ? json_text(options, points) : words(points);
-    std::fputs(out.c_str(), stdout);
+    print_answer(out);
     return std::all_of(points.begin(), points.end(), agrees) ? 0 : disagreement;
 }
 
@@ -256,12 +260,21 @@ void add_confirm(CLI::App& app, int& exit_status) {
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
     command->add_option("--seed", o->seed, "of the random choice (1)");
     command->add_option("--elements", o->choices.elements, "about how many triangles (200)");
-    command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)");
-    command->add_option("--end", o->choices.end, "run until then instead of time.end of the case");
+    command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)")
+        ->check(refuse_infinite);
+    command->add_option("--end", o->choices.end, "run until then instead of time.end of the case")
+        ->check(refuse_infinite);
     command->add_option("-o,--output", o->folder, "folder of the results (default: beside the scan, NAME_confirm)");
     CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");
     command->add_flag("--json", o->json, "the same, as JSON")->excludes(csv);
     command->add_flag("--quiet", o->quiet, "no progress output");
+    end_help(*command, {"tubule confirm k42.hdf --points 2"},
+             {{0, "all points agree"},
+              {1, "a point does not agree"},
+              {2},
+              {4},
+              {130, "interrupted; the same command continues"}},
+             {"scans"});
     command->callback([o, &exit_status] { exit_status = confirm_scan(*o); });
 }
 

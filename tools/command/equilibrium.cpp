@@ -10,34 +10,39 @@
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
+#include "tools/command/streams.hpp"
+#include "tools/command/text.hpp"
 
 namespace tubule {
 
 namespace {
 
 // One line a shape. Growth rates: the largest of all m, and its m.
-void print_table(const Result& result) {
+Text table_of(const Result& result) {
+    Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
     const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
     const bool branch = has("parameter"), modes = has("growth_0");
-    if (branch) fmt::print("{:>14}  ", "parameter");
-    fmt::print("{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "sigma", "lambda", "height", "r_max", "neg");
-    if (modes) fmt::print("  {:>10} of m", "growth");
-    fmt::print("\n");
+    if (branch) add(out, "{:>14}  ", "parameter");
+    add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "sigma", "lambda", "height", "r_max", "neg");
+    if (modes) add(out, "  {:>10} of m", "growth");
+    add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
-        if (branch) fmt::print("{:>14.9g}  ", value("parameter", i));
-        fmt::print("{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("sigma", i),
-                   value("lambda", i), value("height", i), value("r_max", i), value("negative_directions", i));
+        if (branch) add(out, "{:>14.9g}  ", value("parameter", i));
+        add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("sigma", i),
+            value("lambda", i), value("height", i), value("r_max", i), value("negative_directions", i));
         if (modes) {
             int fastest = 0;
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)
                 if (value(fmt::format("growth_{}", m), i) > value(fmt::format("growth_{}", fastest), i)) fastest = m;
-            fmt::print("  {:>10.4g} {:>4}", value(fmt::format("growth_{}", fastest), i), fastest);
+            add(out, "  {:>10.4g} {:>4}", value(fmt::format("growth_{}", fastest), i), fastest);
         }
         const int special = branch ? static_cast<int>(value("special", i)) : 0;
-        fmt::print("{}\n", special == 1 ? "  fold" : special == 2 ? "  bifurcation" : "");
+        add(out, "{}\n", special == 1 ? "  fold" : special == 2 ? "  bifurcation" : "");
     }
+    return out;
 }
 
 int find(const RunOptions& options) {
@@ -52,7 +57,8 @@ int find(const RunOptions& options) {
     if (options.quiet) return status;
     for (const Case& c : cases) {
         const Result result = read_result(result_path(options, c));
-        if (result.series.contains("time") && !result.series.at("time").empty()) print_table(result);
+        if (result.series.contains("time") && !result.series.at("time").empty())
+            print_answer(to_string(table_of(result)));
     }
     return status;
 }
@@ -68,6 +74,15 @@ void add_equilibrium(CLI::App& app, int& exit_status) {
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
     command->add_flag("--quiet", o->quiet, "no table; words only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
+    end_help(*command, {"tubule equilibrium cases/equilibrium_capsule.toml -o capsule.hdf"},
+             {{0},
+              {1, "--expect: something did not come out as expected"},
+              {2},
+              {3},
+              {4},
+              {5, "the time limit of the case was reached"},
+              {130, "interrupted"}},
+             {"equilibria", "case_files"});
     command->callback([o, &exit_status] { exit_status = find(*o); });
 }
 

@@ -2,11 +2,13 @@
 
 #include <cmath>
 
+#include "common/case/text.hpp"
+
 namespace tubule {
 
 std::string json(const std::string& text) {
     std::string quoted = "\"";
-    for (const char c : text) {
+    for (const char c : valid_utf8(text)) {
         if (c == '"' || c == '\\')
             quoted += {'\\', c};
         else if (static_cast<unsigned char>(c) < 0x20)

@@ -3,34 +3,70 @@
 
 #include <CLI/CLI.hpp>
 #include <exception>
+#include <new>
+#include <sstream>
+#include <string>
 
 #include "common/case/read.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
+#include "tools/command/streams.hpp"
 
-int main(int argc, char** argv) {
+namespace {
+
+std::string version() {
+    std::string text;
+    for (const auto& [name, value] : tubule::build_info()) text += fmt::format("{:<12} {}\n", name, value);
+    return text;
+}
+
+// The exit status.
+int run(int argc, char** argv) {
     CLI::App app("Membranes as fluid deformable surfaces with bending energies of any order in H and K.", "tubule");
     app.require_subcommand(0, 1);
-    bool version = false;
-    app.add_flag("--version", version, "what this program is made of");
+    bool asks_version = false;
+    app.add_flag("--version", asks_version, "what this program is made of");
     int status = 0;
 #define TUBULE_COMMAND(name) tubule::add_##name(app, status);
     TUBULE_COMMANDS(TUBULE_COMMAND)
 #undef TUBULE_COMMAND
+    // Last, since subcommands would inherit it.
+    tubule::end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {
         app.parse(argc, argv);
-        if (version)
-            for (const auto& [name, value] : tubule::build_info()) fmt::print("{:<12} {}\n", name, value);
-        else if (app.get_subcommands().empty())
-            fmt::print("{}", app.help());
-        return status;
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+    } catch (const CLI::ParseError& error) {  // --help, too
+        std::ostringstream out, complaint;
+        const bool answers = app.exit(error, out, complaint) == 0;
+        tubule::put_words(stderr, complaint.str());
+        tubule::print_answer(out.str());
+        return answers ? 0 : 2;
+    }
+    if (asks_version)
+        tubule::print_answer(version());
+    else if (app.get_subcommands().empty())
+        tubule::print_answer(app.help());
+    return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    tubule::secure_streams();
+    try {
+        return run(argc, argv);
     } catch (const tubule::CaseError& error) {
-        fmt::print(stderr, "{}\n", error.what());
+        tubule::say(stderr, "{}\n", error.what());
         return 2;
+    } catch (const tubule::OutputError& error) {
+        tubule::say(stderr, "tubule: {}\n", error.what());
+        return 2;
+    } catch (const std::bad_alloc&) {
+        tubule::put_words(stderr, "tubule: out of memory\n");
+        return 4;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "tubule: {}\n", error.what());
+        tubule::say(stderr, "tubule: {}\n", error.what());
         return 4;
     }
 }

@@ -12,8 +12,11 @@
 
 #include "common/energy/bending.hpp"
 #include "common/result/result.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/python.hpp"
+#include "tools/command/text.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
@@ -52,14 +55,14 @@ int plot(const PlotOptions& options) {
     try {
         for (const std::string& result : options.results) is_scan(result) ? repair_scan(result) : repair_result(result);
     } catch (const std::runtime_error& error) {
-        fmt::print(stderr, "{}\n", error.what());
+        say(stderr, "{}\n", error.what());
         return 2;
     }
     std::vector<std::string> arguments;
     try {
         arguments = script_arguments(options);
     } catch (const std::runtime_error& error) {
-        fmt::print(stderr, "{}\n", error.what());
+        say(stderr, "{}\n", error.what());
         return 4;
     }
     return become("plot", arguments);
@@ -79,6 +82,7 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->allow_extra_args(false);
     command
         ->add_option("--times", options->times, "times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
+        ->check(refuse_infinite)
         ->delimiter(',')
         ->allow_extra_args(false);
     command->add_option("--kind", options->kind, "what to draw: profiles, surface, cuts, energy, balance, all")
@@ -95,6 +99,8 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->check(
             [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
+    end_help(*command, {"tubule plot figure.hdf -o figure.svg"}, {{0}, {2}, {4, "the picture could not be drawn"}},
+             {"pictures"});
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }
 

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "build_config.hpp"
+#include "common/solve/message.hpp"
 
 namespace tubule {
 
@@ -74,7 +75,7 @@ int draw_by_script(const std::string& subcommand, const std::string& script, con
         throw std::runtime_error(fmt::format("tubule {}: cannot write a temporary file for the picture", subcommand));
     return wait_for(subcommand, std::move(command), file.get());
 } catch (const std::runtime_error& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    say(stderr, "{}\n", error.what());
     return no_picture;
 }
 
@@ -84,7 +85,7 @@ int become(const std::string& subcommand, std::vector<std::string> command) {
     argv.push_back(nullptr);
     std::fflush(nullptr);
     execv(argv[0], argv.data());
-    fmt::print(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
+    say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
     return no_picture;
 }
 

@@ -17,9 +17,11 @@
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/message.hpp"
 #include "common/solve/progress.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/run/engine.hpp"
 
 namespace tubule {
@@ -27,6 +29,15 @@ namespace tubule {
 std::filesystem::path result_path(const RunOptions& options, const Case& c) {
     if (!options.output.empty()) return options.output;
     return std::filesystem::path(c.path).filename().replace_extension(".hdf");
+}
+
+void check_output(const std::filesystem::path& file) {
+    if (file.extension() == ".journal")
+        throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
+                                    std::filesystem::path(file).replace_extension().string()));
+    std::error_code error;
+    if (std::filesystem::status(file, error).type() == std::filesystem::file_type::none)
+        throw CaseError(fmt::format("{}: cannot be written: {}", file.string(), error.message()));
 }
 
 About about_start() {
@@ -57,7 +68,7 @@ public:
     bool interrupted() override { return tubule::interrupted(); }
     void note(const std::string& words) override {
         const char* wiped = ProgressStyle::is_terminal(stderr) ? "\r\x1b[K" : "";  // the bar, drawn again soon
-        if (!quiet_) fmt::print(stderr, "{}{}: {}\n", wiped, case_.path, words);
+        if (!quiet_) say(stderr, "{}{}: {}\n", wiped, case_.path, words);
     }
 
 private:
@@ -114,22 +125,22 @@ std::vector<std::string> unmet(const Case& c, const Result& result) {
 // Exit status of a result that is to be as expected, which is said where it is not.
 int compare(const Case& c, const std::filesystem::path& file) {
     const std::vector<std::string> lines = unmet(c, read_result(file));
-    for (const std::string& line : lines) fmt::print(stderr, "{}: not as expected: {}\n", c.path, line);
+    for (const std::string& line : lines) say(stderr, "{}: not as expected: {}\n", c.path, line);
     return lines.empty() ? 0 : 1;
 }
 
 void report(const Case& c, const RunSummary& s, const std::filesystem::path& file, double seconds) {
-    fmt::print("{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
-    if (!s.stop.advice.empty()) fmt::print("    {}\n", s.stop.advice);
-    for (const std::string& warning : s.warnings) fmt::print("    warning: {}\n", warning);
+    say(stdout, "{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
+    if (!s.stop.advice.empty()) say(stdout, "    {}\n", s.stop.advice);
+    for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
     if (s.reference_energy > 0 && s.estimated_error < 1)
-        fmt::print("    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
-                   s.estimated_error, s.reference_energy, c.accuracy.energy);
+        say(stdout, "    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
+            s.estimated_error, s.reference_energy, c.accuracy.energy);
     else if (s.reference_energy > 0)
-        fmt::print("    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
+        say(stdout, "    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
     for (const auto& [key, value] : s.details)
-        if (key == "choice" || key == "reason") fmt::print("    {}: {}\n", key, std::get<std::string>(value));
-    fmt::print("    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
+        if (key == "choice" || key == "reason") say(stdout, "    {}: {}\n", key, std::get<std::string>(value));
+    say(stdout, "    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
 }
 
 bool derivatives_can_be_checked(const Case& c) {
@@ -140,7 +151,7 @@ bool derivatives_can_be_checked(const Case& c) {
 bool derivatives_pass(const Case& c) {
     bool pass = true;
     for (const auto& [key, check] : axisym::check_terms(c)) {
-        fmt::print("{}: {}\n{}\n", c.path, key, check.text());
+        say(stdout, "{}: {}\n{}\n", c.path, key, check.text());
         pass = pass && check.pass();
     }
     return pass;
@@ -189,7 +200,7 @@ std::optional<Opened> open_result(const Case& c, const Engine& engine, const std
 int run_case(Case c, const RunOptions& options) {
     const std::filesystem::path file = result_path(options, c);
     if (options.check_derivatives && !derivatives_pass(c)) {
-        fmt::print(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
+        say(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
         return exit_code(Stop::solver_failed);
     }
     if (options.expect)
@@ -200,7 +211,7 @@ int run_case(Case c, const RunOptions& options) {
     const auto engine = engine_for(c);
     std::optional<Opened> result = open_result(c, *engine, file, options.resume);
     if (!result) {
-        if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", c.path, file.string());
+        if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
     auto& [writer, restart, unfinished] = *result;
@@ -240,6 +251,7 @@ int run_cases(const RunOptions& options) {
         if (options.check_derivatives && !derivatives_can_be_checked(cases.back()))
             throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
         const auto file = result_path(options, cases.back());
+        check_output(file);
         refuse_to_replace_the_start(cases.back(), file);
         if (!files.insert(file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, file.string()));
@@ -253,7 +265,7 @@ int run_cases(const RunOptions& options) {
         } catch (const CaseError&) {
             throw;
         } catch (const std::exception& error) {
-            fmt::print(stderr, "{}: {}\n", c.path, error.what());
+            say(stderr, "{}: {}\n", c.path, error.what());
             one = exit_code(Stop::solver_failed);
         }
         if (status == 0) status = one;
@@ -273,6 +285,12 @@ void add_run(CLI::App& app, int& exit_status) {
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,
                       "first check the derivatives of the energy at the start");
+    end_help(*command,
+             {"tubule run cases/figure_k42_006.toml -o figure.hdf",
+              "tubule run cases/figure_k42_006.toml --set energy.k42=0.1 --set time.end=0.5 -o other.hdf",
+              "tubule run cases/figure_k42_006.toml -o figure.hdf --resume"},
+             {{0}, {1, "--expect: something did not come out as expected"}, {2}, {3}, {4}, {5}, {130}},
+             {"case_files", "results"});
     command->callback([o, &exit_status] { exit_status = run_cases(*o); });
 }
 

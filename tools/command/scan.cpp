@@ -12,7 +12,9 @@
 
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/scan/dispatcher.hpp"
 #include "tools/scan/ranks.hpp"
 
@@ -52,17 +54,18 @@ void report(const ScanResult& result, const std::filesystem::path& file, bool in
     for (int i = 1; i < n_outcomes; ++i)
         if (const std::size_t n = counts[static_cast<std::size_t>(i)]; n > 0)
             words.push_back(fmt::format("{} {}", n, name(static_cast<Outcome>(i))));
-    fmt::print("{}: {}{} of {} points: {}\n", result.scan.path, interrupted ? "interrupted; " : "",
-               result.points.size() - counts[0], result.points.size(), fmt::join(words, ", "));
-    fmt::print("    {} run now, {:.3g} s of CPU time, {:.3g} s; {}\n", effort.points, effort.cpu_seconds, seconds,
-               file.string());
-    if (interrupted) fmt::print("    go on with --resume\n");
+    say(stdout, "{}: {}{} of {} points: {}\n", result.scan.path, interrupted ? "interrupted; " : "",
+        result.points.size() - counts[0], result.points.size(), fmt::join(words, ", "));
+    say(stdout, "    {} run now, {:.3g} s of CPU time, {:.3g} s; {}\n", effort.points, effort.cpu_seconds, seconds,
+        file.string());
+    if (interrupted) say(stdout, "    go on with --resume\n");
 }
 
 int scan_by(const ScanOptions& options, Ranks* ranks) {
     const auto started = std::chrono::steady_clock::now();
     const Scan scan = read_scan(options.choices);
     const auto file = scan_path(options, scan);
+    check_output(file);
     if (ranks && options.jobs)
         throw CaseError("--jobs must be absent under mpirun: each rank runs one point at a time");
     const int jobs = options.jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
@@ -70,14 +73,16 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
     ScanWriter writer = open_result(scan, file, options.resume);
     if (writer.complete()) {
         if (ranks) ranks->dismiss();
-        if (!options.quiet) fmt::print("{}: {} is complete, nothing to resume\n", scan.path, file.string());
+        if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", scan.path, file.string());
         return 0;
     }
     bool was_interrupted = false;
+    int workers = 0;
     ScanEffort effort;
     {
         Dispatcher dispatcher(writer, options.quiet);
-        was_interrupted = ranks ? ranks->run_scan(dispatcher, scan) : run_scan(dispatcher, scan, jobs);
+        workers = ranks ? ranks->run_scan(dispatcher, scan) : run_scan(dispatcher, scan, jobs);
+        was_interrupted = dispatcher.was_interrupted();
         effort = dispatcher.effort();
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
@@ -86,7 +91,7 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
                    {"wall_seconds", seconds},
                    {"cpu_seconds", effort.cpu_seconds},
                    {"points_run", static_cast<std::int64_t>(effort.points)},
-                   {"workers", std::int64_t{ranks ? ranks->count() : jobs}}});
+                   {"workers", std::int64_t{workers}}});
     if (!options.quiet) report(writer.result(), file, was_interrupted, effort, seconds);
     if (was_interrupted && ranks) {
         std::fflush(nullptr);
@@ -109,7 +114,7 @@ int scan(const ScanOptions& options) {
         ranks->dismiss();  // thrown before any work was handed out
         throw;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "tubule: {}\n", error.what());
+        say(stderr, "tubule: {}\n", error.what());
         std::fflush(nullptr);
         ranks->abort(exit_code(Stop::solver_failed));
     }
@@ -137,8 +142,12 @@ void add_scan(CLI::App& app, int& exit_status) {
                       "run each point to time.end even where its outcome is known before");
     command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");
     command->add_flag("--resume", o->resume, "continue a scan that was interrupted or killed");
-    command->add_option("--jobs", o->jobs, "threads (default: one a processor)");
+    command->add_option("--jobs", o->jobs, "threads, at most one a point (default: one a processor)");
     command->add_flag("--quiet", o->quiet, "no output except errors");
+    end_help(*command,
+             {"tubule scan cases/decay.toml --over energy.k42=0:0.2:3 -o k42.hdf",
+              "tubule scan cases/decay.toml --over energy.k42=0:0.2:3 -o k42.hdf --resume"},
+             {{0}, {2}, {4, "a point could not be saved; --resume continues"}, {130}}, {"scans"});
     command->callback([o, &exit_status] { exit_status = scan(*o); });
 }
 

@@ -4,9 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -17,9 +14,12 @@
 
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"
+#include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/show_scan.hpp"
+#include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 #include "tools/scan/scan_file.hpp"
 
@@ -260,13 +260,14 @@ Text shown(const ShowOptions& options) {
 int show(const ShowOptions& options) {
     try {
         const Text out = shown(options);
-        if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0)
-            throw std::runtime_error(fmt::format("cannot write the output: {}", std::strerror(errno)));
+        print_answer({out.data(), out.size()});
         return 0;
+    } catch (const OutputError&) {
+        throw;
     } catch (const std::runtime_error& error) {
         const std::string_view words = error.what();
         const bool named = words.find(options.file) != std::string_view::npos;
-        fmt::print(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
+        say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
         return 2;
     }
 }
@@ -283,6 +284,7 @@ void add_show(CLI::App& app, int& exit_status) {
     command->add_option("--frame", options->frame,
                         "with --csv: points and what is known there, of this frame, instead; with --json: its arrays "
                         "too (-1: the last)");
+    end_help(*command, {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1"}, {{0}, {2}}, {"results"});
     command->callback([options, &exit_status] { exit_status = show(*options); });
 }
 

@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -18,10 +17,14 @@
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"
+#include "common/solve/message.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/help.hpp"
 #include "tools/command/python.hpp"
+#include "tools/command/streams.hpp"
+#include "tools/command/text.hpp"
 
 namespace tubule {
 
@@ -191,16 +194,14 @@ void refuse_contradictions(const StabilityOptions& o) {
 int stability(const StabilityOptions& options) {
     try {
         refuse_contradictions(options);
-        const std::string text = answer(options, subject_of(options));
-        if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-            throw std::invalid_argument("cannot write the output");
+        print_answer(answer(options, subject_of(options)));
         return 0;
     } catch (const NoPicture& failure) {
         return failure.status;
     } catch (const std::invalid_argument& error) {
         const std::string message = error.what();
         const bool named = message.find(options.file) != std::string::npos;
-        fmt::print(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", message);
+        say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", message);
         return 2;
     }
 }
@@ -217,10 +218,13 @@ void add_stability(CLI::App& app, int& exit_status) {
     std::vector<std::string> names{"all"};
     for (const ModelEntry& m : models) names.insert(names.end() - 1, m.name);
     command->add_option("--model", o->model, "another model than the case's, or all")->check(CLI::IsMember(names));
-    command->add_option("--Re", o->Re, "of viscous models, where the case has none")->check(CLI::PositiveNumber);
+    command->add_option("--Re", o->Re, "of viscous models, where the case has none")
+        ->check(CLI::PositiveNumber)
+        ->check(refuse_infinite);
     command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
-        ->check(CLI::NonNegativeNumber);
-    command->add_option("--tension", o->tension, "sigma (default: from model, case and shape)");
+        ->check(CLI::NonNegativeNumber)
+        ->check(refuse_infinite);
+    command->add_option("--tension", o->tension, "sigma (default: from model, case and shape)")->check(refuse_infinite);
     command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();
@@ -236,6 +240,9 @@ void add_stability(CLI::App& app, int& exit_status) {
     CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");
     command->add_flag("--json", o->json, "everything, in full precision")->excludes(csv);
     command->add_option("--plot", o->plot, "tube: draws rates over wave numbers, to a .svg, .png or .pdf");
+    end_help(*command,
+             {"tubule stability cases/tube_waves_fluid.toml --modes 3", "tubule stability figure.hdf --fit 1 --csv"},
+             {{0}, {2}, {4, "the rates could not be computed"}}, {"stability"});
     command->callback([o, &exit_status] { exit_status = stability(*o); });
 }
 

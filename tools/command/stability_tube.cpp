@@ -180,7 +180,12 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
     for (const WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) waves.push_back({*row.n, row.m, 1, 0});
     if (waves.empty()) return;
-    const auto end = theory::waves_in_time(report.tube, report.law, subject.length, waves, {subject.end}).front();
+    theory::WaveState end;
+    try {
+        end = theory::waves_in_time(report.tube, report.law, subject.length, waves, {subject.end}).front();
+    } catch (const SolveError&) {  // the radius vanishes, for one: the rates of this instant are right all the same
+        return;
+    }
     std::size_t k = 0;
     for (WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) row.factor = end.amplitudes[k++];
@@ -203,6 +208,12 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
                 add_row(n, 2 * pi * n / subject.length, m);
         report.fastest.push_back(theory::fastest_wave(report.tube, law, m));
     }
+    for (const WaveRow& row : report.rows)
+        if (!std::isfinite(row.growth.rate()))
+            throw std::invalid_argument(fmt::format(
+                "the growth rate of m = {}, q = {:g} is not a finite number: tension {:g}, moduli, radius, Re "
+                "or gamma are too large or too small to compute with",
+                row.m, row.q, report.tube.tension));
     report.fastest_fitting = theory::fastest_fitting_wave(report.tube, law, subject.length, options.modes);
     if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
     return report;
@@ -260,7 +271,9 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
     add(out, "  beyond the threshold of: {}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")));
     if (const double rate = radius_rate_of(report); rate != 0)
         add(out, "  the radius changes at the rate {:.6g}{}: growth rates hold at this instant only\n", rate,
-            report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end) : "");
+            report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end)
+            : end > 0            ? fmt::format(" and cannot be followed to t = {:g}", end)
+                                 : "");
     if (const auto least = least_k42_of(report.tube); least && !ill)
         add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least);
     add_rows(out, report, end);

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -18,6 +20,11 @@ using Text = fmt::memory_buffer;
 template <class Out, class... Args>
 void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+// What is wrong with a number of the command line: nothing, unless it is infinite or none.
+inline std::string refuse_infinite(const std::string& number) {
+    return std::isfinite(std::strtod(number.c_str(), nullptr)) ? "" : number + " is not a finite number";
 }
 
 inline std::string text_of(const Value& value) {

@@ -1,0 +1,37 @@
+#include "tools/command/help.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "tools/command/text.hpp"
+
+namespace tubule {
+namespace {
+
+const std::map<int, std::string> meanings{
+    {0, "finished as requested"},
+    {1, "something differs from what was expected"},
+    {2, "invalid input, and nothing was written; or the output could not be written"},
+    {3, "the physics ended the run (pinch-off, overhang, ill-posed ...); the result up to then is saved"},
+    {4, "the numerics failed; the last good state is saved"},
+    {5, "the time limit of the case was reached; --resume continues"},
+    {130, "interrupted; --resume continues"}};
+
+}  // namespace
+
+void end_help(CLI::App& command, const std::vector<std::string>& examples, const std::vector<ExitStatus>& statuses,
+              const std::vector<std::string>& pages) {
+    std::string text;
+    if (!examples.empty()) text += examples.size() == 1 ? "Example:\n" : "Examples:\n";
+    for (const std::string& example : examples) add(text, "  {}\n", example);
+    text += "Exit status:\n";
+    for (const auto& [code, meaning] : statuses)
+        add(text, "  {:<4} {}\n", code, meaning.empty() ? meanings.at(code) : meaning);
+    text += "More:";
+    for (const std::string& page : pages) add(text, " docs/{}.md", page);
+    command.footer(text);
+}
+
+}  // namespace tubule
