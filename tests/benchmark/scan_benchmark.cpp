@@ -25,6 +25,7 @@ void scan(benchmark::State& state, const std::string& name, const std::string& b
         ScanWriter writer = ScanWriter::create(file, what, {});
         Dispatcher dispatcher(writer, true);
         run_scan(dispatcher, what, static_cast<int>(std::thread::hardware_concurrency()));
+        dispatcher.was_interrupted();  // throws what failed
         writer.finish({});
         effort = dispatcher.effort();
     }

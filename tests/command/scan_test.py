@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -225,6 +226,27 @@ class Boundary(ScanTest):
         picture = self.folder / "map.svg"
         self.tubule("plot", self.result, "-o", picture)
         self.assertIn("refined", picture.read_text())
+
+
+class Threads(ScanTest):
+    OVER = ("--over", f"{AMPLITUDE}=0.1:0.3:4", "--set", "time.end=0.01", "--to-the-end", "--quiet")
+
+    def workers(self, jobs, **limits):
+        limit = lambda: [resource.setrlimit(getattr(resource, name), value) for name, value in limits.items()]  # noqa: E731
+        with self.start("scan", "case.toml", *self.OVER, "--jobs", jobs, preexec_fn=limit) as process:
+            out, err = process.communicate()
+        self.assertEqual(process.returncode, 0, out + err)
+        self.assertEqual(len(self.shown("case_scan.hdf")[1]), 4)
+        return about(self.folder / "case_scan.hdf")["workers"]
+
+    def test_no_more_than_points(self):
+        self.assertEqual(self.workers(100000), 4)
+        self.assertEqual(self.workers(3), 3)
+
+    def test_no_more_than_the_system_allows(self):
+        """A stack of 2 GB for each thread in 5 GB: the points are run by fewer."""
+        hard = resource.getrlimit(resource.RLIMIT_STACK)[1]
+        self.assertIn(self.workers(4, RLIMIT_STACK=(2 << 30, hard), RLIMIT_AS=(5 << 30, 5 << 30)), (1, 2))
 
 
 class Refusals(ScanTest):

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -11,6 +12,11 @@
 #include "common/solve/interrupt.hpp"
 
 namespace tubule {
+namespace {
+
+constexpr std::size_t most_threads = 256;
+
+}  // namespace
 
 Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
     : writer_(writer), plan_(plan_of(writer.result())), progress_({.quiet = quiet}) {
@@ -71,7 +77,8 @@ PointResult run_one(const Scan& scan, std::size_t point) {
     return result;
 }
 
-bool run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
+int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
+    jobs = static_cast<int>(std::min<std::size_t>({static_cast<std::size_t>(jobs), scan.size(), most_threads}));
     const int processors = omp_get_max_threads();
     const auto work = [&] {
         omp_set_num_threads(std::max(1, processors / jobs));  // of this thread: points share the processors
@@ -83,10 +90,14 @@ bool run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
         }
     };
     std::vector<std::thread> crew;
-    for (int i = 1; i < jobs; ++i) crew.emplace_back(work);
+    crew.reserve(static_cast<std::size_t>(jobs));
+    try {
+        for (int i = 1; i < jobs; ++i) crew.emplace_back(work);
+    } catch (const std::system_error&) {  // no more threads are to be had: those that are do the work
+    }
     work();
     for (std::thread& thread : crew) thread.join();
-    return dispatcher.was_interrupted();
+    return static_cast<int>(crew.size()) + 1;
 }
 
 }  // namespace tubule

@@ -46,8 +46,9 @@ private:
     ScanProgress progress_;
 };
 
-// Runs the scan on `jobs` threads of this process. True if an interrupt ended it. Throws what failed.
-bool run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs);
+// Runs the scan on `jobs` threads of this process, or fewer: at most one a point, as many as the system allows, and
+// 256. How many it had.
+int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs);
 
 // One point, from its keys to its result.
 PointResult run_one(const Scan& scan, std::size_t point);

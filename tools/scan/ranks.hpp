@@ -18,9 +18,8 @@ public:
     int rank() const { return rank_; }
     int count() const { return count_; }
 
-    // Of rank 0: runs the scan on all ranks, one point at a time each. True if an interrupt ended it; throws what
-    // failed.
-    bool run_scan(Dispatcher& dispatcher, const Scan& scan);
+    // Of rank 0: runs the scan on all ranks, one point at a time each. How many they are.
+    int run_scan(Dispatcher& dispatcher, const Scan& scan);
     // Of rank 0 in place of run_scan: there is nothing to do.
     void dismiss();
     // Of the others: computes what rank 0 hands out, until it says that all is over.

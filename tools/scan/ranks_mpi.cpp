@@ -140,7 +140,7 @@ void Ranks::dismiss() {
     broadcast(nothing);
 }
 
-bool Ranks::run_scan(Dispatcher& dispatcher, const Scan& scan) {
+int Ranks::run_scan(Dispatcher& dispatcher, const Scan& scan) {
     Bytes header = header_of(scan);
     broadcast(header);
     std::thread here([&] {
@@ -181,7 +181,7 @@ bool Ranks::run_scan(Dispatcher& dispatcher, const Scan& scan) {
         if (quiet) std::this_thread::sleep_for(poll);
     }
     here.join();
-    return dispatcher.was_interrupted();
+    return count_;
 }
 
 void Ranks::serve() {

@@ -11,8 +11,8 @@ std::optional<Ranks> Ranks::join() {
 }
 Ranks::Ranks(Ranks&&) noexcept = default;
 Ranks::~Ranks() = default;
-bool Ranks::run_scan(Dispatcher&, const Scan&) {
-    return false;
+int Ranks::run_scan(Dispatcher&, const Scan&) {
+    return 0;
 }
 void Ranks::dismiss() {}
 void Ranks::serve() {}
