@@ -4,12 +4,15 @@
 chart_test.py TUBULE PLOT: the program, the folder of its scripts.
 """
 import csv
+import os
+import resource
+import signal
 import stat
 import sys
 import textwrap
 import unittest
 
-from program import QUICK, ProgramTest
+from program import QUICK, SLOW, ProgramTest
 
 sys.path.insert(0, sys.argv[2])
 import chart  # noqa: E402
@@ -105,6 +108,11 @@ class Refusals(Charts):
         self.write("study.toml", 'case = "case.toml"\n[[series]]\nstudy = true')
         self.write("list.toml", 'case = "case.toml"\n[[series]]\nvary = { accuracy.energy = 1 }')
         self.write("other.csv", "a,b\n1,2\n")
+        (self.folder / "binary.csv").write_bytes(b"\xff\0")
+        (self.folder / "folder.csv").mkdir()
+        self.write("huge.toml", QUICK + "#" * 2**20)
+        self.write("nested.toml", "a = " + "[" * 10000)
+        os.mkfifo(self.folder / "pipe")
         for arguments, words in (
             (["case.toml"], "it needs --vary"),
             (["missing.toml", *vary], "cannot be read"),
@@ -127,9 +135,50 @@ class Refusals(Charts):
             (["case.toml", *vary, "-o", "other.svg"], "is no table of a chart"),
             (["case.toml", *vary, "--jobs", "0"], "must be 1 or more"),
             (["case.toml", *vary, "--times", "0.2,0.1"], "must be growing numbers above 0"),
+            (["case.toml", *vary, "--quantity", "enrgy"], "quantity enrgy: no series has this name; did you mean 'energy'?"),
+            (["case.toml", *vary, "--quantity", "a.b"], "quantity 'a.b': is no name of a series"),
+            (["case.toml", *vary, "-o", "folder.svg"], "folder.csv: is no file"),
+            (["case.toml", *vary, "-o", "binary.svg"], "binary.csv: is no table of a chart"),
+            (["pipe", *vary], "pipe: is a directory, a pipe or a device, not a file"),
+            (["huge.toml", *vary], "huge.toml: is larger than 1 MB, the most that is read"),
+            (["nested.toml", *vary], "nested.toml: is not TOML"),
+            (["case.toml", *vary, "--reference", "pipe"], "pipe: is a directory, a pipe or a device, not a file"),
         ):
             with self.subTest(arguments=arguments):
                 self.assertIn(words, self.refused("chart", *arguments))
+
+
+class Surroundings(Charts):
+    VARY = ("--vary", "accuracy.energy=1e-2,1e-3")
+
+    def test_names_that_are_no_text_or_more_than_a_line(self):
+        for name in (b"two\nlines.toml", b"\xff.toml"):
+            with self.subTest(name=name):
+                path = os.fsencode(self.folder) + b"/" + name
+                os.rename(self.write("plain.toml", QUICK), path)
+                self.tubule("chart", os.fsdecode(path), *self.VARY, "-o", "x.svg", "--again")
+
+    def test_a_limit_of_file_sizes_is_told(self):
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))  # noqa: E731
+        with self.start("chart", self.case, *self.VARY, preexec_fn=limit) as process:
+            _, err = process.communicate()
+        self.assertEqual(process.returncode, 4, err)
+        self.assertIn("File too large", err)
+        self.assertNotIn("Traceback", err)
+
+    def test_sigterm_ends_it_and_its_runs(self):
+        self.write("case.toml", SLOW)
+        with self.start("chart", self.case, "--vary", "discretisation.time_tolerance=1e-13,1e-14") as process:
+            children = f"/proc/{process.pid}/task/{process.pid}/children"
+            while not (runs := open(children).read().split()):
+                self.assertIsNone(process.poll())
+            while b"run" not in open(f"/proc/{runs[0]}/cmdline", "rb").read().split(b"\0"):  # first come its checks
+                runs = open(children).read().split() or runs
+            process.send_signal(signal.SIGTERM)
+            _, err = process.communicate()
+        self.assertEqual(process.returncode, 130, err)
+        self.assertIn("tubule chart: interrupted", err)
+        self.assertFalse(any(os.path.exists(f"/proc/{run}") for run in runs))
 
 
 class Outcomes(Charts):

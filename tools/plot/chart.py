@@ -2,7 +2,10 @@
 """Error against CPU time of many runs of a case, or a map of its largest stable steps. See `tubule chart --help`."""
 
 import argparse
+import csv
 import importlib.util
+import os
+import signal
 import sys
 import tempfile
 import tomllib
@@ -12,6 +15,7 @@ from pathlib import Path
 from chart_file import BadChart, Reference, Series, assignment, chart_of_case, check, map_option, plain, read_chart, split
 from chart_file import toml_of
 from chart_runs import Program, Runner, Table
+from command_line import say
 
 EXIT_BAD_INPUT, EXIT_UNAVAILABLE, EXIT_INTERRUPTED = 2, 4, 130
 TARGETS = (1e-3, 1e-4, 1e-6)
@@ -78,12 +82,16 @@ def outputs_of(options):
             raise BadChart(f"{path}: a picture is written as one of {', '.join(FORMATS)}")
         if not path.parent.is_dir():
             raise BadChart(f"{path}: the folder {path.parent} does not exist")
+        if not os.access(path.parent, os.W_OK):
+            raise BadChart(f"{path}: the folder {path.parent} cannot be written to")
     return outputs
 
 
 def checked(program, jobs):
-    """Validates all cases before any run; returns the first as TOML. Raises BadChart."""
+    """Validates all cases and the quantity before any run; returns the first case as TOML. Raises BadChart."""
     first = None
+    if jobs and (error := program.check_quantity(jobs[0])):
+        raise BadChart(error)
     for job in jobs:
         text, error = program.check(job)
         if error:
@@ -112,6 +120,8 @@ def truth_of(chart, times, runs, own, program):
     whole = [run for run in runs if run.finished and all(time in run.values for time in times)]
     if reference.sets is not None:
         whole = [run for run in whole if run.key == own.key]
+    if not whole and any(run.finished and not run.values for run in runs):
+        raise BadChart(f"no run has a series {chart.quantity} at the times of the chart")
     if not whole:
         raise BadChart("no run reached the end of the chart, so errors have no reference")
     best = min(whole, key=lambda run: (run.stated_error or float("inf"), -run.cpu_s))
@@ -193,7 +203,7 @@ def report(jobs, front, chosen, truth):
     return lines, named
 
 
-def work_precision(chart, options, outputs, program, say):
+def work_precision(chart, options, outputs, program, tell):
     jobs = chart.jobs()
     own = None
     if chart.reference.sets is not None:
@@ -207,19 +217,19 @@ def work_precision(chart, options, outputs, program, say):
     if options.draw:
         every = len(jobs)
         jobs = [job for job in jobs if job.key in table.runs]
-        say(f"{len(jobs)} of {every} runs are in {table.path}")
+        tell(f"{len(jobs)} of {every} runs are in {table.path}")
     else:
-        Runner(program, table, jobs, options.jobs, chart.repeats, say).run(jobs)
+        Runner(program, table, jobs, options.jobs, chart.repeats, tell).run(jobs)
     runs = list({job.key: table.runs[job.key] for job in jobs}.values())
     try:
         truth = truth_of(chart, times, runs, own, program)
     except BadChart as error:
-        print(f"tubule chart: {error}", file=sys.stderr)
+        say(f"tubule chart: {error}")
         return EXIT_UNAVAILABLE
     judged, front, chosen = judge(jobs, runs, truth)
     table.write(jobs, judged)
     lines, named = report(jobs, front, chosen, truth)
-    print("\n".join(lines))
+    say("\n".join(lines), sys.stdout)
     import chart_draw
 
     chart_draw.work_precision(chart, jobs, table.runs, truth, front, named, outputs, error_of)
@@ -262,7 +272,7 @@ class Bisection:
         )
 
 
-def stability_map(chart, options, outputs, program, say):
+def stability_map(chart, options, outputs, program, tell):
     lines = [Bisection(chart, series, value) for series in chart.series for value in series.vary[chart.against]]
     checked(program, [line.job(i) for line in lines for i in (0, len(line.values) - 1)])
     table = open_table(chart, options, outputs, [])
@@ -273,15 +283,15 @@ def stability_map(chart, options, outputs, program, say):
             if not going:
                 break
         asked += [job for _, job in going]
-        Runner(program, table, asked, options.jobs, 1, say).run([job for _, job in going])
+        Runner(program, table, asked, options.jobs, 1, tell).run([job for _, job in going])
         for line, job in going:
             line.take(table.runs[job.key])
     table.write(asked)
     for line in lines:
         low, high = line.limits
-        print(f"{line.series.name}: {chart.against} = {line.against:g}: "
-              f"stable up to {'none' if low is None else f'{low:g}'}, "
-              f"unstable from {'none' if high is None else f'{high:g}'}")  # fmt: skip
+        say(f"{line.series.name}: {chart.against} = {line.against:g}: "
+            f"stable up to {'none' if low is None else f'{low:g}'}, "
+            f"unstable from {'none' if high is None else f'{high:g}'}", sys.stdout)  # fmt: skip
     import chart_draw
 
     chart_draw.stability_map(chart, lines, asked, table.runs, outputs)
@@ -289,40 +299,56 @@ def stability_map(chart, options, outputs, program, say):
 
 
 def open_table(chart, options, outputs, times):
+    path = outputs[0].with_suffix(".csv")
+    if path.exists() and not path.is_file():
+        raise BadChart(f"{path}: is no file, so the data of the chart cannot be written there; choose another -o")
     try:
-        return Table(outputs[0].with_suffix(".csv"), chart.quantity, times, options.again)
-    except ValueError as error:
-        raise BadChart(str(error)) from error
+        return Table(path, chart.quantity, times, options.again)
+    except OSError as error:
+        raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, csv.Error) as error:
+        raise BadChart(f"{path}: is no table of a chart ({error}); move it or choose another -o") from error
+
+
+def draw_chart(options):
+    """The exit status. Raises BadChart."""
+
+    def tell(words):
+        if not options.quiet:
+            say(words)
+
+    chart, outputs = chart_of(options), outputs_of(options)
+    with tempfile.TemporaryDirectory(prefix="tubule-chart-") as folder:
+        program = Program(options.tubule, Path(folder), chart.limit, chart.quantity)
+        draw = stability_map if chart.map else work_precision
+        status = draw(chart, options, outputs, program, tell)
+    if status == 0:
+        say("\n".join(map(str, [*outputs, outputs[0].with_suffix(".csv")])), sys.stdout)
+    return status
 
 
 def main():
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
+    sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     options = read_options()
-
-    def say(words):
-        if not options.quiet:
-            print(words, file=sys.stderr, flush=True)
-
     missing = [name for name in ("numpy", "matplotlib", "h5py") if importlib.util.find_spec(name) is None]
     if missing:  # reported before any run
         packages = " ".join(f"python3-{name}" for name in missing)
-        print(f"tubule chart: {sys.executable} lacks {', '.join(missing)}; install {packages}", file=sys.stderr)
+        say(f"tubule chart: {sys.executable} lacks {', '.join(missing)}; install {packages}")
         return EXIT_UNAVAILABLE
+    from results import BadInput
+
     try:
-        chart, outputs = chart_of(options), outputs_of(options)
-        with tempfile.TemporaryDirectory(prefix="tubule-chart-") as folder:
-            program = Program(options.tubule, Path(folder), chart.limit, chart.quantity)
-            draw = stability_map if chart.map else work_precision
-            status = draw(chart, options, outputs, program, say)
-    except BadChart as error:
-        print(error, file=sys.stderr)
+        return draw_chart(options)
+    except (BadChart, BadInput) as error:
+        say(error)
         return EXIT_BAD_INPUT
+    except OSError as error:  # a full disk, no more processes
+        say(f"tubule chart: {error}")
+        return EXIT_UNAVAILABLE
     except KeyboardInterrupt:
-        print("tubule chart: interrupted; run the same command to continue", file=sys.stderr)
+        say("tubule chart: interrupted; run the same command to continue")
         return EXIT_INTERRUPTED
-    if status == 0:
-        for path in [*outputs, outputs[0].with_suffix(".csv")]:
-            print(path)
-    return status
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ SERIES_KEYS = ("name", "set", "vary", "study")
 REFERENCE_KEYS = ("result", "set", "values", "E_ref", "known_to", "source")
 MAP_KEYS = ("key", "from", "to", "per_decade", "steps")
 MOST_RUNS = 2000
+LARGEST_FILE = 2**20  # bytes
 
 
 class BadChart(Exception):
@@ -167,10 +168,14 @@ class Reader:
 def toml_of(path):
     """Raises BadChart."""
     try:
+        if path.exists() and not path.is_file():
+            raise BadChart(f"{path}: is a directory, a pipe or a device, not a file")
+        if path.exists() and path.stat().st_size > LARGEST_FILE:
+            raise BadChart(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
         return tomllib.loads(path.read_text())
     except OSError as error:
         raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise BadChart(f"{path}: is not TOML: {error}") from error
 
 
@@ -256,7 +261,7 @@ def plain(text):
     """A TOML value; a bare word is a string."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
 
 

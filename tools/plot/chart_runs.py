@@ -11,6 +11,7 @@ import io
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import time
@@ -35,7 +36,7 @@ class Job:
     def key(self):
         """Identifies a computation: from the text of the case and the overrides."""
         text = self.case.read_text() + "\n".join(self.sets)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:16]
 
 
 @dataclass
@@ -83,13 +84,25 @@ class Program:
 
     def check(self, job):
         """The case with all overrides as TOML text, or its error."""
-        done = subprocess.run([self.path, "check", job.case, *set_options(job)], capture_output=True, text=True)
+        done = self.printed("check", job.case, *set_options(job))
         return (done.stdout, None) if done.returncode == 0 else (None, done.stderr.strip())
+
+    def check_quantity(self, job):
+        """What is wrong with the name of the quantity, if anything: the program knows what a case can expect."""
+        if not re.fullmatch("[A-Za-z0-9_]+", self.quantity):
+            return f"quantity {self.quantity!r}: is no name of a series"
+        expected = f"expect.{self.quantity}={{value=0.0,abs=1.0}}"
+        error = self.printed("check", job.case, "--set", expected).stderr
+        found = re.search(f"unknown key expect.{self.quantity}(; did you mean .*?\\?)?", error)
+        return f"quantity {self.quantity}: no series has this name{found[1] or ''}" if found else None
+
+    def printed(self, *arguments):
+        return subprocess.run([self.path, *arguments], capture_output=True, encoding="utf-8", errors="replace")
 
     def start(self, job, number):
         result = self.folder / f"run_{number}.hdf"
         command = [self.path, "run", "--quiet", job.case, *set_options(job), "-o", result]
-        log = open(result.with_suffix(".log"), "w")
+        log = open(result.with_suffix(".log"), "wb")
         process = subprocess.Popen(
             list(map(str, command)),
             stdout=log,
@@ -118,7 +131,7 @@ class Program:
             name = signal.Signals(-going.process.returncode).name
             run.outcome, run.message = "crashed", f"ended by {name}"
         elif not run.outcome:
-            words = going.result.with_suffix(".log").read_text().strip().splitlines()
+            words = going.result.with_suffix(".log").read_text(errors="replace").strip().splitlines()
             run.outcome = STATUS.get(going.process.returncode, "crashed")
             run.message = words[-1] if words else f"exit status {going.process.returncode}"
         for path in self.folder.glob(going.result.stem + ".*"):
@@ -127,10 +140,7 @@ class Program:
 
     def read(self, going, run):
         """Content of the result, journal included; empty if there is none."""
-        shown = [
-            subprocess.run([self.path, "show", going.result, form], capture_output=True, text=True)
-            for form in ("--json", "--csv")
-        ]
+        shown = [self.printed("show", going.result, form) for form in ("--json", "--csv")]
         if not going.result.exists() or any(done.returncode != 0 for done in shown):
             return
         about = json.loads(shown[0].stdout)["about"]
@@ -185,9 +195,9 @@ class Table:
         return [f"{self.quantity}@{time:g}" for time in self.times]
 
     def _read(self):
-        """Runs of an earlier call. ValueError if the file is something else."""
+        """Runs of an earlier call. Raises ValueError or csv.Error if the file is something else."""
         runs = {}
-        with open(self.path, newline="") as file:
+        with open(self.path, newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 try:
                     values = {}
@@ -199,9 +209,8 @@ class Table:
                         row["key"], row["outcome"], row["message"], float(row["stop_time"]), float(row["cpu_s"]), values,
                         float(row["E_ref"]), float(row["stated_error"]), int(row["elements"]), int(row["steps"]),
                         float(row["width"]), float(row["growth"]))  # fmt: skip
-                except (KeyError, TypeError, ValueError, AttributeError) as error:
-                    complaint = f"{self.path}: is no table of a chart ({error}); move it or choose another -o"
-                    raise ValueError(complaint) from error
+                except (KeyError, TypeError, AttributeError) as error:
+                    raise ValueError(error) from error
         return runs
 
     def write(self, jobs, judged=None):
@@ -216,7 +225,7 @@ class Table:
                 rows.append(self._row(job.series, " ".join(job.told), run, judged.get(job.key, {})))
         rows += [self._row(*self.names.get(key, ("", "")), run, {}) for key, run in self.runs.items() if key not in seen]
         aside = self.path.with_name(self.path.name + ".part")
-        with open(aside, "w", newline="") as file:
+        with open(aside, "w", newline="", encoding="utf-8", errors="backslashreplace") as file:
             columns = [*self.COLUMNS, *self._value_columns(), "message", "key"]
             writer = csv.DictWriter(file, columns, lineterminator="\n")
             writer.writeheader()
@@ -260,22 +269,38 @@ class Runner:
         if len(jobs) > len(left) and left:
             self.say(f"{len(jobs) - len(left)} runs are in {self.table.path} already")
         left = [job for job in left for _ in range(self.repeats)]
-        total, going = len(left), []
-        while left or going:
-            while left and len(going) < self.at_once:
-                self.number += 1
-                going.append(self.program.start(left.pop(0), self.number))
-            time.sleep(0.005)
-            for one in list(going):
-                run = self.program.look(one)
-                if run is None:
-                    continue
-                going.remove(one)
-                run.values = {at: run.values[at] for at in self.table.times if at in run.values}
-                earlier = done.get(run.key)
-                if earlier is None or run.cpu_s < earlier.cpu_s:  # of repeats, the least disturbed
-                    done[run.key] = run
-                self.table.write(self.jobs)
-                ended = total - len(left) - len(going)
-                words = run.outcome if run.finished else f"{run.outcome} at t = {run.stop_time:.4g}"
-                self.say(f"[{ended}/{total}] {one.job.series}: {' '.join(one.job.told)}: {words}, {run.cpu_s:.3g} s")
+        self.total, going = len(left), []
+        try:
+            while left or going:
+                self.start_some(left, going)
+                time.sleep(0.005)
+                for one in list(going):
+                    run = self.program.look(one)
+                    if run is not None:
+                        going.remove(one)
+                        self.take(one.job, run, self.total - len(left) - len(going))
+        finally:  # of an interrupt, say: nothing may write into the folder any more
+            for one in going:
+                one.process.kill()
+                one.process.wait()
+
+    def start_some(self, left, going):
+        while left and len(going) < self.at_once:
+            self.number += 1
+            try:
+                going.append(self.program.start(left[0], self.number))
+            except OSError:  # no more processes, or files, are to be had
+                if not going:
+                    raise
+                return
+            left.pop(0)
+
+    def take(self, job, run, ended):
+        done = self.table.runs
+        run.values = {at: run.values[at] for at in self.table.times if at in run.values}
+        earlier = done.get(run.key)
+        if earlier is None or run.cpu_s < earlier.cpu_s:  # of repeats, the least disturbed
+            done[run.key] = run
+        self.table.write(self.jobs)
+        words = run.outcome if run.finished else f"{run.outcome} at t = {run.stop_time:.4g}"
+        self.say(f"[{ended}/{self.total}] {job.series}: {' '.join(job.told)}: {words}, {run.cpu_s:.3g} s")

@@ -8,6 +8,15 @@ EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
 
 
+def say(words, out=None):
+    """Prints words, by default to stderr. Nothing depends on them: where they cannot be written, it goes on without."""
+    out = out or sys.stderr
+    try:
+        print(words, file=out, flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())  # else what is left in its buffer fails again at exit
+
+
 def require_libraries(program):
     """Exits, naming the package, if a library is missing. To be called before the imports that need them."""
     # A result file never changes in place, so it needs no lock; on some disks locks fail.
@@ -16,7 +25,7 @@ def require_libraries(program):
         try:
             __import__(module)
         except ImportError:
-            print(f"{program}: {sys.executable} has no {module}; install the package {package}", file=sys.stderr)
+            say(f"{program}: {sys.executable} has no {module}; install the package {package}")
             sys.exit(EXIT_UNAVAILABLE)
 
 
@@ -28,10 +37,10 @@ def run(draw, outputs, name=None):
         style.check_outputs(outputs)
         draw(outputs)
     except style.BadInput as error:
-        print(error, file=sys.stderr)
+        say(error)
         return EXIT_BAD_INPUT
     for path in outputs if name else ():
-        print(name(path))
+        say(name(path), sys.stdout)
     return 0
 
 

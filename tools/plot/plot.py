@@ -161,7 +161,7 @@ def main():
     try:
         read_arguments(options)
     except ValueError as error:
-        print(f"tubule plot: {error}", file=sys.stderr)
+        command_line.say(f"tubule plot: {error}")
         return command_line.EXIT_BAD_INPUT
     return command_line.run(lambda pictures: draw_any(options, pictures), outputs, str)
 

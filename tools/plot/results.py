@@ -134,6 +134,8 @@ def read_result(path):
     """Raises BadInput naming the file if it is not a result or a record is damaged."""
     if not os.path.exists(path):
         raise BadInput(f"{path}: no such file")
+    if not os.path.isfile(path):
+        raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
