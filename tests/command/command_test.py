@@ -141,7 +141,7 @@ class Refused(ProgramTest):
         with open(self.folder / "huge", "w") as file:
             file.truncate(2**40)
         by_points = ("scan", self.case, "--points")
-        of_file = ("--set", "shape={kind=\"result\",path=\"pipe\"}")
+        of_file = ("--set", "tier=surface3d", "--set", "shape={kind=\"result\",path=\"pipe\"}")
         for command in (["check"], ["run"], ["scan"], ["stability"], ["equilibrium"], by_points, ["show"], ["plot"],
                         ["compare", "pipe"], ["confirm"], ["run", self.case, *of_file, "--set"]):  # fmt: skip
             for name in ("pipe", "/dev/zero", "huge"):
@@ -297,6 +297,14 @@ class Others(ProgramTest):
             for example in examples if command != "confirm" else ():
                 with self.subTest(example=example):
                     self.tubule(*shlex.split(example)[1:])
+
+    def test_threads_that_the_environment_asks_for(self):
+        """As many would not fit into memory."""
+        root = Path(__file__).parents[2]
+        many = {**os.environ, "OMP_NUM_THREADS": "100000"}
+        with self.start("run", root / "cases/surface_ellipsoid.toml", "--quiet", env=many) as process:
+            self.assertEqual(process.communicate(), ("", ""))
+        self.assertEqual(process.returncode, 0)
 
     def test_plot(self):
         self.tubule("run", self.case)

@@ -171,7 +171,9 @@ void check(const ConfirmOptions& options) {
         refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
         refuse(fmt::format("--end must be above 0, not {}", *options.choices.end));
-    if (!fs::exists(options.scan)) throw CaseError(options.scan + ": no such file");
+    std::error_code error;
+    if (!fs::exists(options.scan, error))
+        throw CaseError(fmt::format("{}: {}", options.scan, error ? error.message() : "no such file"));
     if (!is_scan(options.scan)) throw CaseError(options.scan + ": is not a result of tubule scan");
 }
 

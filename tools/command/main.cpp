@@ -1,9 +1,10 @@
 // tubule: membranes as fluid deformable surfaces.
 #include <fmt/format.h>
+#include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
-#include <new>
 #include <sstream>
 #include <string>
 
@@ -13,6 +14,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/streams.hpp"
+#include "tools/command/text.hpp"
 
 namespace {
 
@@ -54,6 +56,8 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     tubule::secure_streams();
+    // Whatever the environment asks for: more threads than processors only wait, and too many cannot be started.
+    omp_set_num_threads(std::min(omp_get_max_threads(), omp_get_num_procs()));
     try {
         return run(argc, argv);
     } catch (const tubule::CaseError& error) {
@@ -62,11 +66,8 @@ int main(int argc, char** argv) {
     } catch (const tubule::OutputError& error) {
         tubule::say(stderr, "tubule: {}\n", error.what());
         return 2;
-    } catch (const std::bad_alloc&) {
-        tubule::put_words(stderr, "tubule: out of memory\n");
-        return 4;
     } catch (const std::exception& error) {
-        tubule::say(stderr, "tubule: {}\n", error.what());
+        tubule::say(stderr, "tubule: {}\n", tubule::words_of(error));
         return 4;
     }
 }

@@ -22,6 +22,7 @@
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/text.hpp"
 #include "tools/run/engine.hpp"
 
 namespace tubule {
@@ -193,7 +194,7 @@ std::optional<Opened> open_result(const Case& c, const Engine& engine, const std
         if (resuming && std::filesystem::exists(file)) return resume(c, engine, file);
         return create(c, engine, file);
     } catch (const std::runtime_error& error) {
-        throw CaseError(error.what());
+        throw CaseError(words_of(error));
     }
 }
 
@@ -265,7 +266,7 @@ int run_cases(const RunOptions& options) {
         } catch (const CaseError&) {
             throw;
         } catch (const std::exception& error) {
-            say(stderr, "{}: {}\n", c.path, error.what());
+            say(stderr, "{}: {}\n", c.path, words_of(error));
             one = exit_code(Stop::solver_failed);
         }
         if (status == 0) status = one;

@@ -15,6 +15,7 @@
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/text.hpp"
 #include "tools/scan/dispatcher.hpp"
 #include "tools/scan/ranks.hpp"
 
@@ -42,7 +43,7 @@ ScanWriter open_result(const Scan& scan, const std::filesystem::path& file, bool
         if (resuming && std::filesystem::exists(file)) return ScanWriter::resume(file, scan);
         return ScanWriter::create(file, scan, about_start());
     } catch (const std::runtime_error& error) {
-        throw CaseError(error.what());
+        throw CaseError(words_of(error));
     }
 }
 
@@ -114,7 +115,7 @@ int scan(const ScanOptions& options) {
         ranks->dismiss();  // thrown before any work was handed out
         throw;
     } catch (const std::exception& error) {
-        say(stderr, "tubule: {}\n", error.what());
+        say(stderr, "tubule: {}\n", words_of(error));
         std::fflush(nullptr);
         ranks->abort(exit_code(Stop::solver_failed));
     }

@@ -265,8 +265,8 @@ int show(const ShowOptions& options) {
     } catch (const OutputError&) {
         throw;
     } catch (const std::runtime_error& error) {
-        const std::string_view words = error.what();
-        const bool named = words.find(options.file) != std::string_view::npos;
+        const std::string words = words_of(error);
+        const bool named = words.find(options.file) != std::string::npos;
         say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
         return 2;
     }

@@ -5,7 +5,10 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <exception>
+#include <filesystem>
 #include <iterator>
+#include <new>
 #include <string>
 #include <utility>
 #include <variant>
@@ -20,6 +23,14 @@ using Text = fmt::memory_buffer;
 template <class Out, class... Args>
 void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+}
+
+// The words of an error, for people: those of the standard library are none.
+inline std::string words_of(const std::exception& error) {
+    if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error))
+        return fmt::format("{}: {}", file->path1().string(), file->code().message());
+    if (dynamic_cast<const std::bad_alloc*>(&error)) return "out of memory";
+    return error.what();
 }
 
 // What is wrong with a number of the command line: nothing, unless it is infinite or none.

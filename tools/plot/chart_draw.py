@@ -3,6 +3,7 @@
 import textwrap
 
 import style
+from labels import as_label
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -97,7 +98,7 @@ def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
     relative = "E_ref" if "energy" in chart.quantity else "its largest value"
     at = ", ".join(f"{time:g}" for time in truth.values)
     axes.set_ylabel(f"largest error of {chart.quantity}, relative to {relative}")
-    axes.set_title(f"{chart.title or chart.case.stem}; t = {at}", loc="left", fontsize=7)
+    axes.set_title(f"{as_label(chart.title or chart.case.stem)}; t = {at}", loc="left", fontsize=7)
     label_axes(axes)
     handles = [Line2D([], [], label=name, **styles[name]) for name in styles]
     if failed:
@@ -145,7 +146,7 @@ def stability_map(chart, lines, jobs, runs, outputs):
     axes.set_yscale("log")
     axes.set_xlabel("mesh width h (edge of a triangle of the mean area)" if by_width else chart.against)
     axes.set_ylabel(chart.map.key.rpartition(".")[2])
-    axes.set_title(chart.title or chart.case.stem, loc="left", fontsize=7)
+    axes.set_title(as_label(chart.title or chart.case.stem), loc="left", fontsize=7)
     label_axes(axes)
     handles = [Line2D([], [], ls="-", label=name, **styles[name]) for name in styles]
     handles.append(Line2D([], [], color="0.3", ls="", marker="o", label="stable"))

@@ -20,6 +20,11 @@ NAMES = {
 }
 
 
+def as_label(words):
+    """What a user or a file calls something, as text of a picture: no mathematics, "?" for what is no character."""
+    return words.encode(errors="replace").decode().replace("$", r"\$")
+
+
 class BadCase(ValueError):
     """The case text or one of its overrides cannot be read."""
 

@@ -16,7 +16,7 @@ from balance import BalancePanel, has_balance  # noqa: E402
 from curves import CurvePanel  # noqa: E402
 from cuts import CutPanel  # noqa: E402
 from energy import EnergyPanel  # noqa: E402
-from labels import row_labels  # noqa: E402
+from labels import as_label, row_labels  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from results import BadInput, read_result  # noqa: E402
 from surfaces import SurfacePanel, choose_colours  # noqa: E402
@@ -100,7 +100,7 @@ class Page:
 def draw(paths, outputs, options):
     """Reads all results, decides what can be drawn, lays the panels out from top to bottom and writes the pictures."""
     results = [read_result(path) for path in paths]
-    names = [os.path.splitext(os.path.basename(path))[0] for path in paths]
+    names = [as_label(os.path.splitext(os.path.basename(path))[0]) for path in paths]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
     panels = Page(results, labels, options).panels()
     if not panels:

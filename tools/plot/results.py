@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import h5py
 import numpy as np
 
-from labels import BadCase, effective_case, flatten
+from labels import BadCase, as_label, effective_case, flatten
 
 
 class BadInput(Exception):
@@ -84,7 +84,7 @@ class Result:
 
     @property
     def title(self):
-        return self.case.get("about", {}).get("title") or os.path.splitext(os.path.basename(self.path))[0]
+        return as_label(self.case.get("about", {}).get("title") or os.path.splitext(os.path.basename(self.path))[0])
 
     @property
     def H0(self):

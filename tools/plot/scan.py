@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import style
-from labels import formula
+from labels import as_label, formula
 from results import BadInput
 
 HEIGHT = 4.2  # inches
@@ -160,7 +160,7 @@ def draw(path, outputs):
     if axes[0].logarithmic:
         panel.set_xscale("log")
     axes[0].mark(panel.xaxis)
-    panel.set_title(title)
+    panel.set_title(as_label(title))
     patches = [
         Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
         for k, name in enumerate(names)
