@@ -52,7 +52,8 @@ bool segments_meet(const Axes& p, const Vector3d& a, const Vector3d& b, const Ve
 
 using Corners = std::array<Vector3d, 3>;
 
-bool segment_meets_coplanar(const Vector3d& p, const Vector3d& q, const Corners& t) {
+// Seen along the coordinate axis nearest to the triangle's normal; if all is in one plane, whether they meet in space.
+bool segment_meets_projected(const Vector3d& p, const Vector3d& q, const Corners& t) {
     Eigen::Index drop;
     (t[1] - t[0]).cross(t[2] - t[0]).cwiseAbs().maxCoeff(&drop);
     const Axes axes{int(drop + 1) % 3, int(drop + 2) % 3};
@@ -68,10 +69,11 @@ bool segment_meets_coplanar(const Vector3d& p, const Vector3d& q, const Corners&
 bool segment_meets(const Vector3d& p, const Vector3d& q, const Corners& t) {
     const int sp = side(t[0], t[1], t[2], p), sq = side(t[0], t[1], t[2], q);
     if (sp * sq > 0) return false;
-    if (sp == 0 && sq == 0) return segment_meets_coplanar(p, q, t);
+    if (sp == 0 && sq == 0) return segment_meets_projected(p, q, t);
     const int s[3] = {side(p, q, t[0], t[1]), side(p, q, t[1], t[2]), side(p, q, t[2], t[0])};
     const auto [low, high] = std::minmax({s[0], s[1], s[2]});
-    return low * high >= 0;
+    // Where all five points are nearly in one plane, these signs are rounding. What meets, meets in every projection.
+    return low * high >= 0 && segment_meets_projected(p, q, t);
 }
 
 // The corners of `a`, those that `b` has too first; and how many those are.

@@ -261,7 +261,10 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
     memory_.moved = 0;
     auto crossing = find_self_intersection(surface().mesh(state_.X));
-    if (crossing) crossing->time = state_.time;
+    if (!crossing) return std::nullopt;
+    crossing->time = state_.time;
+    if (memory_.count.steps == 0)
+        crossing->advice = "change the shape; if only its triangles intersect, use more elements or another mesh";
     return crossing;
 }
 

@@ -9,8 +9,10 @@
 #include <regex>
 
 #include "common/case/read.hpp"
+#include "common/shapes/capsule.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
+#include "surface3d/meshing/graded_mesh.hpp"
 #include "surface3d/run/motion_checks.hpp"
 #include "tests/surface3d/errors.hpp"
 #include "tests/surface3d/motion.hpp"
@@ -50,6 +52,19 @@ TEST(SelfIntersection, OfClosedSurfaces) {
         EXPECT_NE(crossing->message.find("the surface intersects itself near ("), std::string::npos)
             << crossing->message;
     }
+}
+
+TEST(SelfIntersection, NotWherePlanesNearlyAgree) {
+    // Flat triangles on the cylinder of a capsule lie in common planes, up to rounding, and far from each other.
+    for (const double length : {2.0, 5.0})
+        for (const int order : {3, 4}) {
+            SCOPED_TRACE(testing::Message() << "length " << length << ", order " << order);
+            const Capsule capsule{1, length};
+            const Profile profile = base(capsule);
+            const auto map = map_of(capsule);
+            const TriangleMesh rings = graded_rings(resolution_of(map, profile, order), profile, 200);
+            EXPECT_FALSE(find_self_intersection(mapped_mesh(rings, order, map)));
+        }
 }
 
 TEST(SelfIntersection, OfATubeWithItsOwnImages) {
