@@ -37,6 +37,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"identity_defect", "energy", "defect of the energy identity", SeriesUse::diagnostic},
     {"area", "length^2", "area"},
     {"volume", "length^3", "enclosed volume"},
+    {"volume_drift", "1", "relative change of a volume that is to be kept", SeriesUse::diagnostic},
     {"reduced_volume", "1", "volume over that of the sphere with the same area"},
     {"r_min", "length", "smallest radius"},
     {"r_max", "length", "largest radius"},

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/geometry/profile_point.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/motion/motion_forms.hpp"
 
@@ -178,11 +179,19 @@ void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionS
     to.X += te * nodal;
 }
 
+// Relative to the sphere, or the straight tube, of the same area.
+double MovingSurface::lack_of_volume(const CurvedMesh& mesh) const {
+    const Extent e = extent(space_, mesh);
+    const double radius = mesh.period > 0 ? e.area / (2 * pi * mesh.period) : std::sqrt(e.area / (4 * pi));
+    return 1 - e.volume / (e.area * radius / (mesh.period > 0 ? 2 : 3));
+}
+
 bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f) const {
     if (!law_.inextensible) return false;
     const Extent rate = extent_rate(space_, mesh, f.normal);  // -INT H, A
     const Extent by_H = extent_rate(space_, mesh, f.normal * f.H.asDiagonal());
-    return 1 - rate.area * by_H.volume / (rate.volume * by_H.area) < control_.least_variation;
+    const double variation = 1 - rate.area * by_H.volume / (rate.volume * by_H.area);
+    return variation < control_.least_variation && std::abs(lack_of_volume(mesh)) < control_.most_drift;
 }
 
 // Of the conserved quantities; zero if there are none.

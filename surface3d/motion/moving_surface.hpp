@@ -20,9 +20,10 @@ struct MotionControl {
     std::optional<double> area = {}, volume = {};  // conserved to rounding, where the law has the multiplier
     double relaxation = 0.1;                       // time in which the mesh becomes even
     bool follow_curvature = false;                 // or small triangles where the surface is curved
-    // If 1 - (INT H)^2/(A INT H^2) is smaller, area and volume are the same condition to the accuracy of the mesh:
-    // lambda is omitted, the pressure takes its place, and only the area is conserved to rounding.
-    double least_variation = 1e-8;
+    // If 1 - (INT H)^2/(A INT H^2) is smaller and the volume cannot drift by more than most_drift, relatively, area and
+    // volume are the same condition: lambda is omitted, the pressure takes its place, and only the area is conserved to
+    // rounding.
+    double least_variation = 1e-8, most_drift = HUGE_VAL;
     double smoothing = 0;  // of schemes that smooth curvatures: eps of a - eps Lap a = a_h, a length squared
 };
 
@@ -66,7 +67,8 @@ public:
     // Columns r of the conditions (r, v) = 0 that exclude the rigid motions left undetermined by the law.
     Eigen::MatrixXd open_rigid_motions(const CurvedMesh& mesh) const;
 
-    // Whether area and volume are the same condition to the accuracy of the mesh.
+    // Whether area and volume are the same condition: H is constant to the accuracy of the mesh, and the volume differs
+    // from that of the sphere of this area, or of the straight tube, by less than `most_drift`.
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
     // The rates of area and volume that take `begin` to the conserved values in a time `span`: linearised about the
     // surface `at`, as seen from the expected `end`, plus `missed`, which a step like this is expected to miss.
@@ -84,6 +86,7 @@ private:
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
     Eigen::MatrixXd momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const;
     Extent lack(const CurvedMesh& mesh) const;
+    double lack_of_volume(const CurvedMesh& mesh) const;
 
     CurvedMesh mesh_, pressure_mesh_;  // pressure: empty without
     SurfaceSpace space_;

@@ -23,7 +23,9 @@ constexpr double shortest_step = 1e-9;         // of the relaxation time: shorte
 // Nodes of the coarser run of a pair are so much farther apart, and turn so much more.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
-constexpr double unseen_move = 0.25;  // between looks for self-intersection, of the distance of nodes
+constexpr double one_condition = 1e-6;  // lack of volume, relative: below, meshes cannot keep both area and volume
+constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
+constexpr double kept = 1e-8;           // area and volume, relative: a larger drift is reported
 
 // What dissipates in a step of length tau after one of length `before`: the parabola through three rates.
 double dissipated_in(double tau, double before, double rate, double now, double past) {
@@ -51,6 +53,7 @@ void MotionAttempt::use_mesh(const CurvedMesh& mesh) {
                                 .relaxation = memory_.scale.relaxation,
                                 .follow_curvature = case_.surface.follow_curvature,
                                 .least_variation = memory_.scale.least_variation,
+                                .most_drift = std::max(most_drift / 2 * case_.accuracy.energy, one_condition),
                                 .smoothing = case_.surface.smoothing};
     scheme_ = make_scheme(time_scheme(case_), mesh, motion_law(case_.model), case_.energy, control);
     summary.elements = mesh.triangles();
@@ -118,6 +121,9 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& nex
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
     if (const auto rises = find_rise_in_step(rise, case_.accuracy.energy, t, next.state.step))
         return Refusal{0.25, *rises};
+    const double since = m.bending.energy + m.kinetic - memory_.balance.lowest_total;
+    if (const auto rises = find_slow_rise(since / memory_.scale.reference_energy, case_.accuracy.energy, t))
+        return Refusal{0, *rises};  // shorter steps would creep on
     return std::nullopt;
 }
 
@@ -209,7 +215,8 @@ std::optional<StopReport> MotionAttempt::step() {
     while (const auto refusal = attempt(tau())) {
         ++memory_.count.rejected;
         memory_.next_step = refusal->shrink * tau();
-        if (case_.surface.step || memory_.next_step < shortest_step * memory_.scale.relaxation) return refusal->report;
+        if (refusal->shrink == 0 || case_.surface.step || memory_.next_step < shortest_step * memory_.scale.relaxation)
+            return refusal->report;
         if (clock_.interrupted()) break;
     }
     trace.add(state_.time, now_.bending.energy);
@@ -246,10 +253,8 @@ void MotionAttempt::go() {
 std::optional<StopReport> MotionAttempt::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
     if (auto bad = find_bad_shape(now_, case_.accuracy.r_min, t)) return bad;
-    if (auto rise = find_slow_rise((total() - memory_.balance.lowest_total) / memory_.scale.reference_energy, asked, t))
-        return rise;
-    if (traits().controls_mesh && surface().law().keeps_volume)
-        if (auto drift = find_drift(now_.bending.volume / memory_.scale.volume - 1, asked, t)) return drift;
+    if (traits().controls_mesh)
+        if (auto drift = find_drift(volume_drift(), asked, t)) return drift;
     return std::nullopt;
 }
 
@@ -284,18 +289,35 @@ double MotionAttempt::what_may_change() const {
     return std::max({now_.dissipation * left, now_.kinetic, now_.acceleration * left * left});
 }
 
+// What a row states is at least what its energy has risen by: then both runs of the pair may be wrong alike.
 void MotionAttempt::compare() {
     const auto difference =
         coarser_ ? coarser_->trace.difference(state_.time, now_.bending.energy) : std::optional<double>();
-    error_now_ = difference.value_or(memory_.scale.reference_energy);  // nothing is known
-    if (difference) memory_.error = std::max(memory_.error, *difference);
+    const double rise = total() - memory_.balance.lowest_total;
+    error_now_ = std::max(difference.value_or(memory_.scale.reference_energy), rise);  // without it nothing is known
+    if (difference) memory_.error = std::max({memory_.error, *difference, rise});
+}
+
+// Of a volume that is to be kept, relative to that of the start.
+double MotionAttempt::volume_drift() const {
+    return surface().law().keeps_volume ? now_.bending.volume / memory_.scale.volume - 1 : 0;
+}
+
+void MotionAttempt::warn_of_drift() {
+    const double area = surface().law().inextensible ? std::abs(now_.bending.area / memory_.scale.area - 1) : 0;
+    const double volume = std::abs(volume_drift());
+    const std::string why = traits().controls_mesh ? "on this shape, keeping the area nearly keeps the volume"
+                                                   : fmt::format("scheme \"{}\" does not correct them", traits().name);
+    if (std::max(area, volume) > kept)
+        summary.warnings.push_back(
+            fmt::format("area and volume drifted by {:.2g} and {:.2g} (relative): {}", area, volume, why));
 }
 
 void MotionAttempt::write_row() {
     if (!out_.wants_row(state_.time)) return;
     out_.row(state_.time,
-             motion_series().values({state_, now_, memory_.balance.defect_at(total()), memory_.balance.corrected,
-                                     error_now_, summary.elements, out_.seconds()}));
+             motion_series().values({state_, now_, volume_drift(), memory_.balance.defect_at(total()),
+                                     memory_.balance.corrected, error_now_, summary.elements, out_.seconds()}));
 }
 
 void MotionAttempt::write_frame() {
@@ -315,6 +337,7 @@ void MotionAttempt::summarise(const StopReport& stop) {
     summary.reference_energy = memory_.scale.reference_energy;
     summary.details = {{"pairs", std::int64_t{memory_.settings.pair}}};
     if (!scheme_) return;
+    warn_of_drift();
     write_row();
     out_.end(stop, state_.time, [this] { return record(); });
     const int nodes = static_cast<int>(state_.X.cols());

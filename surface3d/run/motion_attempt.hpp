@@ -40,7 +40,7 @@ public:
 private:
     // Why a trial step was rejected; empty if it is accepted.
     struct Refusal {
-        double shrink = 0.25;  // the next trial is so much shorter
+        double shrink = 0.25;  // the next trial is so much shorter; 0: there is none
         StopReport report;     // if no step is short enough
     };
 
@@ -64,9 +64,11 @@ private:
     std::optional<StopReport> check_crossing(bool at_output);
     std::optional<StopReport> check_progress();
     double what_may_change() const;
+    double volume_drift() const;
 
     // What is written.
     void compare();
+    void warn_of_drift();
     void write_row();
     void write_frame();
     void summarise(const StopReport& stop);

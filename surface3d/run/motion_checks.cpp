@@ -11,9 +11,8 @@ namespace tubule::surface3d {
 namespace {
 
 // Measured choices: docs/decisions.md, "Surfaces in motion".
-constexpr double creep = 10;        // increase since its lowest, of the asked accuracy
-constexpr double climb = 0.25;      // increase of the energy in a step, of the asked accuracy
-constexpr double most_drift = 0.1;  // of the volume, of the asked accuracy
+constexpr double creep = 10;    // increase since its lowest, of the asked accuracy
+constexpr double climb = 0.25;  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
 constexpr int most_stalled = 100;
 constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere

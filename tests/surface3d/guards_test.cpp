@@ -259,5 +259,34 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
     }
 }
 
+// A capsule of few triangles, whose H is known to 0.2 only, is no sphere: 20 % of the volume of the sphere of its area
+// are missing. Of a sphere with waves of 1e-3, 3 (l-1)(l+2)/(16 pi) a^2 = 2.4e-7 (theory.md 6, to second order) are
+// missing.
+TEST(NewMesh, OnlyNearASphereAreAreaAndVolumeOneCondition) {
+    const Capsule capsule{0.913, 3.135};
+    const Profile profile = base(capsule);
+    const CurvedMesh few =
+        mapped_mesh(uniform_rings(resolution_of(map_of(capsule), profile, 3), profile, 113), 3, map_of(capsule));
+    const CurvedMesh sphere = mapped_mesh(icosphere(2), 4, map_of(Sphere{.radius = 1, .modes = {{1e-3, 2, 1}}}));
+    const MotionLaw law = motion_law({.kind = ModelKind::overdamped, .keeps_volume = {}});
+    for (const CurvedMesh* mesh : {&few, &sphere}) {
+        SCOPED_TRACE(mesh == &few ? "capsule" : "sphere");
+        const SurfaceSpace space(*mesh);
+        const MotionFields fields = motion_fields(space, *mesh, Projection(space, *mesh));
+        const Extent e = extent(space, *mesh);
+        const MotionControl control{.area = e.area,
+                                    .volume = e.volume,
+                                    .least_variation = 4 * noise_of_H(space, *mesh, fields),
+                                    .most_drift = 1e-6};
+        const auto scheme = make_scheme(scheme_named("bdf2"), *mesh, law, {.k = {1, 0, 0}, .H0 = 0.958}, control);
+        EXPECT_EQ(scheme->surface().area_is_volume(*mesh, fields), mesh == &sphere);
+        MotionState state = scheme->surface().start(*mesh);
+        for (int i = 0; i < 3; ++i) state = scheme->step(state, 1e-5).state;
+        const Extent after = extent(space, scheme->surface().mesh(state.X));
+        EXPECT_NEAR(after.area / e.area, 1, 1e-11);
+        EXPECT_NEAR(after.volume / e.volume, 1, mesh == &sphere ? 1e-6 : 1e-11);
+    }
+}
+
 }  // namespace
 }  // namespace tubule::surface3d
