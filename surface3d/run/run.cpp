@@ -87,7 +87,7 @@ public:
             StopReport{Stop::finished, 0, "geometry, curvature and energies of the shape", ""});
         summary_.energy = o.energy;
         summary_.reference_energy = reference_energy(o);
-        summary_.estimated_error = summary_.reference_energy > 0 ? error_ / summary_.reference_energy : 0;
+        summary_.estimated_error = summary_.reference_energy > 0 ? error_ / summary_.reference_energy : 1;
         summary_.warnings = start_.notes();
         describe_effort();
         return summary_;

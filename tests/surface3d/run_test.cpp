@@ -130,6 +130,7 @@ TEST(SurfaceRun, StopsWhereTheAnswerMeansNothing) {
     const Outcome folded = run_case("kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 1.0, l = 12, m = 7}]\n",
                                     {"discretisation.elements=80"});
     EXPECT_EQ(folded.summary.stop.reason, Stop::mesh_lost);
+    EXPECT_EQ(folded.summary.estimated_error, 1) << "nothing is known of its energy";
     EXPECT_NE(folded.summary.stop.message.find("folds at ("), std::string::npos) << folded.summary.stop.message;
 }
 
