@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "axisym/curve/curve_guards.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 
@@ -221,6 +222,45 @@ TEST(Outputs, rowsFitTheirNames) {
     // Two modes of two waves add up: |0.2 + 0.05 e^i|.
     EXPECT_NEAR(o["mode_2"].front(), std::hypot(0.2 + 0.05 * std::cos(1), 0.05 * std::sin(1)), 1e-5);
     EXPECT_NEAR(o["mode_4"].front(), 0.1, 1e-5);
+}
+
+// docs/decisions.md: the speed of the parameter may vary by a factor of 1000 along the profile.
+TEST(CurveGuards, aParameterStretchedTooFar) {
+    Snapshot s{};
+    s.neck.radius = HUGE_VAL, s.o.symbol = 1, s.o.g_max = 2;
+    const auto tripped = [&](double least) {
+        s.o.g_min = least;
+        std::vector<StopReport> out;
+        for (const CurveGuard& guard : curve_guards())
+            if (!(guard.value(s, 1e-3) > 0)) out.push_back(guard.report(s, 0.5));
+        return out;
+    };
+    EXPECT_TRUE(tripped(2.1e-3).empty());
+    const auto stop = tripped(1.9e-3);
+    ASSERT_EQ(stop.size(), 1);
+    EXPECT_EQ(word(stop[0].reason), "mesh-lost");
+    EXPECT_EQ(stop[0].time, 0.5);
+    EXPECT_SAYS(stop[0].message, "varies by a factor 1.05e+03 along the profile");
+    EXPECT_SAYS(stop[0].advice, "discretisation.parametrisation = \"even\"");
+}
+
+TEST(CurveGuards, stepsThatLeadNowhere) {
+    // 2000 steps in which the time does not grow by a thousandth, and which are shorter than 1e-9 of the end.
+    const auto steps_until_stop = [](double step, double end) {
+        CurveStall stall;
+        double time = 1;
+        for (int steps = 1; steps <= 5000; ++steps, time += step)
+            if (const auto stop = stall.after_step(time, step, end)) {
+                EXPECT_EQ(word(stop->reason), "solver-failed");
+                EXPECT_SAYS(stop->message, "no progress with steps of 1e-10");
+                EXPECT_SAYS(stop->advice, "discretisation.elements");
+                return steps;
+            }
+        return 0;
+    };
+    EXPECT_EQ(steps_until_stop(1e-10, 1), 2001);
+    EXPECT_EQ(steps_until_stop(1e-10, 0.01), 0);  // such steps are not short for this end
+    EXPECT_EQ(steps_until_stop(1e-5, 1e5), 0);    // a thousandth of the time in 100 steps
 }
 
 }  // namespace
