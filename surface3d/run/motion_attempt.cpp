@@ -78,6 +78,7 @@ void MotionAttempt::begin(const Start& from) {
     look();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     trace.add(state_.time, now_.bending.energy);
+    error_now_ = difference_now().value_or(memory_.scale.reference_energy);
     write_row();
     write_frame();
 }
@@ -289,12 +290,16 @@ double MotionAttempt::what_may_change() const {
     return std::max({now_.dissipation * left, now_.kinetic, now_.acceleration * left * left});
 }
 
+// From the coarser run of the pair, now; nothing where that is unknown.
+std::optional<double> MotionAttempt::difference_now() const {
+    return coarser_ ? coarser_->trace.difference(state_.time, now_.bending.energy) : std::nullopt;
+}
+
 // What a row states is at least what its energy has risen by: then both runs of the pair may be wrong alike.
 void MotionAttempt::compare() {
-    const auto difference =
-        coarser_ ? coarser_->trace.difference(state_.time, now_.bending.energy) : std::optional<double>();
+    const auto difference = difference_now();
     const double rise = total() - memory_.balance.lowest_total;
-    error_now_ = std::max(difference.value_or(memory_.scale.reference_energy), rise);  // without it nothing is known
+    error_now_ = std::max(difference.value_or(memory_.scale.reference_energy), rise);
     if (difference) memory_.error = std::max({memory_.error, *difference, rise});
 }
 

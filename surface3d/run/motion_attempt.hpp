@@ -67,6 +67,7 @@ private:
     double volume_drift() const;
 
     // What is written.
+    std::optional<double> difference_now() const;
     void compare();
     void warn_of_drift();
     void write_row();

@@ -109,7 +109,7 @@ def judge(scene, out):
     if rise.max() > NOISE * out.E_ref:
         row = int(rise.argmax())
         raise Finding("rise", f"at t = {out.series['time'][row]:.6g} the energy is {rise[row] / out.E_ref:.3g} of E_ref above its lowest, beyond its error")
-    if out.error == 0 or (out.series["energy_error"] <= 0).any():
+    if out.error == 0 or (out.series["energy_error"][1:] <= 0).any():
         raise Finding("no-error", f"a stated error of 0, stop {out.stop}")
     if out.stop == "self-intersection" and out.about["stop_time"] == 0:
         raise Finding("intersects", f"a start that is free of intersections: {out.about['stop_message']}")
