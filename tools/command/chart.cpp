@@ -59,7 +59,7 @@ int chart(const ChartOptions& options) {
     try {
         return become("chart", script_arguments(options));
     } catch (const std::runtime_error& error) {
-        say(stderr, "{}\n", words_of(error));
+        say(stderr, "{}\n", explanation(error));
         return 4;
     }
 }

@@ -341,7 +341,7 @@ int run_compare(const CompareOptions& options) {
     try {
         c = compared(options);
     } catch (const std::exception& error) {
-        say(stderr, "tubule compare: {}\n", words_of(error));
+        say(stderr, "tubule compare: {}\n", explanation(error));
         return bad_input;
     }
     const Text out = options.json ? json_text(c) : options.csv ? csv(c) : words(c);

@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
         tubule::say(stderr, "tubule: {}\n", error.what());
         return 2;
     } catch (const std::exception& error) {
-        tubule::say(stderr, "tubule: {}\n", tubule::words_of(error));
+        tubule::say(stderr, "tubule: {}\n", tubule::explanation(error));
         return 4;
     }
 }

@@ -55,14 +55,14 @@ int plot(const PlotOptions& options) {
     try {
         for (const std::string& result : options.results) is_scan(result) ? repair_scan(result) : repair_result(result);
     } catch (const std::runtime_error& error) {
-        say(stderr, "{}\n", words_of(error));
+        say(stderr, "{}\n", explanation(error));
         return 2;
     }
     std::vector<std::string> arguments;
     try {
         arguments = script_arguments(options);
     } catch (const std::runtime_error& error) {
-        say(stderr, "{}\n", words_of(error));
+        say(stderr, "{}\n", explanation(error));
         return 4;
     }
     return become("plot", arguments);

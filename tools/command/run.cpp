@@ -194,7 +194,7 @@ std::optional<Opened> open_result(const Case& c, const Engine& engine, const std
         if (resuming && std::filesystem::exists(file)) return resume(c, engine, file);
         return create(c, engine, file);
     } catch (const std::runtime_error& error) {
-        throw CaseError(words_of(error));
+        throw CaseError(explanation(error));
     }
 }
 
@@ -266,7 +266,7 @@ int run_cases(const RunOptions& options) {
         } catch (const CaseError&) {
             throw;
         } catch (const std::exception& error) {
-            say(stderr, "{}: {}\n", c.path, words_of(error));
+            say(stderr, "{}: {}\n", c.path, explanation(error));
             one = exit_code(Stop::solver_failed);
         }
         if (status == 0) status = one;

@@ -43,7 +43,7 @@ ScanWriter open_result(const Scan& scan, const std::filesystem::path& file, bool
         if (resuming && std::filesystem::exists(file)) return ScanWriter::resume(file, scan);
         return ScanWriter::create(file, scan, about_start());
     } catch (const std::runtime_error& error) {
-        throw CaseError(words_of(error));
+        throw CaseError(explanation(error));
     }
 }
 
@@ -115,7 +115,7 @@ int scan(const ScanOptions& options) {
         ranks->dismiss();  // thrown before any work was handed out
         throw;
     } catch (const std::exception& error) {
-        say(stderr, "tubule: {}\n", words_of(error));
+        say(stderr, "tubule: {}\n", explanation(error));
         std::fflush(nullptr);
         ranks->abort(exit_code(Stop::solver_failed));
     }

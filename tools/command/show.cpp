@@ -265,7 +265,7 @@ int show(const ShowOptions& options) {
     } catch (const OutputError&) {
         throw;
     } catch (const std::runtime_error& error) {
-        const std::string words = words_of(error);
+        const std::string words = explanation(error);
         const bool named = words.find(options.file) != std::string::npos;
         say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
         return 2;

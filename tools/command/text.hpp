@@ -26,7 +26,7 @@ void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
 }
 
 // The words of an error, for people: those of the standard library are none.
-inline std::string words_of(const std::exception& error) {
+inline std::string explanation(const std::exception& error) {
     if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error))
         return fmt::format("{}: {}", file->path1().string(), file->code().message());
     if (dynamic_cast<const std::bad_alloc*>(&error)) return "out of memory";
