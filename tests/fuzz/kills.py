@@ -14,7 +14,7 @@ import time
 import samples
 from sandbox import Finding
 
-FAST = 3
+FAST = 2
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGKILL, signal.SIGKILL, signal.SIGHUP)
 END = None
 
