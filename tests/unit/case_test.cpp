@@ -132,7 +132,8 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
 
 TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
-        "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, reduced_volume, r_min, "
+        "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, volume_drift, "
+        "reduced_volume, r_min, "
         "r_max, mode_<n>, kinetic_energy, speed, momentum_x, momentum_y, momentum_z, angular_momentum_x, "
         "angular_momentum_y, angular_momentum_z, lambda, stretching, correction_energy, integral_H2, integral_K, "
         "gauss_bonnet_defect, quality, turn, parameter, special, sigma, negative_directions, growth_<m>, "
