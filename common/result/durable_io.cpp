@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 namespace tubule::durable {
@@ -31,7 +30,7 @@ void sync_directory(const std::filesystem::path& directory) {
 }  // namespace
 
 void fail(const char* verb, const std::filesystem::path& path, int error) {
-    throw std::runtime_error(fmt::format("cannot {} {}: {}", verb, path.string(), std::strerror(error)));
+    throw Error(fmt::format("cannot {} {}: {}", verb, path.string(), std::strerror(error)));
 }
 
 File::File(const std::filesystem::path& path, int flags) : path_(path) {

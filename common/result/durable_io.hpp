@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <stdexcept>
 
 namespace tubule::durable {
 
@@ -20,7 +21,10 @@ struct Operation {
 // For tests: called before every operation. Returns 0 to let it happen, or an errno value to make it fail.
 inline std::function<int(const Operation&)> fault;
 
-// All of these throw std::runtime_error with the path and the system's message.
+// A file cannot be read or written. All of these throw it, with the path and the system's words.
+struct Error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
 
 // An owned file descriptor.
 class File {

@@ -266,7 +266,7 @@ void Journal::begin(Entry kind) {
 }
 
 void Journal::commit(std::uint64_t sequence) {
-    if (!sound_) throw std::runtime_error(fmt::format("{} was damaged by an earlier error", file_.path().string()));
+    if (!sound_) throw durable::Error(fmt::format("{} was damaged by an earlier error", file_.path().string()));
     Head head;
     std::memcpy(&head, buffer_.data(), sizeof(Head));
     head.length = buffer_.size() - sizeof(Head);

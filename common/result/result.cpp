@@ -118,7 +118,7 @@ void check_record(const Record& record, const std::vector<SurfaceCells>& meshes,
 
 // The absolute path of a result, valid after a change of directory; symbolic links are followed.
 fs::path resolved(const fs::path& file) {
-    return fs::weakly_canonical(file);
+    return fs::weakly_canonical(fs::absolute(file));
 }
 
 // A typo after -o must not overwrite a case file or other data.
@@ -185,6 +185,8 @@ struct ResultWriter::Impl {
     Journal journal;
     Contents contents;
     Record restart;
+    bool may_begin = false;  // there is, or was to resume from, something worth the file
+    bool began = false;      // the file and its journal are this writer's
     bool finished = false;
 
     std::size_t image_size = 0;
@@ -210,12 +212,31 @@ struct ResultWriter::Impl {
         if (outgrown || Clock::now() - consolidated_at > pause) consolidate();
     }
 
-    // The sequence number for the next journal record.
-    std::uint64_t next() const {
+    // One call: `journalled` writes its record, `add` adds it to the contents. What comes before the first row of a new
+    // result waits for it in memory, and what was there stays: the run may fail at its start.
+    template <class Journalled, class Add>
+    void record(const Journalled& journalled, const Add& add) {
+        refuse_if_finished();
+        const auto sequence = contents.sequence + 1;
+        if (began) journalled(sequence);
+        add();
+        contents.sequence = sequence;
+        if (began)
+            consolidate_if_due();
+        else if (may_begin)
+            begin();
+    }
+
+    void begin() {
+        consolidate();
+        write_view(file, contents);
+        began = true;
+    }
+
+    void refuse_if_finished() const {
         if (finished)
             throw std::logic_error(
                 fmt::format("{}: the result is finished; nothing can be written after finish()", file.string()));
-        return contents.sequence + 1;
     }
 };
 
@@ -240,9 +261,6 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     impl->contents.case_text = c;
     impl->contents.about = about;
     impl->contents.series = series;
-    // The old result ends here; a leftover journal of it has another id.
-    impl->consolidate();
-    write_view(path, impl->contents);
     return ResultWriter(std::move(impl));
 }
 
@@ -257,9 +275,12 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
     } catch (const std::runtime_error& e) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
-    impl->consolidate();
-    write_view(path, impl->contents);
+    impl->may_begin = true;
     return ResultWriter(std::move(impl));
+}
+
+bool ResultWriter::began() const {
+    return impl_->began;
 }
 
 const Record& ResultWriter::restart_record() const {
@@ -274,56 +295,46 @@ void ResultWriter::row(std::span<const double> values) {
     for (std::size_t j = 0; j < values.size(); ++j)
         if (!std::isfinite(values[j])) check_finite(values[j], "series", contents.series[j]);
 
-    const auto sequence = impl_->next();
-    impl_->journal.row(sequence, values);
-    contents.add_row(values);
-    contents.sequence = sequence;
-    impl_->consolidate_if_due();
+    impl_->record([&](auto sequence) { impl_->journal.row(sequence, values); },
+                  [&] {
+                      contents.add_row(values);
+                      impl_->may_begin = true;
+                  });
 }
 
 std::size_t ResultWriter::mesh(const SurfaceCells& cells) {
     check_mesh(cells);
-    const auto sequence = impl_->next();
     std::vector<SurfaceCells>& meshes = impl_->contents.meshes;
     const auto same = std::find(meshes.begin(), meshes.end(), cells);
     const auto number = static_cast<std::size_t>(same - meshes.begin());
-    if (same != meshes.end()) return number;
-    impl_->journal.mesh(sequence, cells);
-    meshes.push_back(cells);
-    impl_->contents.sequence = sequence;
-    impl_->consolidate_if_due();
+    if (same == meshes.end())
+        impl_->record([&](auto sequence) { impl_->journal.mesh(sequence, cells); }, [&] { meshes.push_back(cells); });
     return number;
 }
 
 void ResultWriter::frame(const Record& frame) {
     check_record(frame, impl_->contents.meshes, "frame");
-    const auto sequence = impl_->next();
-    impl_->journal.record(Entry::frame, sequence, frame);
-    impl_->contents.frames.push_back(frame);
-    impl_->contents.sequence = sequence;
-    impl_->consolidate_if_due();
+    impl_->record([&](auto sequence) { impl_->journal.record(Entry::frame, sequence, frame); },
+                  [&] { impl_->contents.frames.push_back(frame); });
 }
 
 void ResultWriter::checkpoint(const Record& state) {
     check_record(state, impl_->contents.meshes, "checkpoint");
-    const auto sequence = impl_->next();
-    impl_->journal.record(Entry::checkpoint, sequence, state);
-    impl_->contents.checkpoint = state;
-    impl_->contents.sequence = sequence;
-    impl_->consolidate_if_due();
+    impl_->record([&](auto sequence) { impl_->journal.record(Entry::checkpoint, sequence, state); },
+                  [&] { impl_->contents.checkpoint = state; });
 }
 
 void ResultWriter::discard() {
-    const auto sequence = impl_->next();
-    impl_->journal.discard(sequence);
-    impl_->contents.forget();
-    impl_->contents.sequence = sequence;
-    impl_->consolidate_if_due();
+    impl_->record([&](auto sequence) { impl_->journal.discard(sequence); },
+                  [&] {
+                      impl_->contents.forget();
+                      impl_->may_begin = false;
+                  });
 }
 
 void ResultWriter::finish(const About& more) {
     check_about(more);
-    impl_->next();  // refuses a second time
+    impl_->refuse_if_finished();
     About& about = impl_->contents.about;
     for (const auto& [name, value] : more) {
         const auto same = std::find_if(about.begin(), about.end(), [&](const auto& old) { return old.first == name; });

@@ -67,18 +67,18 @@ struct CaseText {
 // each goes to an append-only journal NAME.hdf.journal first; NAME.hdf itself is only ever replaced
 // as a whole (write aside, rename). Non-finite numbers and impossible names are refused with
 // std::invalid_argument, I/O errors and a second writer of the same file with std::runtime_error naming
-// the file; arguments that are refused leave nothing behind. A writer destroyed before finish() leaves its
-// journal.
+// the file; arguments that are refused leave nothing behind. What was in the file before, and its journal, stay until
+// the first row: a run that fails at its start replaces nothing. A writer destroyed before finish() leaves its journal.
 class ResultWriter {
 public:
-    // Starts a new result: NAME.hdf exists when this returns, without rows. An old result of that
-    // name is replaced; a file that is not a result is kept (std::runtime_error). `series` must contain "time".
+    // A new result. An old one of that name is replaced at the first row; a file that is not a result is kept
+    // (std::runtime_error). `series` must contain "time".
     static ResultWriter create(const std::filesystem::path& file, const CaseText& c, const About& about,
                                const std::vector<std::string>& series);
     // Resumes a result from its newest restart record (checkpoint or last frame, whichever is later);
     // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
-    // restart_record() gives it. Throws std::runtime_error if there is none, and whatever `check` throws of it, with
-    // the file as it was.
+    // restart_record() gives it. The file changes with the next record. Throws std::runtime_error if there is none, and
+    // whatever `check` throws of it, with the file as it was.
     static ResultWriter resume(
         const std::filesystem::path& file, const std::function<void(const Record&)>& check = [](const Record&) {});
     ResultWriter(ResultWriter&&) noexcept;
@@ -86,6 +86,7 @@ public:
     ~ResultWriter();
 
     const Record& restart_record() const;      // of a resumed result
+    bool began() const;                        // whether the file has changed
     void row(std::span<const double> values);  // one value a series, in the order given to create
     // Gives the number by which later frames name these cells; that of an equal mesh if there is one.
     std::size_t mesh(const SurfaceCells& cells);

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <bit>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -122,12 +123,15 @@ struct Step {
     std::function<void(Model&)> meaning;
 };
 
+// With its first row, at time 0: the file changes then.
 Step create(const std::string& text) {
+    const std::vector<double> values = {0, 1};
     return {"create",
             [=](auto& writer, const fs::path& file) {
                 writer = ResultWriter::create(file, {text, {"a=1"}}, {{"version", "0"}}, series);
+                writer->row(values);
             },
-            [=](Model& m) { m = Model{text, {}, {}, {}, {}, {}}; }};
+            [=](Model& m) { m = Model{text, {}, {values}, {}, {}, {}}; }};
 }
 Step row(double time) {
     const std::vector<double> values = {time, 1 / (1 + time)};
@@ -173,20 +177,28 @@ Step finish(const std::string& stop) {
 Step abandon() {
     return {"abandon", [](auto& writer, const fs::path&) { writer.reset(); }, [](Model&) {}};
 }
-Step resume() {
-    return {"resume", [](auto& writer, const fs::path& file) { writer = ResultWriter::resume(file); },
-            [](Model& m) { m.resume(); }};
+// With its first row.
+Step resume(double time) {
+    const Step first = row(time);
+    return {"resume",
+            [=](auto& writer, const fs::path& file) {
+                writer = ResultWriter::resume(file);
+                first.call(writer, file);
+            },
+            [=](Model& m) {
+                m.resume();
+                first.meaning(m);
+            }};
 }
 Step repair() {
     return {"repair", [](auto&, const fs::path& file) { repair_result(file); }, [](Model&) {}};
 }
 
 // An earlier result of the same name, unfinished, with a journal.
-const std::vector<Step> before = {create("# before\n"), row(0), frame(0), row(1)};
+const std::vector<Step> before = {create("# before\n"), frame(0), row(1)};
 
 // The big frames make the journal outgrow the file, so that there are consolidations within the run.
 const std::vector<Step> run = {create(case_text),
-                               row(0),
                                frame(0),
                                row(1),
                                frame(1, 6000),
@@ -202,8 +214,7 @@ const std::vector<Step> run = {create(case_text),
                                frame(2, 6000),
                                row(3),
                                abandon(),
-                               resume(),
-                               row(3),
+                               resume(3),
                                checkpoint(3),
                                frame(3),
                                mesh(false),
@@ -213,12 +224,10 @@ const std::vector<Step> run = {create(case_text),
                                row(4),
                                abandon(),
                                repair(),
-                               resume(),
-                               row(4),
+                               resume(4),
                                finish("time-limit"),
                                abandon(),
-                               resume(),
-                               row(5),
+                               resume(5),
                                frame(5),
                                finish("finished")};
 
@@ -314,7 +323,7 @@ void expect_resumable(const fs::path& file, Model model) {
     }
     const Record restart = *model.restart();
     std::optional<ResultWriter> writer;
-    for (const Step& step : {resume(), row(restart.time + 1), frame(restart.time + 1), finish("finished")}) {
+    for (const Step& step : {resume(restart.time + 1), frame(restart.time + 1), finish("finished")}) {
         step.call(writer, file);
         step.meaning(model);
         EXPECT_TRUE(same(writer->restart_record(), restart));
@@ -389,7 +398,7 @@ TEST_F(Durability, KilledAtEveryOperationOfARun) {
 }
 
 TEST_F(Durability, ResumedWithoutRepairAfterBeingKilledAtEveryOperation) {
-    const std::vector<Step> steps = {create(case_text), row(0), frame(0, 6000), row(1), checkpoint(1), row(2)};
+    const std::vector<Step> steps = {create(case_text), frame(0, 6000), row(1), checkpoint(1), row(2)};
     std::vector<Model> models = {Model{}};
     for (const Step& step : steps) {
         models.push_back(models.back());
@@ -529,11 +538,9 @@ TEST_F(Durability, EveryFailingOperationOfCreateNamesTheFileAndKeepsTheOldResult
           std::tuple(Call::rename, EROFS, "Read-only file system")}) {
         SCOPED_TRACE(words);
         clear();
-        take({create("# before\n"), row(0), frame(0), finish("finished")}, file);
+        take({create("# before\n"), frame(0), finish("finished")}, file);
         break_disk(call, error);
-        const std::string message = message_of<std::runtime_error>([&] {
-            ResultWriter::create(file, {case_text, {}}, {}, series);
-        });
+        const std::string message = message_of<std::runtime_error>([&] { take({create(case_text)}, file); });
         durable::fault = nullptr;
         EXPECT_NE(message.find(file.string()), std::string::npos) << message;
         EXPECT_NE(message.find(words), std::string::npos) << message;
@@ -543,10 +550,50 @@ TEST_F(Durability, EveryFailingOperationOfCreateNamesTheFileAndKeepsTheOldResult
     }
 }
 
+// ---- runs that fail at their start
+
+TEST_F(Durability, WhatWasThereStaysUntilTheFirstRow) {
+    take(before, file);
+    Model old;
+    for (const Step& step : before) step.meaning(old);
+    {
+        auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+        writer.mesh(make_mesh(false));
+        writer.frame(make_surface_record(0, 0));
+        writer.checkpoint(make_record(0, 2));
+        EXPECT_THROW(writer.row(std::vector<double>{0, INFINITY}), std::invalid_argument);
+        writer.discard();
+        EXPECT_FALSE(writer.began());
+    }
+    EXPECT_TRUE(same(read_result(file), old));  // whose last row is in its journal
+    {
+        auto writer = ResultWriter::resume(file);
+        EXPECT_THROW(writer.row(std::vector<double>{INFINITY, 1}), std::invalid_argument);
+        EXPECT_FALSE(writer.began());
+    }
+    EXPECT_TRUE(same(read_result(file), old));
+
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.frame(make_record(0, 3));
+    writer.row(std::vector<double>{0, 1});
+    EXPECT_TRUE(writer.began());
+    EXPECT_TRUE(same(read_result(file), Model{case_text, {}, {{0, 1}}, {make_record(0, 3)}, {}, {}}));
+}
+
+// Where nothing was before, the reason is all that such a run leaves.
+TEST_F(Durability, AResultWithoutRowsSaysWhyItStopped) {
+    auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    EXPECT_FALSE(fs::exists(file));
+    writer.finish({{"stop", "solver-failed"}});
+    EXPECT_TRUE(same(read_result(file), Model{case_text, {}, {}, {}, {}, "solver-failed"}));
+    EXPECT_FALSE(fs::exists(journal_path(file)));
+}
+
 // ---- several parties
 
 TEST_F(Durability, ASecondWriterIsRefusedAsLongAsTheFirstIsThere) {
     auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.row(std::vector<double>{0, 1});
     writer.frame(make_record(0, 3));
     for (const auto& second :
          std::vector<std::function<void()>>{[&] {
@@ -563,13 +610,13 @@ TEST_F(Durability, ASecondWriterIsRefusedAsLongAsTheFirstIsThere) {
 // A reader sees a prefix of the run at any time, at least as long as the one it saw before.
 TEST_F(Durability, ReadingWhileARunGoesOn) {
     const std::size_t calls = 3000;
-    ResultWriter::create(file, {case_text, {}}, {}, series).frame(make_record(0, 3));
+    take({create(case_text), frame(0)}, file);
     const Child child = in_child(
         [&](const auto& report) {
             journal_slack = 2000;
             auto writer = ResultWriter::resume(file);
             report();
-            for (std::size_t i = 0; i < calls; ++i) {
+            for (std::size_t i = 1; i < calls; ++i) {
                 writer.row(std::vector<double>{static_cast<double>(i), 0.5});
                 report();
             }
@@ -592,6 +639,7 @@ TEST_F(Durability, ReadingWhileARunGoesOn) {
 TEST_F(Durability, AnOldCopyOfTheFileBesideItsNewerJournalIsNotTakenForWhole) {
     journal_slack = 0;
     auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+    writer.row(std::vector<double>{0, 1});
     const fs::path copy = directory / "copy.hdf";
     fs::copy_file(file, copy);
     writer.frame(make_record(0, 6000));  // outgrows the file: consolidated, the journal begins anew
@@ -607,9 +655,9 @@ TEST_F(Durability, ADamagedRecordEndsTheJournal) {
         for (int i = 0; i < 5; ++i) writer.row(std::vector<double>{static_cast<double>(i), 1});
     }
     const auto size = fs::file_size(journal_path(file));
-    const auto record = (size - 16) / 5;  // 16 bytes of header, five records of equal size
+    const auto record = (size - 16) / 4;  // 16 bytes of header; the first row is in the file
     std::fstream journal(journal_path(file), std::ios::in | std::ios::out | std::ios::binary);
-    journal.seekp(static_cast<std::streamoff>(16 + 3 * record + record - 1));
+    journal.seekp(static_cast<std::streamoff>(16 + 2 * record + record - 1));
     journal.put('\x55');
     journal.close();
     EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2}));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct RunOptions {
     std::string output;
     bool resume = false, quiet = false, expect = false, check_derivatives = false;
     bool silent = false;  // quiet, and no words on stdout even if the run ends early
+    // Called with each result that was written, which is none where a run fails at its start and an earlier result
+    // stays.
+    std::function<void(const std::filesystem::path&)> written = {};
 };
 int run_cases(const RunOptions& options);
 std::filesystem::path result_path(const RunOptions& options, const Case& c);

@@ -226,7 +226,8 @@ int run_in_3d(Point& p, const fs::path& folder) {
     run.resume = holds(hdf, p.surface_case);
     run.quiet = run.silent = true;
     std::ofstream(toml, std::ios::binary) << p.surface_case;
-    p.file = hdf.string();
+    p.file = run.resume ? hdf.string() : "";
+    run.written = [&](const fs::path& file) { p.file = file.string(); };
     return run_cases(run);  // which says so if the case could not be written
 }
 
@@ -240,6 +241,11 @@ int confirm_scan(const ConfirmOptions& options) {
             say(stderr, "{} of {}: point {}, {}\n", i + 1, points.size(), p.pick.point, fmt::join(p.sets, ", "));
         const int status = run_in_3d(p, folder);
         if (status == exit_code(Stop::interrupted) || status == 2) return status;
+        if (p.file.empty()) {
+            say(stderr, "point {}: the run failed at its start, and an earlier result was left as it was\n",
+                p.pick.point);
+            continue;
+        }
         try {
             p.answer = confirm::answer(p.axisymmetric, read_result(p.file));
         } catch (const std::runtime_error& error) {  // given up without a result

@@ -53,10 +53,13 @@ int find(const RunOptions& options) {
             throw CaseError(
                 fmt::format("{}: is a time-dependent case: an equilibrium needs a table [equilibrium]", path));
     }
-    const int status = run_cases(options);
+    std::vector<std::filesystem::path> files;
+    RunOptions run = options;
+    run.written = [&](const std::filesystem::path& file) { files.push_back(file); };
+    const int status = run_cases(run);
     if (options.quiet) return status;
-    for (const Case& c : cases) {
-        const Result result = read_result(result_path(options, c));
+    for (const auto& file : files) {
+        const Result result = read_result(file);
         if (result.series.contains("time") && !result.series.at("time").empty())
             print_answer(to_string(table_of(result)));
     }

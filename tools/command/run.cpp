@@ -15,6 +15,7 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "common/case/read.hpp"
+#include "common/result/durable_io.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
@@ -24,6 +25,7 @@
 #include "tools/command/help.hpp"
 #include "tools/command/text.hpp"
 #include "tools/run/engine.hpp"
+#include "tools/run/failure.hpp"
 
 namespace tubule {
 
@@ -60,7 +62,10 @@ class Recorder : public RunObserver {
 public:
     Recorder(const Case& c, ResultWriter& writer, bool quiet, double begin)
         : case_(c), writer_(writer), quiet_(quiet), progress_(begin, c.time.end, {.quiet = quiet}) {}
-    void row(std::span<const double> values) override { writer_.row(values); }
+    void row(std::span<const double> values) override {
+        writer_.row(values);
+        reached_ = values.front();
+    }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
     void checkpoint(const Record& state) override { writer_.checkpoint(state); }
@@ -72,11 +77,15 @@ public:
         if (!quiet_) say(stderr, "{}{}: {}\n", wiped, case_.path, words);
     }
 
+    // The time of the last row, of this run.
+    std::optional<double> reached() const { return reached_; }
+
 private:
     const Case& case_;
     ResultWriter& writer_;
     bool quiet_;
     Progress progress_;
+    std::optional<double> reached_;
 };
 
 About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
@@ -98,6 +107,25 @@ std::optional<Stop> stop_of(const Result& result) {
     for (const auto& [name, value] : result.about)
         if (name == "stop") return stop_from_name(std::get<std::string>(value));
     return std::nullopt;
+}
+
+bool has_rows(const std::filesystem::path& file) {
+    return std::filesystem::exists(file) && !read_result(file).series.at("time").empty();
+}
+
+// Whether both are the same case but for comments and time.limit.
+bool same_run(const Case& c, const CaseText& other) {
+    if (other.text == c.text && other.sets == c.sets) return true;
+    const auto meaning = [&](const CaseText& text) {
+        Case read = parse_case(text.text, text.sets, c.path);
+        read.time.limit.reset();
+        return effective_toml(read);
+    };
+    try {
+        return meaning(other) == meaning({c.text, c.sets});
+    } catch (const CaseError&) {
+        return false;  // written by a version with other keys
+    }
 }
 
 // Expectations that a complete result does not meet, one line each.
@@ -130,7 +158,7 @@ int compare(const Case& c, const std::filesystem::path& file) {
     return lines.empty() ? 0 : 1;
 }
 
-void report(const Case& c, const RunSummary& s, const std::filesystem::path& file, double seconds) {
+void report(const Case& c, const RunSummary& s, const std::string& file, double seconds) {
     say(stdout, "{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
     if (!s.stop.advice.empty()) say(stdout, "    {}\n", s.stop.advice);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
@@ -141,7 +169,7 @@ void report(const Case& c, const RunSummary& s, const std::filesystem::path& fil
         say(stdout, "    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
     for (const auto& [key, value] : s.details)
         if (key == "choice" || key == "reason") say(stdout, "    {}: {}\n", key, std::get<std::string>(value));
-    say(stdout, "    {}, {:.3g} s; {}\n", s.effort, seconds, file.string());
+    say(stdout, "    {}{}{:.3g} s; {}\n", s.effort, s.effort.empty() ? "" : ", ", seconds, file);
 }
 
 bool derivatives_can_be_checked(const Case& c) {
@@ -172,7 +200,7 @@ Opened create(const Case& c, const Engine& engine, const std::filesystem::path& 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
 std::optional<Opened> resume(const Case& c, const Engine& engine, const std::filesystem::path& file) {
     Result old = read_result(file);
-    if (old.case_text.text != c.text || old.case_text.sets != c.sets)
+    if (!same_run(c, old.case_text))
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
                                     file.string(), c.path));
     const auto stop = stop_of(old);
@@ -198,6 +226,36 @@ std::optional<Opened> open_result(const Case& c, const Engine& engine, const std
     }
 }
 
+struct Ended {
+    RunSummary summary;
+    bool failed = false;  // by an exception
+};
+
+// A run that cannot go on is at its end, too: rows and frames until then are kept. Passes on bad input that is found
+// before there is a row, and errors of the disk: the journal has what was written until then.
+Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Recorder& recorder) {
+    const auto failed = [&](const std::exception& error) {
+        Ended ended{{}, true};
+        ended.summary.stop = failure_of(c, error, recorder.reached());
+        ended.summary.estimated_error = 1;
+        ended.summary.warnings.emplace_back("the error is unknown");
+        return ended;
+    };
+    try {
+        Ended ended{engine.run(recorder, result.restart ? &*result.restart : nullptr,
+                               result.unfinished ? &*result.unfinished : nullptr)};
+        if (ended.summary.stop.reason == Stop::solver_failed) blame_extreme_numbers(c, ended.summary.stop);
+        return ended;
+    } catch (const durable::Error&) {
+        throw;
+    } catch (const CaseError& error) {
+        if (!result.writer.began()) throw;
+        return failed(error);
+    } catch (const std::exception& error) {
+        return failed(error);
+    }
+}
+
 int run_case(Case c, const RunOptions& options) {
     const std::filesystem::path file = result_path(options, c);
     if (options.check_derivatives && !derivatives_pass(c)) {
@@ -215,17 +273,24 @@ int run_case(Case c, const RunOptions& options) {
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
-    auto& [writer, restart, unfinished] = *result;
-    RunSummary summary;
+    Ended ended;
     {
-        Recorder recorder(c, writer, options.quiet || c.equilibrium, restart ? restart->record.time : 0);
-        summary = engine->run(recorder, restart ? &*restart : nullptr, unfinished ? &*unfinished : nullptr);
+        Recorder recorder(c, result->writer, options.quiet || c.equilibrium,
+                          result->restart ? result->restart->record.time : 0);
+        ended = run_to_its_end(c, *engine, *result, recorder);
     }
+    const RunSummary& summary = ended.summary;
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    writer.finish(about_end(c, summary, seconds));
-    const bool compared = options.expect && summary.stop.reason != Stop::interrupted;
+    // An earlier result stays where this run has no row to put in its place.
+    const bool stays = !result->writer.began() && (ended.failed || !result->restart) && has_rows(file);
+    if (!stays) {
+        result->writer.finish(about_end(c, summary, seconds));
+        if (options.written) options.written(file);
+    }
+    const bool compared = options.expect && !stays && summary.stop.reason != Stop::interrupted;
     const int status = compared ? compare(c, file) : exit_code(summary.stop.reason);
-    if (!options.silent && (!options.quiet || status != 0)) report(c, summary, file, seconds);
+    const std::string words = file.string() + (stays ? " is left as it was: this run has no row" : "");
+    if (!options.silent && (!options.quiet || status != 0)) report(c, summary, words, seconds);
     return status;
 }
 

@@ -88,11 +88,12 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     const Stop stop = was_interrupted ? Stop::interrupted : Stop::finished;
-    writer.finish({{"stop", std::string(name(stop))},
-                   {"wall_seconds", seconds},
-                   {"cpu_seconds", effort.cpu_seconds},
-                   {"points_run", static_cast<std::int64_t>(effort.points)},
-                   {"workers", std::int64_t{workers}}});
+    if (!was_interrupted || writer.began())  // else an earlier result stays as it was
+        writer.finish({{"stop", std::string(name(stop))},
+                       {"wall_seconds", seconds},
+                       {"cpu_seconds", effort.cpu_seconds},
+                       {"points_run", static_cast<std::int64_t>(effort.points)},
+                       {"workers", std::int64_t{workers}}});
     if (!options.quiet) report(writer.result(), file, was_interrupted, effort, seconds);
     if (was_interrupted && ranks) {
         std::fflush(nullptr);

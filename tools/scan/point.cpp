@@ -10,7 +10,9 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_frame.hpp"
+#include "common/case/read.hpp"
 #include "tools/run/engine.hpp"
+#include "tools/run/failure.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
 namespace tubule {
@@ -176,8 +178,10 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
     PointResult p;
     try {
         p = computed(c, to_the_end, interrupted);
-    } catch (const std::exception& error) {
+    } catch (const CaseError& error) {
         p = refused_point(error.what());
+    } catch (const std::exception& error) {
+        p = refused_point(failure_of(c, error, {}).message);
         p.stop = stop_word(Stop::solver_failed);
     }
     p[Measure::wall_seconds] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();

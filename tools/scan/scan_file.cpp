@@ -387,6 +387,7 @@ struct ScanWriter::Impl {
     Journal journal;
     Stored stored;
     bool complete = false;
+    bool began = false;  // the file and its journal are this writer's
     Clock::time_point written_at;
     Clock::duration cost{};
 
@@ -396,6 +397,7 @@ struct ScanWriter::Impl {
         journal.restart(stored.id);
         written_at = Clock::now();
         cost = written_at - start;
+        began = true;
     }
 };
 
@@ -421,7 +423,6 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
         c.result.points[i].point = i;
         c.result.points[i].measures.fill(std::numeric_limits<double>::quiet_NaN());
     }
-    impl->write();
     return ScanWriter(std::move(impl));
 }
 
@@ -435,12 +436,10 @@ ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
                                     file.string(), scan.path));
     for (const auto& [key, value] : impl->stored.result.about)
         if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
-    if (impl->complete) {
+    if (impl->complete)
         impl->journal.remove();
-    } else {
+    else
         std::erase_if(impl->stored.result.about, [](const auto& entry) { return entry.first == "stop"; });
-        impl->write();
-    }
     return ScanWriter(std::move(impl));
 }
 
@@ -452,13 +451,18 @@ bool ScanWriter::complete() const {
     return impl_->complete;
 }
 
+bool ScanWriter::began() const {
+    return impl_->began;
+}
+
 void ScanWriter::point(const PointResult& p) {
     Stored& c = impl_->stored;
-    impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
+    if (impl_->began) impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
     ++c.sequence;
     keep(c.result, p);
     // For concurrent readers, as often as takes less than 2 % of the time.
-    if (Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
+    if (!impl_->began ||
+        Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
         impl_->write();
 }
 

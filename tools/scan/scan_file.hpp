@@ -31,7 +31,7 @@ Plan plan_of(const ScanResult& result);
 // that name that is no scan.
 class ScanWriter {
 public:
-    // Begins anew; an old scan of that name is replaced.
+    // Begins anew; an old scan of that name is replaced at the first point.
     static ScanWriter create(const std::filesystem::path& file, const Scan& scan, const About& about);
     // Goes on with the points of an unfinished scan. Throws CaseError if the file belongs to another one.
     static ScanWriter resume(const std::filesystem::path& file, const Scan& scan);
@@ -40,6 +40,7 @@ public:
 
     const ScanResult& result() const;
     bool complete() const;  // of a resumed scan: nothing is left to do
+    bool began() const;     // there was a point, and the file is this writer's
     void point(const PointResult& p);
     // Writes the file whole and removes the journal. What `more` says replaces what /about said by the same names.
     void finish(const About& more);
