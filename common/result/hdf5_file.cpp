@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
 
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
+#include "common/result/result_index.hpp"
 #include "common/result/vtk_grid.hpp"
 #include "common/series/catalogue.hpp"
 
@@ -25,20 +27,23 @@ std::mutex library;  // HDF5 may be built without thread safety
 
 // ---- writing
 
-void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes) {
+void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes,
+                std::vector<Extent>& extents) {
     const auto group = make_group(parent, name);
     put_attribute(group, "time", record.time);
     if (record.kind) put_attribute(group, "kind", std::string(tubule::name(*record.kind)));
     for (const auto& [key, value] : record.numbers) put_attribute(group, key, value);
     if (record.mesh) {
-        put_grid(group, record, meshes[*record.mesh]);
+        put_grid(group, record, meshes[*record.mesh], extents);
         return;
     }
     for (const Array& array : record.arrays)
-        put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data());
+        extents.push_back(
+            extent_of(put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data()),
+                      std::as_bytes(std::span(array.data))));
 }
 
-void put_series(hid_t file, const Contents& contents) {
+void put_series(hid_t file, const Contents& contents, std::vector<Extent>& extents) {
     const auto group = make_group(file, "series");
     put_attribute(group, "order", contents.series);
     const std::size_t width = contents.series.size();
@@ -47,6 +52,7 @@ void put_series(hid_t file, const Contents& contents) {
         for (std::size_t i = 0; i < column.size(); ++i) column[i] = contents.rows[i * width + j];
         const auto data =
             put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
+        extents.push_back(extent_of(data, std::as_bytes(std::span(column))));
         if (const SeriesEntry* entry = find_series(contents.series[j])) {
             put_attribute(data, "unit", std::string(entry->unit));
             put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
@@ -68,6 +74,16 @@ std::size_t size_estimate(const Contents& contents) {
 // All attributes of a record are numbers but its kind and, on a mesh, these.
 bool is_of_the_grid(const std::string& attribute) {
     return std::find(std::begin(grid_attributes), std::end(grid_attributes), attribute) != std::end(grid_attributes);
+}
+
+// No number of a result is NaN or infinite: the writer refuses them.
+void require_finite(const std::vector<double>& values, const std::string& what) {
+    const auto bad = std::find_if_not(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+    if (bad != values.end())
+        throw std::runtime_error(
+            fmt::format("{} is {} in row {}, and no number of a result can be that: the file is "
+                        "damaged",
+                        what, *bad, bad - values.begin()));
 }
 
 Record get_record(hid_t parent, const std::string& name, const std::vector<SurfaceCells>& meshes) {
@@ -93,6 +109,9 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
     } else {
         for (const std::string& key : member_names(group)) record.arrays.push_back(get_array(group, key));
     }
+    for (const Array& array : record.arrays) require_finite(array.data, fmt::format("{}: {}", name, array.name));
+    for (const auto& [key, value] : record.numbers) require_finite({value}, fmt::format("{}: {}", name, key));
+    require_finite({record.time}, fmt::format("{}: time", name));
     return record;
 }
 
@@ -113,6 +132,7 @@ void get_series(hid_t file, Contents& contents) {
     const std::size_t width = contents.series.size();
     for (std::size_t j = 0; j < width; ++j) {
         const auto column = get_array(group, contents.series[j]).data;
+        require_finite(column, "series " + contents.series[j]);
         if (j == 0) contents.rows.resize(column.size() * width);
         if (column.size() * width != contents.rows.size())
             throw std::runtime_error(
@@ -166,10 +186,7 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
     if (!std::filesystem::is_regular_file(status))
         throw std::runtime_error(fmt::format("{}: not a regular file", file.string()));
     try {
-        const auto access = property_list(H5P_FILE_ACCESS);
-        // A result never changes in place, so it needs no lock; on some file systems locks fail.
-        H5Pset_file_locking(access, false, true);
-        const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "it");
+        const auto opened = open_file(file);
         require_parts(opened);
         return read(opened);
     } catch (const std::runtime_error& e) {
@@ -192,14 +209,17 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
-    put_series(file, contents);
-    const auto meshes = put_meshes(file, contents.meshes);
+    std::vector<Extent> extents;
+    put_series(file, contents, extents);
+    const auto meshes = put_meshes(file, contents.meshes, extents);
     const auto frames = make_group(file, "frames");
     for (std::size_t i = 0; i < contents.frames.size(); ++i)
-        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes);
-    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes);
+        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes, extents);
+    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes, extents);
     put_steps(file, contents, meshes);
-    return bytes_of(file);
+    auto bytes = bytes_of(file);
+    seal(bytes, index_of(contents, extents));
+    return bytes;
 }
 
 std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
@@ -214,6 +234,14 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
 
 Contents read_hdf5(const std::filesystem::path& file) {
     return with_result(file, get_contents);
+}
+
+Contents read_hdf5(std::vector<std::byte> bytes) {
+    const std::lock_guard lock(library);
+    const Quiet quiet;
+    const auto image = open_image(bytes);
+    require_parts(image);
+    return get_contents(image);
 }
 
 void require_result(const std::filesystem::path& file) {

@@ -1,8 +1,12 @@
 #include "common/result/hdf5_objects.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <stdexcept>
+
+#include "common/result/durable_io.hpp"
 
 namespace tubule::h5 {
 
@@ -126,8 +130,12 @@ Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t exte
     return dataset;
 }
 
-void put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values) {
-    put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size()}), values.data());
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values) {
+    return put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size()}), values.data());
+}
+
+Extent extent_of(hid_t dataset, std::span<const std::byte> data) {
+    return tubule::extent_of(data.empty() ? 0 : H5Dget_offset(dataset), data);
 }
 
 Handle make_group(hid_t parent, const std::string& name) {
@@ -141,6 +149,30 @@ Handle make_group(hid_t parent, const std::string& name) {
 }
 
 // ---- reading
+
+Handle open_file(const std::filesystem::path& file) {
+    while (true) {
+        const durable::File looked_at(file, O_RDONLY);
+        require_whole(looked_at.descriptor(), file);
+        const auto access = property_list(H5P_FILE_ACCESS);
+        // A result never changes in place, so there is nothing to lock against; and on some file systems locks fail.
+        H5Pset_file_locking(access, false, true);
+        Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "it");
+        // It may have been replaced between the two.
+        struct stat checked {
+        }, named{};
+        ::fstat(looked_at.descriptor(), &checked);
+        if (::stat(file.c_str(), &named) == 0 && named.st_ino == checked.st_ino && named.st_dev == checked.st_dev)
+            return opened;
+    }
+}
+
+Handle open_image(std::span<std::byte> bytes) {
+    const auto access = property_list(H5P_FILE_ACCESS);
+    H5Pset_fapl_core(access, bytes.size(), false);
+    require(H5Pset_file_image(access, bytes.data(), bytes.size()) >= 0, "read", "a file in memory");
+    return {H5Fopen("image", H5F_ACC_RDONLY, access), H5Fclose, "open", "it"};
+}
 
 bool has(hid_t parent, const std::string& name) {
     return H5Lexists(parent, name.c_str(), H5P_DEFAULT) > 0;

@@ -6,11 +6,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "common/result/checksums.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule::h5 {
@@ -70,12 +73,18 @@ void put_attribute(hid_t object, const std::string& name, const std::string& tex
 void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts);
 
 Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data);
-void put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values);
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values);
+// Where a dataset has its numbers, which begin with `data`.
+Extent extent_of(hid_t dataset, std::span<const std::byte> data);
 
 // A group that remembers the order in which its attributes and members were made.
 Handle make_group(hid_t parent, const std::string& name);
 
 // ---- reading
+
+// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged.
+Handle open_file(const std::filesystem::path& file);
+Handle open_image(std::span<std::byte> bytes);  // of a file in memory
 
 bool has(hid_t parent, const std::string& name);
 Handle open_group(hid_t parent, const std::string& name);

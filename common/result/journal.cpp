@@ -7,13 +7,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
+
+#include "common/result/checksums.hpp"
+#include "common/result/record_bytes.hpp"
 
 namespace tubule {
 
@@ -30,19 +33,6 @@ struct Head {
 };
 constexpr std::size_t summed_head = offsetof(Head, crc);
 
-// Eight tables process eight bytes at a time: a bytewise CRC would take longer than writing a row.
-constexpr auto crc_tables = [] {
-    std::array<std::array<std::uint32_t, 256>, 8> t{};
-    for (std::uint32_t i = 0; i < 256; ++i) {
-        std::uint32_t c = i;
-        for (int bit = 0; bit < 8; ++bit) c = (c & 1) ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-        t[0][i] = c;
-    }
-    for (std::size_t k = 1; k < 8; ++k)
-        for (std::size_t i = 0; i < 256; ++i) t[k][i] = t[0][t[k - 1][i] & 0xFF] ^ (t[k - 1][i] >> 8);
-    return t;
-}();
-
 std::uint32_t seed_of(std::uint64_t id) {
     return crc32(0, std::as_bytes(std::span(&id, 1)));
 }
@@ -51,128 +41,11 @@ std::uint32_t record_crc(std::uint32_t seed, std::span<const std::byte> record) 
     return crc32(crc32(seed, record.first(summed_head)), record.subspan(sizeof(Head)));
 }
 
-// Writing of a payload.
-void put(std::vector<std::byte>& out, std::span<const std::byte> bytes) {
-    out.insert(out.end(), bytes.begin(), bytes.end());
-}
-void put(std::vector<std::byte>& out, std::span<const double> values) {
-    put(out, std::as_bytes(values));
-}
-void put(std::vector<std::byte>& out, double value) {
-    put(out, std::span<const double>(&value, 1));
-}
-void put(std::vector<std::byte>& out, std::uint64_t value) {
-    put(out, std::as_bytes(std::span(&value, 1)));
-}
-void put(std::vector<std::byte>& out, const std::string& text) {
-    put(out, std::uint64_t{text.size()});
-    put(out, std::as_bytes(std::span(text)));
-}
-
-// In place of the number of a mesh.
-constexpr std::uint64_t no_mesh = ~std::uint64_t{0};
-
-// Reading of a payload. Its CRC matched, so reading past its end is a bug in this file.
-class Payload {
-public:
-    explicit Payload(std::span<const std::byte> bytes) : rest_(bytes) {}
-
-    bool empty() const { return rest_.empty(); }
-    std::span<const std::byte> take(std::size_t n) {
-        if (n > rest_.size()) throw std::runtime_error("a journal record is shorter than its stated length");
-        const auto taken = rest_.first(n);
-        rest_ = rest_.subspan(n);
-        return taken;
-    }
-    template <class T>
-    T get() {
-        T value;
-        std::memcpy(&value, take(sizeof(T)).data(), sizeof(T));
-        return value;
-    }
-    std::string text() {
-        const auto bytes = take(get<std::uint64_t>());
-        return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-    }
-    template <class T>
-    std::vector<T> list(std::size_t n) {
-        const auto bytes = take(n * sizeof(T));
-        std::vector<T> values(n);
-        if (n > 0) std::memcpy(values.data(), bytes.data(), bytes.size());
-        return values;
-    }
-
-private:
-    std::span<const std::byte> rest_;
-};
-
-void put(std::vector<std::byte>& out, const Record& record) {
-    put(out, record.time);
-    put(out, std::uint64_t{record.numbers.size()});
-    for (const auto& [name, value] : record.numbers) {
-        put(out, name);
-        put(out, value);
-    }
-    put(out, std::uint64_t{record.arrays.size()});
-    for (const Array& array : record.arrays) {
-        put(out, array.name);
-        put(out, std::uint64_t{array.shape.size()});
-        for (const std::size_t extent : array.shape) put(out, std::uint64_t{extent});
-        put(out, std::uint64_t{array.data.size()});
-        put(out, std::span<const double>(array.data));
-    }
-    if (!record.mesh && !record.kind) return;
-    put(out, record.mesh ? std::uint64_t{*record.mesh} : no_mesh);
-    if (record.kind) put(out, std::string(name(*record.kind)));
-}
-
-Record get_record(Payload& in) {
-    Record record;
-    record.time = in.get<double>();
-    for (auto n = in.get<std::uint64_t>(); n > 0; --n) {
-        auto name = in.text();
-        record.numbers.emplace_back(std::move(name), in.get<double>());
-    }
-    for (auto n = in.get<std::uint64_t>(); n > 0; --n) {
-        Array array;
-        array.name = in.text();
-        for (auto rank = in.get<std::uint64_t>(); rank > 0; --rank) array.shape.push_back(in.get<std::uint64_t>());
-        array.data = in.list<double>(in.get<std::uint64_t>());
-        record.arrays.push_back(std::move(array));
-    }
-    if (!in.empty())
-        if (const auto mesh = in.get<std::uint64_t>(); mesh != no_mesh) record.mesh = mesh;
-    if (!in.empty()) record.kind = record_kind(in.text());
-    return record;
-}
-
-void put(std::vector<std::byte>& out, const std::vector<int>& values) {
-    put(out, std::uint64_t{values.size()});
-    put(out, std::as_bytes(std::span(values)));
-}
-void put(std::vector<std::byte>& out, const SurfaceCells& mesh) {
-    put(out, static_cast<std::uint64_t>(mesh.order));
-    put(out, std::uint64_t{mesh.nodes});
-    put(out, mesh.period);
-    put(out, mesh.cells);
-    put(out, mesh.shifts);
-}
-
-SurfaceCells get_mesh(Payload& in) {
-    SurfaceCells mesh;
-    mesh.order = static_cast<int>(in.get<std::uint64_t>());
-    mesh.nodes = in.get<std::uint64_t>();
-    mesh.period = in.get<double>();
-    mesh.cells = in.list<int>(in.get<std::uint64_t>());
-    mesh.shifts = in.list<int>(in.get<std::uint64_t>());
-    return mesh;
-}
-
 void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
     Payload payload(bytes);
     switch (kind) {
         case Entry::row:
-            contents.add_row(payload.list<double>(contents.series.size()));
+            contents.add_row(payload.values<double>(contents.series.size()));
             return;
         case Entry::frame:
             contents.frames.push_back(get_record(payload));
@@ -210,22 +83,6 @@ durable::File open_locked(const std::filesystem::path& path) {
 
 }  // namespace
 
-std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes) {
-    const auto& t = crc_tables;
-    crc = ~crc;
-    const std::byte* p = bytes.data();
-    std::size_t n = bytes.size();
-    for (; n >= 8; n -= 8, p += 8) {
-        std::uint64_t word;  // little-endian, as every machine this is built for
-        std::memcpy(&word, p, 8);
-        word ^= crc;
-        crc = 0;
-        for (std::size_t k = 0; k < 8; ++k) crc ^= t[7 - k][(word >> (8 * k)) & 0xFF];
-    }
-    for (; n > 0; --n, ++p) crc = t[0][(crc ^ std::to_integer<std::uint32_t>(*p)) & 0xFF] ^ (crc >> 8);
-    return ~crc;
-}
-
 std::filesystem::path journal_path(const std::filesystem::path& result) {
     auto path = result;
     path += ".journal";
@@ -246,7 +103,7 @@ void Journal::restart(std::uint64_t id) {
     sound_ = false;
     file_.truncate(0);
     size_ = header_size;  // even if the header fails now: there was a journal, leave its file alone
-    std::vector<std::byte> header;
+    Bytes header;
     put(header, std::as_bytes(std::span(magic)));
     put(header, id);
     file_.write(header);
@@ -318,7 +175,7 @@ void Journal::bytes(Entry kind, std::uint64_t sequence, std::span<const std::byt
     commit(sequence);
 }
 
-std::vector<std::byte> read_journal(const std::filesystem::path& result) {
+Bytes read_journal(const std::filesystem::path& result) {
     const auto path = journal_path(result);
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe must not be waited for
     if (fd < 0 && errno == ENOENT) return {};
@@ -337,33 +194,31 @@ std::vector<std::byte> read_journal(const std::filesystem::path& result) {
     };
 
     while (true) {
-        std::vector<std::byte> bytes;
+        Bytes bytes;
         std::size_t size = 0;
         for (std::size_t n = 1; n > 0; size += n) {
             bytes.resize(std::max<std::size_t>(2 * size, 1 << 16));
             n = read_from(size, std::span(bytes).subspan(size));
         }
         bytes.resize(size);
-        // If the run has restarted the journal meanwhile, its first record is a different one, and the data read may
-        // mix old and new.
-        std::vector<std::byte> front(std::min(size, header_size + sizeof(Head)));
+        // If the run has begun the journal anew meanwhile, its first record is another one now, and what was read may
+        // be part old, part new.
+        Bytes front(std::min(size, header_size + sizeof(Head)));
         if (read_from(0, front) == front.size() && std::equal(front.begin(), front.end(), bytes.begin())) return bytes;
     }
 }
 
-void replay(std::span<const std::byte> journal, Contents& contents) {
-    replay(journal, contents.id, contents.sequence,
-           [&](Entry kind, std::span<const std::byte> payload) { apply(kind, payload, contents); });
+std::size_t replay(std::span<const std::byte> journal, Contents& contents) {
+    return replay(journal, contents.id, contents.sequence,
+                  [&](Entry kind, std::span<const std::byte> payload) { apply(kind, payload, contents); });
 }
 
-void replay(std::span<const std::byte> journal, std::uint64_t expected_id, std::uint64_t& sequence,
-            const std::function<void(Entry, std::span<const std::byte>)>& apply) {
-    std::uint64_t id = 0;
-    if (journal.size() < header_size || std::memcmp(journal.data(), magic.data(), magic.size()) != 0) return;
-    std::memcpy(&id, journal.data() + magic.size(), sizeof(id));
-    if (id != expected_id) return;
-
+std::size_t replay(std::span<const std::byte> journal, std::uint64_t id, std::uint64_t& sequence,
+                   const std::function<void(Entry, std::span<const std::byte>)>& apply) {
+    if (journal.size() < header_size) return 0;
+    // Whose journal it is the records tell as well: one damaged byte of the header must not cost them.
     const std::uint32_t seed = seed_of(id);
+    const bool says_so = std::memcmp(journal.data() + magic.size(), &id, sizeof(id)) == 0;
     auto rest = journal.subspan(header_size);
     while (rest.size() >= sizeof(Head)) {
         Head head;
@@ -382,6 +237,18 @@ void replay(std::span<const std::byte> journal, std::uint64_t expected_id, std::
         }
         rest = rest.subspan(record.size());
     }
+    const bool is_ours = says_so || rest.size() < journal.size() - header_size;
+    return is_ours ? rest.size() : 0;
+}
+
+void warn_of_rest(std::size_t bytes, const std::filesystem::path& result) {
+    if (bytes == 0) return;
+    std::fputs(
+        fmt::format("warning: {}: its last {} bytes are no whole record: the run was killed while it wrote them, or "
+                    "they are damaged; what they recorded is lost\n",
+                    journal_path(result).string(), bytes)
+            .c_str(),
+        stderr);
 }
 
 }  // namespace tubule

@@ -23,9 +23,6 @@ inline std::size_t journal_slack = std::size_t{4} << 20;
 
 enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh, point /* of a scan */ };
 
-// Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
-std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
-
 std::filesystem::path journal_path(const std::filesystem::path& result);
 
 class Journal {
@@ -64,12 +61,15 @@ private:
 std::vector<std::byte> read_journal(const std::filesystem::path& result);
 
 // Applies to `contents` the records that follow them, up to the first torn one; none if the journal belongs to another
-// result. During a run, read the journal first and the contents afterwards: in this order there is never a
-// gap. Throws std::runtime_error on a gap.
-void replay(std::span<const std::byte> journal, Contents& contents);
+// result. During a run, read the journal first and the contents afterwards: in this order there is never a gap. Returns
+// how many bytes remain that are no record, torn or damaged. Throws std::runtime_error on a gap.
+std::size_t replay(std::span<const std::byte> journal, Contents& contents);
 
 // The same for other contents: `apply` takes the records after `sequence`, which is updated.
-void replay(std::span<const std::byte> journal, std::uint64_t id, std::uint64_t& sequence,
-            const std::function<void(Entry, std::span<const std::byte>)>& apply);
+std::size_t replay(std::span<const std::byte> journal, std::uint64_t id, std::uint64_t& sequence,
+                   const std::function<void(Entry, std::span<const std::byte>)>& apply);
+
+// Warns on stderr that so many bytes at the end of the journal are lost; silent if there are none.
+void warn_of_rest(std::size_t bytes, const std::filesystem::path& result);
 
 }  // namespace tubule

@@ -37,9 +37,9 @@ void put_format(hid_t group, std::array<std::int64_t, 2> version) {
     put_attribute(group, "Type", fixed, scalar(), type.data());
 }
 
-void put_doubles(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
-                 const std::vector<double>& data) {
-    put_dataset(parent, name, H5T_NATIVE_DOUBLE, space(shape), data.data());
+Handle put_doubles(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
+                   const std::vector<double>& data) {
+    return put_dataset(parent, name, H5T_NATIVE_DOUBLE, space(shape), data.data());
 }
 
 // Rows of nodes become rows of points, and back.
@@ -90,7 +90,7 @@ VtkPoints vtk_points(const SurfaceCells& mesh) {
     return points;
 }
 
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes) {
+std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes, std::vector<Extent>& extents) {
     std::vector<WrittenMesh> written;
     if (meshes.empty()) return written;
     const auto parent = make_group(file, "meshes");
@@ -102,18 +102,21 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
         put_attribute(group, "order", std::int64_t{mesh.order});
         put_attribute(group, "nodes", static_cast<std::int64_t>(mesh.nodes));
         put_attribute(group, "period", mesh.period);
+        const auto put_and_list = [&](const char* part, const std::vector<std::int64_t>& values) {
+            extents.push_back(extent_of(put_dataset(group, part, values), std::as_bytes(std::span(values))));
+        };
         put_dataset(group, "NumberOfPoints", {static_cast<std::int64_t>(points.node.size())});
         put_dataset(group, "NumberOfCells", {static_cast<std::int64_t>(cells)});
         put_dataset(group, "NumberOfConnectivityIds", {static_cast<std::int64_t>(mesh.cells.size())});
-        put_dataset(group, "Connectivity", points.connectivity);
+        put_and_list("Connectivity", points.connectivity);
         std::vector<std::int64_t> offsets;
         for (std::size_t c = 0; c <= cells; ++c) offsets.push_back(static_cast<std::int64_t>(c * nodes_per_cell(mesh)));
         put_dataset(group, "Offsets", offsets);
         const std::vector<std::uint8_t> types(cells, lagrange_triangle);
         put_dataset(group, "Types", H5T_NATIVE_UINT8, space({cells}), types.data());
         if (mesh.period > 0) {
-            put_dataset(group, "point_node", points.node);
-            put_dataset(group, "point_shift", points.shift);
+            put_and_list("point_node", points.node);
+            put_and_list("point_shift", points.shift);
         }
         written.push_back({mesh, std::move(points), "/meshes/" + name});
     }
@@ -131,22 +134,27 @@ SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     mesh.period = get_attribute<double>(open_attribute(group, "period"), H5T_NATIVE_DOUBLE, "period");
     if (mesh.order < 1 || mesh.order > 4)
         throw std::runtime_error(fmt::format("mesh {}: its order is {}, not 1 to 4", name, mesh.order));
-    const bool tube = mesh.period > 0;
     std::vector<std::int64_t> node, shift;
-    if (tube) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
-    const std::size_t points = tube ? std::min(node.size(), shift.size()) : mesh.nodes;
-    for (const std::int64_t point : get_integers(group, "Connectivity")) {
-        const auto p = static_cast<std::size_t>(point);
-        if (p >= points)
-            throw std::runtime_error(
-                fmt::format("mesh {}: a cell uses point {}, but there are {}", name, point, points));
-        mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
-        if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
-    }
+    if (mesh.period > 0) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
+    set_cells(mesh, get_integers(group, "Connectivity"), node, shift, name);
     return mesh;
 }
 
-void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
+void set_cells(SurfaceCells& mesh, const std::vector<std::int64_t>& connectivity, const std::vector<std::int64_t>& node,
+               const std::vector<std::int64_t>& shift, const std::string& where) {
+    const bool tube = mesh.period > 0;
+    const std::size_t points = tube ? std::min(node.size(), shift.size()) : mesh.nodes;
+    for (const std::int64_t point : connectivity) {
+        const auto p = static_cast<std::size_t>(point);
+        if (p >= points)
+            throw std::runtime_error(
+                fmt::format("mesh {}: a cell uses point {}, but there are {}", where, point, points));
+        mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
+        if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
+    }
+}
+
+void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std::vector<Extent>& extents) {
     put_format(group, {1, 0});
     put_attribute(group, "mesh", static_cast<std::int64_t>(*record.mesh));
     std::vector<std::string> names;
@@ -158,17 +166,18 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
         require(H5Lcreate_hard(group, target.c_str(), group, part, H5P_DEFAULT, H5P_DEFAULT) >= 0, "link", target);
     }
     const auto data = make_group(group, "PointData");
-    for (const Array& array : record.arrays) {
+    const auto put_one = [&](const Array& array) {
         if (array.name == "points") {
             const Array points = points_of(array, written);
-            put_doubles(group, "Points", points.shape, points.data);
-        } else if (is_point_data(array, written.mesh)) {
-            const Array values = at_points(array, written.points);
-            put_doubles(data, values.name, values.shape, values.data);
-        } else {
-            put_doubles(group, array.name, array.shape, array.data);
+            return put_doubles(group, "Points", points.shape, points.data);
         }
-    }
+        if (!is_point_data(array, written.mesh)) return put_doubles(group, array.name, array.shape, array.data);
+        const Array values = at_points(array, written.points);
+        return put_doubles(data, values.name, values.shape, values.data);
+    };
+    // The numbers of the nodes come first, whatever points follow.
+    for (const Array& array : record.arrays)
+        extents.push_back(extent_of(put_one(array), std::as_bytes(std::span(array.data))));
 }
 
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh) {

@@ -12,11 +12,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "common/result/checksums.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/journal.hpp"
 #include "common/result/result.hpp"
@@ -661,6 +663,32 @@ TEST_F(Durability, ADamagedRecordEndsTheJournal) {
     journal.put('\x55');
     journal.close();
     EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2}));
+}
+
+// Of a record what it is damaged in does not matter, nor the header; and it is said.
+TEST_F(Durability, AFlippedBitOfTheJournalChangesNoRowAndIsReported) {
+    {
+        auto writer = ResultWriter::create(file, {case_text, {}}, {}, series);
+        for (int i = 0; i < 4; ++i) writer.row(std::vector<double>{static_cast<double>(i), 1});
+    }
+    std::string sound;
+    {
+        std::ifstream in(journal_path(file), std::ios::binary);
+        sound.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    const std::size_t record = (sound.size() - 16) / 3;
+    for (std::size_t i = 0; i < sound.size(); ++i) {
+        std::string spoilt = sound;
+        spoilt[i] ^= static_cast<char>(1 << i % 8);
+        std::ofstream(journal_path(file), std::ios::binary) << spoilt;
+        testing::internal::CaptureStderr();
+        const auto times = read_result(file).series.at("time");
+        const std::string warning = testing::internal::GetCapturedStderr();
+        const std::size_t rows = i < 16 ? 4 : 1 + (i - 16) / record;
+        ASSERT_EQ(times.size(), rows) << "byte " << i;
+        for (std::size_t k = 0; k < rows; ++k) EXPECT_EQ(times[k], static_cast<double>(k));
+        EXPECT_EQ(warning.find("are no whole record") != std::string::npos, rows < 4) << "byte " << i;
+    }
 }
 
 TEST(Crc32, CheckValue) {

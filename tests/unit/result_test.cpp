@@ -615,7 +615,23 @@ TEST_F(ResultFile, ADamagedResultNamesItsLack) {
 TEST_F(ResultFile, ACutOffFileIsRefused) {
     create().finish({});
     fs::resize_file(file, fs::file_size(file) / 2);
-    EXPECT_CONTAINS(message_of([&] { read_result(file); }), "HDF5 cannot open it");
+    EXPECT_CONTAINS(message_of([&] { read_result(file); }), "it is cut off");
+}
+
+// The writer refuses them; another program may have changed the file since.
+TEST_F(ResultFile, NumbersThatAreNoneAreRefused) {
+    const auto refused = [&](const std::string& change) {
+        auto writer = create();
+        for (const double time : {0.0, 1.0, 2.0}) writer.row(row_at(time));
+        writer.frame(record_at(1));
+        writer.finish({});
+        python("f = h5py.File(name, 'a')\n" + change);
+        return message_of([&] { read_result(file); });
+    };
+    EXPECT_CONTAINS(refused("f['series/energy'][2] = np.nan"), "series energy is nan in row 2");
+    EXPECT_CONTAINS(refused("f['series/time'][0] = -np.inf"), "series time is -inf in row 0");
+    EXPECT_CONTAINS(refused("f['frames/000000/X'][1, 0] = np.nan"), "000000: X is nan in row 3");
+    EXPECT_CONTAINS(refused("f['frames/000000'].attrs['length'] = np.nan"), "000000: length is nan in row 0");
 }
 
 // ---- h5py
@@ -627,7 +643,7 @@ TEST_F(ResultFile, H5pyReadsItDuringTheRunAndAfter) {
     writer.row(row_at(0));
     // The journal is not for h5py; the file is, whole, at any time.
     EXPECT_EQ(python("f = h5py.File(name)\nprint(f['case'].asstr()[()] == '# \\u00b5\\n', f['series/time'].shape)"),
-              "True (0,)\n");
+              "True (1,)\n");
     writer.row(row_at(1));
     writer.frame(record_at(1));
     writer.checkpoint(record_at(1));

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/case/read.hpp"
+#include "common/result/checksums.hpp"
 #include "common/result/record.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
@@ -29,7 +30,8 @@ namespace {
 
 struct ShowOptions {
     std::string file;
-    bool csv = false, json = false;
+    std::string rescue;
+    bool csv = false, json = false, verify = false;
     std::optional<long> frame;
 };
 
@@ -257,8 +259,26 @@ Text shown(const ShowOptions& options) {
     return out;
 }
 
+// Whether all is as it was written: exit status 0, or 1 if anything is lost or cannot be known.
+int verify(const ShowOptions& options) {
+    const bool is_whole_scan =
+        is_scan(options.file) && examine(options.file).kind == Wholeness::Kind::whole && options.rescue.empty();
+    const Verification found = is_whole_scan ? Verification{} : verify_result(options.file, options.rescue);
+    std::string out = options.file + ": ";
+    if (!found.has_checksums)
+        add(out, "has no checksums, so whether it is as it was written cannot be told\n");
+    else
+        add(out, "{}\n", found.damage.empty() ? "as it was written" : found.damage);
+    for (const std::string& what : found.lost) add(out, "lost       {}\n", what);
+    if (found.has_checksums && !is_whole_scan) add(out, "good       {} rows, {} frames\n", found.rows, found.frames);
+    if (found.has_checksums && !options.rescue.empty()) add(out, "written    {}\n", options.rescue);
+    print_answer(out);
+    return found.has_checksums && found.damage.empty() ? 0 : 1;
+}
+
 int show(const ShowOptions& options) {
     try {
+        if (options.verify || !options.rescue.empty()) return verify(options);
         const Text out = shown(options);
         print_answer({out.data(), out.size()});
         return 0;
@@ -284,7 +304,15 @@ void add_show(CLI::App& app, int& exit_status) {
     command->add_option("--frame", options->frame,
                         "with --csv: points and what is known there, of this frame, instead; with --json: its arrays "
                         "too (-1: the last)");
-    end_help(*command, {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1"}, {{0}, {2}}, {"results"});
+    command
+        ->add_flag("--verify", options->verify,
+                   "only look whether the file is as it was written, and which rows and frames are good: exit status 1 "
+                   "if it is damaged")
+        ->excludes(csv);
+    command->add_option("--rescue", options->rescue, "write what is good of a damaged result to this new file");
+    end_help(*command,
+             {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1", "tubule show figure.hdf --verify"},
+             {{0}, {1, "--verify, --rescue: the file is damaged, or has no checksums"}, {2}}, {"results"});
     command->callback([options, &exit_status] { exit_status = show(*options); });
 }
 

@@ -210,7 +210,10 @@ std::vector<std::byte> image_of(const Stored& stored) {
     if (scan.boundary && scan.boundary->refine > 0) put_crossings(file, result);
     const auto lines = make_group(file, "thresholds");
     for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
-    return bytes_of(file);
+    auto bytes = bytes_of(file);
+    const std::string kind = "scan 1";  // its points are not rescued one by one: a scan is damaged or whole
+    seal(bytes, std::as_bytes(std::span(kind)));
+    return bytes;
 }
 
 // ---- reading HDF5
@@ -301,12 +304,6 @@ std::map<std::size_t, Outcome> get_between(hid_t file) {
     return between;
 }
 
-Handle open_file(const fs::path& file) {
-    const auto access = property_list(H5P_FILE_ACCESS);
-    H5Pset_file_locking(access, false, true);  // as for results: a file never changes in place
-    return {H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "it"};
-}
-
 Stored read_file(const fs::path& path) {
     const Quiet quiet;
     const auto file = open_file(path);
@@ -335,10 +332,12 @@ Stored load(const fs::path& path) {
     try {
         const auto journal = read_journal(path);  // before the file: see replay
         Stored stored = read_file(path);
-        replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
-            if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
-            keep(stored.result, from_bytes(payload));
-        });
+        const auto rest =
+            replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
+                if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
+                keep(stored.result, from_bytes(payload));
+            });
+        warn_of_rest(rest, path);
         return stored;
     } catch (const std::exception& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));

@@ -1,0 +1,187 @@
+#include "common/result/checksums.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+
+#include "common/result/durable_io.hpp"
+
+namespace tubule {
+
+namespace {
+
+// Eight tables take eight bytes a turn: a bytewise CRC would cost more than the write of a row.
+constexpr auto crc_tables = [] {
+    std::array<std::array<std::uint32_t, 256>, 8> t{};
+    for (std::uint32_t i = 0; i < 256; ++i) {
+        std::uint32_t c = i;
+        for (int bit = 0; bit < 8; ++bit) c = (c & 1) ? 0xEDB88320u ^ (c >> 1) : c >> 1;
+        t[0][i] = c;
+    }
+    for (std::size_t k = 1; k < 8; ++k)
+        for (std::size_t i = 0; i < 256; ++i) t[k][i] = t[0][t[k - 1][i] & 0xFF] ^ (t[k - 1][i] >> 8);
+    return t;
+}();
+
+constexpr std::array<char, 8> magic{'T', 'U', 'B', 'U', 'L', 'E', 'C', '1'};
+
+struct Seal {
+    std::array<char, 8> magic;
+    std::uint64_t hdf5_size, index_size;
+    std::uint32_t hdf5_crc, index_crc;
+
+    bool operator==(const Seal&) const = default;
+};
+
+// Of an open file; throws durable::Error.
+class Source {
+public:
+    explicit Source(int descriptor) : fd_(descriptor) {
+        struct stat info {};
+        if (::fstat(fd_, &info) != 0) durable::fail("read", "the file", errno);
+        size_ = static_cast<std::uint64_t>(info.st_size);
+    }
+    std::uint64_t size() const { return size_; }
+    void read(std::uint64_t offset, std::span<std::byte> into) const {
+        while (!into.empty()) {
+            const ssize_t n = ::pread(fd_, into.data(), into.size(), static_cast<off_t>(offset));
+            if (n < 0 && errno == EINTR) continue;
+            if (n <= 0) durable::fail("read", "the file", n < 0 ? errno : EIO);
+            offset += static_cast<std::uint64_t>(n);
+            into = into.subspan(static_cast<std::size_t>(n));
+        }
+    }
+    template <class T>
+    std::optional<T> at(std::uint64_t offset) const {
+        if (offset > size_ || size_ - offset < sizeof(T)) return std::nullopt;
+        T value;
+        read(offset, std::as_writable_bytes(std::span(&value, 1)));
+        return value;
+    }
+    std::uint32_t crc(std::uint64_t offset, std::uint64_t size) const {
+        Bytes buffer(std::min<std::uint64_t>(size, 1 << 18));
+        std::uint32_t sum = 0;
+        while (size > 0) {
+            const auto part = std::span(buffer).first(std::min<std::uint64_t>(size, buffer.size()));
+            read(offset, part);
+            sum = crc32(sum, part);
+            offset += part.size(), size -= part.size();
+        }
+        return sum;
+    }
+
+private:
+    int fd_;
+    std::uint64_t size_ = 0;
+};
+
+// Where the file ends for HDF5, by its superblock; nothing if this is not HDF5, or not as HDF5 writes it by default.
+std::optional<std::uint64_t> hdf5_end(const Source& file) {
+    constexpr std::array<unsigned char, 8> signature{0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+    if (file.at<std::array<unsigned char, 8>>(0) != signature) return std::nullopt;
+    const auto version = file.at<std::uint8_t>(8);
+    if (!version || *version > 3) return std::nullopt;
+    return file.at<std::uint64_t>(*version == 0 ? 40 : *version == 1 ? 44 : 28);
+}
+
+std::optional<Seal> seal_at(const Source& file, std::uint64_t offset) {
+    const auto found = file.at<Seal>(offset);
+    if (!found || found->magic != magic) return std::nullopt;
+    const std::uint64_t rest = file.size() - std::min<std::uint64_t>(file.size(), 2 * sizeof(Seal));
+    if (found->hdf5_size > rest || found->index_size != rest - found->hdf5_size) return std::nullopt;
+    return found;
+}
+
+Wholeness unsealed(const Source& file) {
+    const auto end = hdf5_end(file);
+    if (!end || *end == file.size()) return {Wholeness::Kind::unsealed, "", end, {}};
+    const std::string words = *end > file.size()
+                                  ? fmt::format("it is cut off: {} of {} bytes are there", file.size(), *end)
+                                  : "its checksums are damaged";
+    return {Wholeness::Kind::damaged, words, {}, {}};
+}
+
+}  // namespace
+
+std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes) {
+    const auto& t = crc_tables;
+    crc = ~crc;
+    const std::byte* p = bytes.data();
+    std::size_t n = bytes.size();
+    for (; n >= 8; n -= 8, p += 8) {
+        std::uint64_t word;  // little-endian, as every machine this is built for
+        std::memcpy(&word, p, 8);
+        word ^= crc;
+        crc = 0;
+        for (std::size_t k = 0; k < 8; ++k) crc ^= t[7 - k][(word >> (8 * k)) & 0xFF];
+    }
+    for (; n > 0; --n, ++p) crc = t[0][(crc ^ std::to_integer<std::uint32_t>(*p)) & 0xFF] ^ (crc >> 8);
+    return ~crc;
+}
+
+Extent extent_of(std::uint64_t offset, std::span<const std::byte> data) {
+    Extent extent{offset, data.size(), {}};
+    for (; !data.empty(); data = data.subspan(std::min(data.size(), Extent::chunk)))
+        extent.crcs.push_back(crc32(0, data.first(std::min(data.size(), Extent::chunk))));
+    return extent;
+}
+
+void seal(Bytes& hdf5, std::span<const std::byte> index) {
+    const Seal seal{magic, hdf5.size(), index.size(), crc32(0, hdf5), crc32(0, index)};
+    const auto bytes = std::as_bytes(std::span(&seal, 1));
+    hdf5.reserve(hdf5.size() + index.size() + 2 * bytes.size());
+    put(hdf5, bytes);
+    put(hdf5, index);
+    put(hdf5, bytes);
+}
+
+Wholeness examine(int descriptor) {
+    const Source file(descriptor);
+    auto back = file.size() >= sizeof(Seal) ? seal_at(file, file.size() - sizeof(Seal)) : std::nullopt;
+    const auto front = seal_at(file, back ? back->hdf5_size : hdf5_end(file).value_or(file.size()));
+    const bool seals_agree = front == back;
+    if (!back) back = front;
+    if (!back) return unsealed(file);
+
+    Wholeness out{Wholeness::Kind::damaged, "", {}, {}};
+    if (file.crc(0, back->hdf5_size) == back->hdf5_crc) out.hdf5_size = back->hdf5_size;
+    Bytes index(back->index_size);
+    file.read(back->hdf5_size + sizeof(Seal), index);
+    const bool index_is_good = crc32(0, index) == back->index_crc;
+    if (index_is_good) out.index = std::move(index);
+    if (out.hdf5_size && index_is_good && seals_agree)
+        out.kind = Wholeness::Kind::whole;
+    else
+        out.damage = out.hdf5_size ? "its checksums are damaged" : "it is damaged: its checksum is wrong";
+    return out;
+}
+
+Wholeness examine(const std::filesystem::path& file) {
+    return examine(durable::File(file, O_RDONLY).descriptor());
+}
+
+void require_whole(int descriptor, const std::filesystem::path& file) {
+    const Wholeness found = examine(descriptor);
+    if (found.kind == Wholeness::Kind::damaged)
+        throw std::runtime_error(fmt::format("{}; `tubule show --verify {}` says what is good and can rescue it",
+                                             found.damage, file.string()));
+    static std::atomic_flag warned;
+    if (found.kind == Wholeness::Kind::unsealed && found.hdf5_size && !warned.test_and_set())
+        std::fputs(fmt::format("warning: {} has no checksums (it is of an earlier version, or another program has "
+                               "changed it): damage may go unnoticed\n",
+                               file.string())
+                       .c_str(),
+                   stderr);
+}
+
+}  // namespace tubule

@@ -1,0 +1,16 @@
+// Records and meshes as bytes, for the journal and the index of a file.
+#pragma once
+
+#include "common/result/bytes.hpp"
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+void put(Bytes& out, const Record& record);
+void put(Bytes& out, const SurfaceCells& mesh);
+
+// Throw as Payload.
+Record get_record(Payload& in);
+SurfaceCells get_mesh(Payload& in);
+
+}  // namespace tubule

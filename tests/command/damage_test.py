@@ -1,0 +1,74 @@
+#!/usr/bin/python3
+"""Results of every kind with one flipped bit: every command that reads one refuses it and changes nothing.
+
+damage_test.py TUBULE [FLIPS], so many of each kind. What is damaged is known, so nothing else is expected.
+"""
+import random
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "fuzz"))
+
+from results import commands
+from samples import samples
+from sandbox import Sandbox
+
+PROGRAM = Path(sys.argv[1]).resolve()
+FLIPS = int(sys.argv[2]) if len(sys.argv) > 2 else 12
+HEAD = 4096  # where HDF5 has most of its structures
+
+
+class Damage(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def box(self, sample):
+        box = Sandbox(PROGRAM, self.folder / sample.kind)
+        sample.put(box)
+        return box
+
+    def test_flipped_bits_are_refused(self):
+        for sample in samples(PROGRAM):
+            box, rng = self.box(sample), random.Random(sample.kind)
+            asked = list(commands(sample.kind))
+            for flip in range(FLIPS):
+                spoilt = bytearray(sample.result)
+                at = rng.randrange(len(spoilt) if flip % 2 else HEAD)
+                spoilt[at] ^= 1 << rng.randrange(8)
+                result = box.write("case.hdf", bytes(spoilt))
+                arguments = asked[flip % len(asked)]
+                with self.subTest(kind=sample.kind, byte=at, command=arguments[0]):
+                    done = box.run(*arguments, statuses=(2,))
+                    self.assertRegex(done.err, r"case\.hdf: .*damaged")
+                    self.assertEqual(done.out, "")
+                    self.assertEqual(result.read_bytes(), bytes(spoilt))
+
+    def test_what_is_good_is_rescued(self):
+        for sample in samples(PROGRAM):
+            with self.subTest(kind=sample.kind):
+                box = self.box(sample)
+                done = box.run("show", "case.hdf", "--verify")
+                self.assertIn("as it was written", done.out)
+                expected = box.run("show", "case.hdf", "--csv").out
+                spoilt = bytearray(sample.result)
+                spoilt[0:2048] = bytes(2048)  # what HDF5 needs first
+                box.write("case.hdf", bytes(spoilt))
+                if sample.kind == "scan":
+                    self.assertIn("nothing of it can be rescued", box.run("show", "case.hdf", "--verify", statuses=(2,)).err)
+                    continue
+                done = box.run("show", "case.hdf", "--rescue", "good.hdf", statuses=(1,))
+                self.assertIn("it is damaged", done.out)
+                rows = box.run("show", "good.hdf", "--csv").out.splitlines()
+                self.assertEqual(rows[0], expected.splitlines()[0])
+                self.assertLessEqual(set(rows), set(expected.splitlines()))
+                self.assertEqual(len(rows) - 1, int(done.out.split("good")[1].split()[0]))
+                if "rows" not in done.out.split("good")[0]:
+                    self.assertEqual(rows, expected.splitlines())
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
