@@ -177,7 +177,11 @@ std::optional<StopReport> CurveAttempt::check_start() const {
 
 void CurveAttempt::go() {
     std::optional<StopReport> stop = check_start();
-    while (!stop) stop = step();
+    try {
+        while (!stop) stop = step();
+    } catch (const Paused& pause) {
+        stop = pause_report(pause, flow_->time());
+    }
     summary.stop = *stop;
     summary.energy = now_.o.energy;
     summary.counters = flow_->counters();

@@ -113,10 +113,12 @@ private:
 
 RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart) {
     const RunClock clock(c, observer);
-    CurveRuns runs(c, observer, clock, restart);
-    RunPairs pairs(runs, c, observer, 0, restart);
-    drive(c, observer, clock, pairs);
-    return runs.summary();
+    return clock.pausing([&] {
+        CurveRuns runs(c, observer, clock, restart);
+        RunPairs pairs(runs, c, observer, 0, restart);
+        drive(c, observer, clock, pairs);
+        return runs.summary();
+    });
 }
 
 }  // namespace tubule::axisym

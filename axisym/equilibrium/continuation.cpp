@@ -225,6 +225,7 @@ private:
             if (met_itself(*p.shape.space, p.shape.x, p.parameter)) break;
             p.index = p.kind == PointKind::regular ? negative_directions(problem_at(p.parameter), p.shape) : before;
             branch_.points.push_back(std::move(p));
+            settings_.found(branch_.points.back());
         }
         index_ = after;
         return complete;
@@ -244,6 +245,7 @@ private:
             if (wanted == parameter) {
                 branch_.points.push_back(point(place_, PointKind::regular));
                 branch_.points.back().index = index_;
+                settings_.found(branch_.points.back());
             }
     }
 
@@ -286,7 +288,8 @@ private:
         const double allowed = std::max(settings_.shapes.accuracy, 1e-11) * system_->forms().reference_energy(x);
         if (lost(defect) <= allowed) return true;
         const ProfileSpace& splines = system_->space().splines();
-        std::vector<double> breaks = adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images());
+        std::vector<double> breaks = adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(),
+                                                    settings_.shapes.max_elements + 1);
         if (static_cast<int>(breaks.size()) - 1 > settings_.shapes.max_elements) return false;
         const auto finer = std::make_shared<CurveSpace>(system_->space().topology(), breaks, splines.degree(),
                                                         splines.smoothness(), system_->space().length());

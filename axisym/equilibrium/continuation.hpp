@@ -13,13 +13,6 @@ namespace tubule::axisym {
 // Gives the parameter a value: a modulus, H0, an area, a volume, or several of them at once.
 using SetParameter = std::function<void(StationaryProblem&, double)>;
 
-struct BranchSettings {
-    double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
-    std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
-    int max_steps = 500;
-    EquilibriumSettings shapes;  // accuracy of each
-};
-
 enum class PointKind { regular, fold, bifurcation };
 
 struct BranchPoint {
@@ -27,6 +20,14 @@ struct BranchPoint {
     double parameter = 0;
     int index = 0;      // axisymmetric negative directions; at a special point, before it
     Equilibrium shape;  // at special points to about 1e-6 of the parameter's range
+};
+
+struct BranchSettings {
+    double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
+    std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
+    int max_steps = 500;
+    EquilibriumSettings shapes;                                                 // accuracy of each
+    std::function<void(const BranchPoint&)> found = [](const BranchPoint&) {};  // is given each as soon as it is known
 };
 
 struct Branch {

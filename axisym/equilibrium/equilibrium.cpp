@@ -13,11 +13,18 @@
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule::axisym {
 namespace {
 
 const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
+
+// In space that is periodic along an axis, balls and cylinders enclose most (Pedrosa and Ritore, Indiana Univ. Math. J.
+// 48, 1999).
+double largest_volume(double area, double period) {
+    return std::max(std::pow(area, 1.5) / sphere_factor, area * area / (4 * pi * period));
+}
 
 }  // namespace
 
@@ -48,6 +55,12 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
         if (v && *v > 1)
             throw std::invalid_argument(
                 fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
+    } else if (c.area && c.volume) {
+        const double most = largest_volume(*c.area, space_->length());
+        if (*c.volume > most)
+            throw std::invalid_argument(
+                fmt::format("a volume of {:.6g} a period is impossible: an area of {:.6g} encloses at most {:.6g}",
+                            *c.volume, *c.area, most));
     }
     problem_ = problem;
     forms_.set_bending(problem.bending);
@@ -129,6 +142,7 @@ double StationarySystem::merit(const Eigen::VectorXd& u) const {
 }
 
 Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) const {
+    check_pause();
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
@@ -399,10 +413,34 @@ private:
 std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
                                 int max_elements) {
     const int elements = space.splines().elements();
-    const std::vector<double> breaks =
-        adapted_breaks(space.splines(), defect, 0.1 * allowed, std::max(coarsest / space.images(), elements));
+    const std::vector<double> breaks = adapted_breaks(space.splines(), defect, 0.1 * allowed,
+                                                      std::max(coarsest / space.images(), elements), max_elements);
     const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (elements + 1) / 2);
     return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
+}
+
+// Why no shape was found, from the first one and the last.
+std::string why_none(const Constraints& goal, const CurveObservation& first, const CurveObservation& last,
+                     int iterations) {
+    const double symbol = std::min(first.symbol, last.symbol);
+    if (!(symbol > 0))
+        return fmt::format(
+            "the energy has no minimum there: ever shorter waves lower it (its principal symbol falls "
+            "to {:.3g}; see the moduli in [energy])",
+            symbol);
+    std::string missed;
+    const auto compare = [&](const char* what, const std::optional<double>& wanted, double from, double to) {
+        if (wanted && !(std::abs(std::log(to / *wanted)) < 0.01) && missed.empty())
+            missed = fmt::format(
+                "no shape with {} {:.6g} was found: the start has {:.6g}, and the descent from there "
+                "came to {:.6g}",
+                what, *wanted, from, to);
+    };
+    compare("area", goal.area, first.area, last.area);
+    compare("volume", goal.volume, first.volume, last.volume);
+    compare("reduced volume", goal.reduced_volume, reduced_volume(first.area, first.volume),
+            reduced_volume(last.area, last.volume));
+    return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
 // Newton on meshes that follow the shape found on the one before, until their energies agree.
@@ -411,8 +449,10 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
     Equilibrium out;
     const auto end = [&](Stop stop, std::string message) {
         out.stop = stop, out.message = std::move(message);
+        if (!std::isfinite(out.estimated_error)) out.estimated_error = 1;  // nothing is known
         return out;
     };
+    CurveObservation first, last;
     MeshComparison compare;
     bool found = false;
     for (int round = 0; round < 16; ++round) {
@@ -420,8 +460,10 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         out.reference_energy = system.forms().reference_energy(out.x);
+        if (round == 0) first = last = system.forms().observe(out.x);
         found = settle(system, u, !found, settings, out);
         const Eigen::VectorXd x = u.head(n);
+        if (system.forms().admissible(x)) last = system.forms().observe(x);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
         std::vector<double> defect;
         out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
@@ -450,8 +492,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         next << finer->prolong(*space, x), u.tail(3);
         space = finer, u = next;
     }
-    return end(Stop::solver_failed,
-               fmt::format("Newton's method does not converge ({} iterations); try another start", out.iterations));
+    return end(Stop::solver_failed, why_none(problem.constraints, first, last, out.iterations));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/run/run_clock.hpp"
 #include "common/series/table.hpp"
 
 namespace tubule::axisym {
@@ -106,7 +107,8 @@ Task task_of(const Case& c) {
         StationarySystem(std::make_shared<CurveSpace>(task.start.topology, equal_breaks(4), 3, 2, task.start.length),
                          task.problem, 1);
     } catch (const std::invalid_argument& error) {
-        throw CaseError(fmt::format("{}: equilibrium: {}", c.path, error.what()));
+        const char* key = e.reduced_volume ? ".reduced_volume" : e.volume ? ".volume" : e.area ? ".area" : "";
+        throw CaseError(fmt::format("{}: equilibrium{}: {}", c.path, key, error.what()));
     }
     return task;
 }
@@ -189,11 +191,13 @@ public:
         observer_.frame([&] { return frame(point, modes); });
         observer_.progress(point.parameter, e.observed.energy, 0);
         worst_ = std::max(worst_, e.estimated_error);
+        last_ = e;
         ++count_;
     }
 
     int count() const { return count_; }
     double worst() const { return worst_; }
+    const Equilibrium& last() const { return last_; }
 
 private:
     std::vector<double> row(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
@@ -245,6 +249,7 @@ private:
     std::chrono::steady_clock::time_point started_;
     int count_ = 0;
     double worst_ = 0;
+    Equilibrium last_;
 };
 
 std::string advice_for(Stop stop) {
@@ -260,6 +265,25 @@ std::string advice_for(Stop stop) {
     }
 }
 
+// Writes the shape, or those of the branch, and says how it ended.
+StopReport find_shapes(const Task& task, Writer& write) {
+    const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
+    if (first.stop != Stop::finished || !task.set) {
+        BranchPoint only;
+        only.shape = first;
+        only.parameter = task.branch.from;
+        if (first.stop == Stop::finished) only.index = negative_directions(task.problem, first);
+        if (first.observed.area > 0 && std::isfinite(first.observed.energy)) write(only);
+        return {first.stop, 0, first.stop == Stop::finished ? "the shape is stationary" : first.message,
+                advice_for(first.stop)};
+    }
+    BranchSettings settings = task.branch;
+    settings.found = [&](const BranchPoint& point) { write(point); };
+    const Branch branch = follow_branch(task.problem, first, task.set, settings);
+    return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
+            advice_for(branch.stop)};
+}
+
 }  // namespace
 
 std::vector<std::string> equilibrium_series_names(const Case& c) {
@@ -271,39 +295,25 @@ void check_equilibrium(const Case& c) {
 }
 
 RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
+    const RunClock clock(c, observer);
     const Task task = task_of(c);
     Writer write(c, task, observer);
-    const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
-    Stop stop = first.stop;
-    std::string message = first.message;
-    std::vector<BranchPoint> points;
-    if (stop != Stop::finished || !task.set) {
-        BranchPoint only;
-        only.shape = first;
-        only.parameter = task.branch.from;
-        if (stop == Stop::finished) only.index = negative_directions(task.problem, first);
-        if (first.observed.area > 0) points.push_back(std::move(only));
-    } else {
-        Branch branch = follow_branch(task.problem, first, task.set, task.branch);
-        points = std::move(branch.points);
-        stop = branch.stop, message = branch.message;
+    StopReport stop;
+    try {
+        stop = find_shapes(task, write);
+    } catch (const Paused& pause) {
+        stop = pause_report(pause, 0);
+        stop.message += " before all shapes were found";
+        stop.advice = "run the case again: equilibria are not resumed";
     }
     RunSummary s;
-    for (const BranchPoint& point : points) {
-        if (observer.interrupted()) {
-            stop = Stop::interrupted, message = "by a signal";
-            break;
-        }
-        write(point);
-        s.energy = point.shape.observed.energy;
-        s.reference_energy = point.shape.reference_energy;
-        s.elements = elements_of(point.shape);
-    }
+    s.energy = write.last().observed.energy;
+    s.reference_energy = write.last().reference_energy;
+    s.elements = write.count() > 0 ? elements_of(write.last()) : 0;
     s.estimated_error = write.worst();
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    if (stop == Stop::finished)
-        message = task.set ? "the branch left its parameter interval" : "the shape is stationary";
-    s.stop = {stop, std::max(write.count() - 1, 0) * 1.0, message, advice_for(stop)};
+    stop.time = std::max(write.count() - 1, 0);
+    s.stop = stop;
     s.effort =
         fmt::format("{} shape{}, {} elements in the last", write.count(), write.count() == 1 ? "" : "s", s.elements);
     s.details = {{"shapes", std::int64_t{write.count()}}, {"elements", std::int64_t{s.elements}}};

@@ -11,6 +11,7 @@
 
 #include "axisym/splines/pack.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -196,6 +197,7 @@ Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
     double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
     for (int k = 0; k < 60; ++k, shift *= 4) {
         const Matrix shifted = A + shift * M;
+        check_pause();
         if (Eigen::LLT<Matrix>(shifted).info() != Eigen::Success) continue;
         const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> eigen(M, shifted);
         if (eigen.info() != Eigen::Success) break;
@@ -387,9 +389,12 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
 }
 
 void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const {
+    check_pause();
     const Field field(shape_.space->splines(), parity);
     Forms forms = assemble(m, field);
+    check_pause();
     const Matrix M = dissipation_form(m, law, parity, field, forms), basis = regular(m, field);
+    check_pause();
     const Matrix fixed = fixed_functionals(m, law, parity, forms, M);
     const Matrix free = basis * complement(basis.transpose() * fixed);
     const Spectrum found =

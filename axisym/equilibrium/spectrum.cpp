@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -95,6 +96,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
+        check_pause();
         const Equilibrium e = balanced(bending, held, settings.sigma, shape, elements, out.unbalanced);
         Constraints& c = problem.constraints;
         if (held == Held::area || held == Held::area_and_volume) c.area = e.observed.area;

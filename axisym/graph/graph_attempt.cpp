@@ -213,7 +213,7 @@ std::optional<StopReport> GraphAttempt::remesh() {
     remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
     const double t = flow_->time();
     const Observation o = now_.o;
-    auto breaks = refined_breaks(stage_->space, now_.defect, settings_.defect * remesh_margin_);
+    auto breaks = refined_breaks(stage_->space, now_.defect, settings_.defect * remesh_margin_, most_graph_elements);
     if (static_cast<int>(breaks.size()) > most_graph_elements + 1) {
         if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
         return StopReport{Stop::resolution_lost, t,
@@ -228,8 +228,8 @@ std::optional<StopReport> GraphAttempt::remesh() {
     const double dt = first_step_after(x);
     const Eigen::VectorXd rate =
         next->space.prolong(stage_->space, Eigen::Map<const Eigen::VectorXd>(flow_->v(), stage_->space.size()));
-    use_stage(std::move(next));
-    const Damped after = damp(stage_->forms, projected, dt);
+    const Damped after = damp(next->forms, projected, dt);
+    use_stage(std::move(next));  // from here on nothing pauses: stage and flow belong together
     make_flow(after.x, after.rate, t + damping_steps * dt, dt);
     past_.dissipated += damping_steps * dt * o.dissipation;
     stage_->transport.begin(projected.data(), rate.data());
@@ -290,6 +290,8 @@ void GraphAttempt::go() {
         while (!stop) stop = step();
     } catch (const SolveError& error) {
         stop = failure(error.what());
+    } catch (const Paused& pause) {
+        stop = pause_report(pause, flow_->time());
     }
     end_with(*stop);
 }

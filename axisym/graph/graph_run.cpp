@@ -57,9 +57,11 @@ private:
 
 RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart) {
     const RunClock clock(c, observer);
-    GraphRuns runs(c, observer, clock, restart);
-    drive(c, observer, clock, runs);
-    return runs.summary();
+    return clock.pausing([&] {
+        GraphRuns runs(c, observer, clock, restart);
+        drive(c, observer, clock, runs);
+        return runs.summary();
+    });
 }
 
 }  // namespace tubule::axisym

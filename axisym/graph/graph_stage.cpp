@@ -65,7 +65,8 @@ FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& c
         const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
         if (lost < allowed * start_margin) return out;
-        std::vector<double> next = adapted_breaks(space, defect, allowed * start_margin / 2, fewest_elements);
+        std::vector<double> next =
+            adapted_breaks(space, defect, allowed * start_margin / 2, fewest_elements, most_graph_elements + 1);
         if (static_cast<int>(next.size()) > most_graph_elements + 1) return out;
         out.breaks = std::move(next);
     }

@@ -120,9 +120,9 @@ Density wanted_density(const ProfileSpace& space, const std::vector<double>& def
 }  // namespace
 
 std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
-                                   int fewest) {
+                                   int fewest, int most) {
     const Density d = wanted_density(space, defect, target, fewest);
-    const int elements = std::max(fewest, static_cast<int>(std::ceil(d.integral())));
+    const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(d.integral()), most)));
     const double share = d.integral() / elements;
     std::vector<double> breaks{space.cell().z0};
     double sum = 0;
@@ -136,16 +136,18 @@ std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<
     return breaks;
 }
 
-std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target) {
+std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+                                   int most) {
     const Density d = wanted_density(space, defect, target, 1);
     std::vector<double> breaks{space.cell().z0};
     for (int e = 0; e < space.elements(); ++e) {
         double wanted = 0;
         for (int i = e * Density::parts; i < (e + 1) * Density::parts; ++i) wanted += d.value[i] * d.width(i);
         const double z = space.breaks()[e], h = space.breaks()[e + 1] - z;
-        const int pieces = std::max(1, static_cast<int>(std::ceil(wanted - 0.2)));
+        const int pieces = static_cast<int>(std::clamp<double>(std::ceil(wanted - 0.2), 1, most + 1));
         for (int i = 1; i < pieces; ++i) breaks.push_back(z + h * i / pieces);
         breaks.push_back(space.breaks()[e + 1]);
+        if (static_cast<int>(breaks.size()) > most + 1) break;
     }
     return breaks;
 }

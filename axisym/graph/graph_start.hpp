@@ -15,12 +15,15 @@ namespace tubule::axisym {
 Cell cell_of(const Tube& tube, bool symmetry);
 
 // Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by that
-// of the present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`.
+// of the present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the
+// same grading at most `most`.
 std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
-                                   int fewest);
+                                   int fewest, int most);
 
-// The same by division of the present elements: the new space contains the old one.
-std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target);
+// The same by division of the present elements: the new space contains the old one. It ends early, and short of the end
+// of the cell, where there would be more than `most`.
+std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+                                   int most);
 
 // The defect of each element that the flow from x will soon develop: the largest over x itself and single
 // linearly implicit Euler steps from it, whose sizes span six decades up to `span`. A start is often smooth and

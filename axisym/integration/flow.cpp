@@ -14,6 +14,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "common/solve/pause.hpp"
+
 namespace tubule::axisym {
 
 FlowCounters& FlowCounters::operator+=(const FlowCounters& o) {
@@ -35,6 +37,7 @@ struct Flow::Impl {
     double time = 0;
     int guard = -1;
     std::string message;
+    SharedPause pause;  // of the step that is under way
 
     explicit Impl(FlowSystem s) : system(std::move(s)) {}
     ~Impl() {
@@ -55,7 +58,9 @@ double* data(N_Vector n) {
 
 template <class Impl>
 int residual(double, N_Vector x, N_Vector v, N_Vector F, void* user) {
-    return static_cast<Impl*>(user)->system.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
+    auto* self = static_cast<Impl*>(user);
+    if (self->pause.look()) return -1;                                // give up
+    return self->system.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
 }
 
 void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
@@ -176,7 +181,10 @@ Flow::~Flow() = default;
 Flow::Outcome Flow::advance(double t_end) {
     Impl& s = *impl_;
     require(IDASetStopTime(s.ida, t_end), "the end time");
+    N_VScale(1, s.v, s.scratch);
     const int status = IDASolve(s.ida, t_end, &s.time, s.x, s.slope, IDA_ONE_STEP);
+    if (s.pause.wanted()) N_VScale(1, s.scratch, s.v);  // x is again that of the last step
+    s.pause.check();
     if (status == IDA_TSTOP_RETURN) return Outcome::end;
     if (status == IDA_ROOT_RETURN) {
         N_VScale(1, s.slope, s.v);  // the corrector's rates are those of the step's end, beyond the guard

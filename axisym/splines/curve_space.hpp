@@ -37,7 +37,8 @@ public:
     template <class F>
     Eigen::VectorXd project(F&& f) const {
         Eigen::VectorXd load = Eigen::VectorXd::Zero(size_);
-        for (int e = 0; e < splines_->elements(); ++e)
+        for (int e = 0; e < splines_->elements(); ++e) {
+            if (e % 64 == 0) check_pause();  // the function may take its time
             for (int g = 0; g < splines_->groups(); ++g) {
                 const ProfileSpace::Basis& b = splines_->basis(e, g);
                 for (int q = 0; q < ProfileSpace::lanes; ++q) {
@@ -46,6 +47,7 @@ public:
                         load[dofs(e)[a]] += signs(e)[a] * value * b.by_spline[q][0][a];
                 }
             }
+        }
         return solve_mass(load);
     }
     // INT phi ds of each spline: the functional of the mean.

@@ -1,5 +1,6 @@
 #include "axisym/splines/profile_space.hpp"
 
+#include <fmt/format.h>
 #include <gsl/gsl_integration.h>
 
 #include <algorithm>
@@ -7,6 +8,8 @@
 #include <stdexcept>
 
 #include "axisym/splines/pack.hpp"
+#include "common/solve/memory.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -117,11 +120,14 @@ void ProfileSpace::Active::operator()(const T& z, int derivatives, T* out) const
 void ProfileSpace::tabulate() {
     const int n = elements(), w = width();
     const GaussRule rule = gauss_rule(lanes * groups());
+    require_memory(static_cast<double>(n) * (sizeof(Active) + groups() * sizeof(Basis)),
+                   fmt::format("a profile of {} elements", n));
     basis_.assign(n * groups(), Basis{});
     dofs_.resize(n * w);
     active_.reserve(n);
     Pack values[3 * max_width];
     for (int e = 0; e < n; ++e) {
+        if (e % 1024 == 0) check_pause();
         const Active& active = active_.emplace_back(*this, e);
         const double h = breaks_[e + 1] - breaks_[e];
         for (int a = 0; a < w; ++a) {

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "common/solve/pause.hpp"
+
 namespace tubule::axisym {
 
 // The part [z0, z1] of the axis that is solved for; the rest of the tube follows by translation, or
@@ -72,7 +74,8 @@ public:
     template <class F>
     Eigen::VectorXd project(F&& f) const {
         Eigen::VectorXd load = Eigen::VectorXd::Zero(size_);
-        for (int e = 0; e < elements(); ++e)
+        for (int e = 0; e < elements(); ++e) {
+            if (e % 64 == 0) check_pause();  // the function may take its time
             for (int g = 0; g < groups(); ++g) {
                 const Basis& b = basis(e, g);
                 for (int q = 0; q < lanes; ++q) {
@@ -80,6 +83,7 @@ public:
                     for (int a = 0; a < width(); ++a) load[dofs(e)[a]] += value * b.by_spline[q][0][a];
                 }
             }
+        }
         return solve_mass(load);
     }
     // Projection of a spline on other knots; the same function if those knots are all here too.

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
@@ -325,6 +326,13 @@ void check_together(Keys& k, const Case& c) {
                                      name(c.model))
                        : "";
         });
+        k.check("equilibrium.volume", [&]() -> std::string {
+            const EquilibriumChoices& e = *c.equilibrium;
+            if (is_tube(c.shape) || !e.area || !e.volume) return {};
+            const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
+            if (*e.volume <= most) return {};
+            return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);
+        });
         k.check("shape.kind", [&] {
             return std::holds_alternative<Torus>(c.shape)
                        ? "must not be \"torus\": equilibria are closed cells, or tubes with "
@@ -413,7 +421,11 @@ void keys(Keys& k, Case& c) {
             keys(k, c.discretisation);
     });
     if (c.equilibrium)
-        k.absent("time", "must be absent: nothing moves in a case with [equilibrium]");
+        k.table("time", [&](auto& k) {
+            for (const char* key : {"end", "output", "stationary"})
+                k.absent(key, "must be absent: nothing moves in a case with [equilibrium]");
+            k.number("limit", c.time.limit, {.above = 0});
+        });
     else if (c.tier == Tier::axisym)
         k.table("time", [&](auto& k) { keys(k, c.time); });
     // The shapes of a branch are numbered as if that were their time.

@@ -4,15 +4,28 @@
 
 namespace tubule {
 
-double RunClock::seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+StopReport pause_report(const Paused& pause, double time) {
+    const std::string message = pause.reason == Stop::time_limit
+                                    ? fmt::format("reached the time limit of {} s (time.limit)", pause.limit.value())
+                                    : "interrupted by a signal";
+    return {pause.reason, time, message, "continue with --resume"};
+}
+
+RunSummary paused_at_start(const Paused& pause) {
+    RunSummary out;
+    out.stop = pause_report(pause, 0);
+    out.stop.message += " before the first state was computed";
+    out.stop.advice = pause.reason == Stop::time_limit
+                          ? "raise time.limit, or make the start easier: fewer elements, less accuracy"
+                          : "run the case again";
+    out.estimated_error = 1;  // nothing is known
+    out.as_accurate_as_asked = false;
+    out.effort = "no state";
+    return out;
 }
 
 std::optional<StopReport> RunClock::find_pause(double time) const {
-    if (limit_ && seconds() > *limit_)
-        return StopReport{Stop::time_limit, time, fmt::format("reached the time limit of {} s (time.limit)", *limit_),
-                          "continue with --resume"};
-    if (interrupted()) return StopReport{Stop::interrupted, time, "interrupted by a signal", "continue with --resume"};
+    if (const auto pause = watch_.due()) return pause_report(*pause, time);
     return std::nullopt;
 }
 

@@ -1,27 +1,41 @@
 // The wall time of a run with all attempts, and whether it is to pause: be saved now and resumed later.
 #pragma once
 
-#include <chrono>
 #include <optional>
 
 #include "common/case/case.hpp"
 #include "common/run/run.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule {
 
+// How a run stops that pauses, having come to `time`.
+StopReport pause_report(const Paused& pause, double time);
+// The summary of a run that pauses before it has a state to go on from.
+RunSummary paused_at_start(const Paused& pause);
+
 class RunClock {
 public:
-    RunClock(const Case& c, RunObserver& watch) : limit_(c.time.limit), watch_(watch) {}
+    RunClock(const Case& c, RunObserver& watch) : watch_(c.time.limit, [&watch] { return watch.interrupted(); }) {}
 
-    double seconds() const;  // since it was made
-    bool interrupted() const { return watch_.interrupted(); }
-    // The time limit is used up, or the observer interrupts the run, which has come to `time`.
+    // Since it was made, or since the outermost PauseWatch of this thread was.
+    double seconds() const { return watch_.seconds(); }
+    // The run, which has come to `time`, is to pause: the time limit is used up, or the observer interrupts it.
     std::optional<StopReport> find_pause(double time) const;
+    // What `run` returns; where it pauses with nothing to go on from, a summary that says so.
+    template <class Run>
+    auto pausing(Run&& run) const {
+        try {
+            return run();
+        } catch (const Paused& pause) {
+            decltype(run()) out;
+            static_cast<RunSummary&>(out) = paused_at_start(pause);
+            return out;
+        }
+    }
 
 private:
-    std::optional<double> limit_;
-    RunObserver& watch_;
-    std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+    PauseWatch watch_;
 };
 
 }  // namespace tubule

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse_engine.hpp"
 
 extern "C" void openblas_set_num_threads(int);  // <cblas.h> is another library's on some systems
@@ -135,6 +136,7 @@ void SparseSolver::factor(const Matrix& A) {
         compressed.makeCompressed();
         return factor(compressed);
     }
+    check_pause();
     require_finite(A);
     const bool known = s.analysed && same_pattern(s.A, A);
     s.A = A;

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "common/solve/memory.hpp"
 #include "common/solve/sparse_engine.hpp"
 
 namespace tubule {
@@ -62,6 +63,8 @@ void require_symmetric(const Matrix& A) {
         for (int k = below[i]; k < begin[i + 1]; ++k) require_equal(row[k], i, value[k], 0);
 }
 
+constexpr double bytes_per_entry = 12;  // of factors: a value and a row
+
 class Cholmod : public SparseEngine {
 public:
     explicit Cholmod(Ordering ordering) : ordering_(std::move(ordering)) {
@@ -78,6 +81,7 @@ public:
         factor_ = cholmod_analyze_p(&view, ordering_.empty() ? nullptr : ordering_.data(), nullptr, 0, &common_);
         if (!factor_) fail();
         fill_ = static_cast<std::int64_t>(common_.lnz);
+        require_factors(bytes_per_entry * common_.lnz, common_.fl / 2, A.cols());
     }
 
     void factor(const Matrix& A) override {

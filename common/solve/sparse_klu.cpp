@@ -3,6 +3,7 @@
 
 #include <new>
 
+#include "common/solve/memory.hpp"
 #include "common/solve/sparse_engine.hpp"
 
 namespace tubule {
@@ -12,6 +13,7 @@ using Matrix = Eigen::SparseMatrix<double>;
 
 // Old pivots are dropped when they let the factors grow this much more than fresh ones did.
 constexpr double tolerated_growth = 100;
+constexpr double bytes_per_entry = 12;  // of factors: a value and a row
 
 class Klu : public SparseEngine {
 public:
@@ -22,6 +24,7 @@ public:
         forget();
         symbolic_ = klu_analyze(static_cast<int>(A.cols()), columns(A), rows(A), &common_);
         if (!symbolic_) fail(A);
+        require_factors(bytes_per_entry * (symbolic_->lnz + symbolic_->unz), symbolic_->est_flops / 2, A.cols());
     }
 
     void factor(const Matrix& A) override {

@@ -11,6 +11,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/solve/memory.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse_engine.hpp"
 #include "common/solve/sparse_front.hpp"
 #include "common/solve/sparse_supernodes.hpp"
@@ -211,6 +213,8 @@ struct SparseLdlt<Scalar>::Impl {
             panel_at.push_back(panel_at.back() + size);
             scratch_size = std::max(scratch_size, size);
         }
+        const auto entries = static_cast<double>(panel_at.back() + updates.size + omp_get_max_threads() * scratch_size);
+        require_memory(entries * sizeof(Scalar), fmt::format("the factors of a matrix of size {}", tree.size));
         panels.reset(new Scalar[panel_at.back()]);
         update_data.reset(new Scalar[updates.size]);
         scratch.clear();
@@ -299,20 +303,22 @@ struct SparseLdlt<Scalar>::Impl {
     void eliminate_all(const View& A) {
         if (static_cast<int>(scratch.size()) < omp_get_max_threads()) scratch.resize(omp_get_max_threads());
         eliminations.assign(tree.count(), {});
-        // Once a pivot has failed the rest is of no use.
+        // Once a pivot has failed, or it is time to pause, the rest is of no use.
         bool failed = false;
+        SharedPause pause;
 #pragma omp parallel for schedule(dynamic, 1) reduction(|| : failed) if (groups.work > worth_a_thread)
         for (std::size_t g = 0; g < groups.subtrees.size(); ++g)
             for (const int s : groups.subtrees[g]) {
-                if (failed) break;
+                if (failed || pause.look(s)) break;
                 eliminate_supernode(A, s, false);
                 failed = eliminations[s].failed >= 0;
             }
         for (const int s : groups.top) {
-            if (failed) break;
+            if (failed || pause.look()) break;
             eliminate_supernode(A, s, multiplications(tree.rows_of(s), tree.columns_of(s)) > worth_a_thread);
             failed = eliminations[s].failed >= 0;
         }
+        pause.check();
         if (failed) report_failure(A);
     }
 

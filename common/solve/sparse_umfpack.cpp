@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <umfpack.h>
 
+#include "common/solve/memory.hpp"
 #include "common/solve/sparse_engine.hpp"
 
 namespace tubule {
@@ -31,6 +32,8 @@ public:
                 ? umfpack_di_symbolic(n, n, columns, rows, nullptr, &symbolic_, control_, info_)
                 : umfpack_di_qsymbolic(n, n, columns, rows, nullptr, ordering_.data(), &symbolic_, control_, info_),
             n);
+        require_memory(info_[UMFPACK_PEAK_MEMORY_ESTIMATE] * info_[UMFPACK_SIZE_OF_UNIT],
+                       fmt::format("the factors of a matrix of size {}", n));
     }
 
     void factor(const Matrix& A) override {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule::theory {
 
@@ -212,6 +213,7 @@ std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const M
             if (!std::isfinite(band.to)) return std::nullopt;
             for (int n = static_cast<int>(std::ceil(band.from * length / (2 * pi))); 2 * pi * n / length < band.to;
                  ++n) {
+                check_pause();
                 if (n == 0 && m < 2) continue;
                 const double q = 2 * pi * n / length, rate = growth(tube, law, q, m).rate();
                 if (!std::isfinite(rate)) return std::nullopt;

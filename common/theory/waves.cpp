@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::theory {
@@ -34,6 +35,7 @@ struct Motion {
     std::vector<Wave> waves;
     std::vector<Coefficients> of;  // unless the radius drifts
     bool drifts, tension_is_outcome;
+    SharedPause* pause = nullptr;  // of the integration that is under way
 
     bool swings() const { return law.inertia != 0; }
     std::size_t per_wave() const { return swings() ? 3 : 1; }
@@ -60,6 +62,7 @@ Motion prepared(const UniformTube& tube, const MotionLaw& law, double length, co
     std::set<std::pair<int, int>> seen;
     double moves = 0;
     for (const Wave& wave : waves) {
+        check_pause();
         if (wave.n < 0 || (wave.n == 0 && wave.m == 0))
             throw std::invalid_argument(fmt::format("there is no wave with n = {}, m = {}", wave.n, wave.m));
         if (!seen.insert({wave.n, wave.m}).second)
@@ -94,7 +97,8 @@ double tension(const Motion& motion, const double* y) {
 
 // The unknowns: the radius and log of each amplitude over that at the start; or amplitudes; or of each wave (a, a', y).
 int slope(double, const double* y, double* dy, void* parameters) {
-    const Motion& motion = *static_cast<const Motion*>(parameters);
+    Motion& motion = *static_cast<Motion*>(parameters);
+    if (motion.pause && motion.pause->look()) return GSL_EBADFUNC;
     if (motion.drifts) {
         UniformTube tube = motion.tube;
         tube.radius = y[0];
@@ -163,6 +167,8 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
                                      const std::vector<Wave>& waves, const std::vector<double>& times) {
     Motion motion = prepared(tube, law, length, waves);
     std::vector<double> y = start(motion);
+    SharedPause pause;
+    motion.pause = &pause;
     double scale = motion.drifts ? 1 : 0;
     for (const double value : y) scale = std::max(scale, std::abs(value));
     if (scale == 0) scale = 1;
@@ -177,6 +183,7 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
     for (const double until : times) {
         if (until < t) throw std::invalid_argument(fmt::format("times must increase from 0, but {} does not", until));
         const int status = until > t ? gsl_odeiv2_driver_apply(driver.get(), &t, until, y.data()) : GSL_SUCCESS;
+        pause.check();
         if (status != GSL_SUCCESS)
             throw SolveError(fmt::format("the amplitude equations could not be solved beyond t = {:.6g}: {}", t,
                                          status == GSL_EBADFUNC ? "the radius vanishes" : gsl_strerror(status)));

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <set>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/fem/projection.hpp"
 
@@ -43,7 +44,9 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
         }
 
     // Nodes of the triangles around, then of those around their corners, until there are more than coefficients.
+    SharedPause pause;
     for (Patch& patch : patches_) {
+        if (pause.look(&patch - patches_.data())) break;
         std::set<std::array<int, 2>> cells, members;  // (cell, shift), (node, shift)
         std::vector<std::array<int, 2>> front{{patch.vertex, 0}};
         while (static_cast<int>(members.size()) <= graph_coefficients(degree_) && !front.empty()) {
@@ -63,6 +66,7 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
         most_members_ = std::max(most_members_, static_cast<int>(patch.members.size()));
     }
 
+    pause.check();
     const auto nodes = lattice(mesh.order);
     for (int cell = 0; cell < mesh.triangles(); ++cell)
         for (int a = 0; a < width; ++a) {
@@ -78,12 +82,14 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
 std::vector<PolynomialGraph> PatchRecovery::fit(const CurvedMesh& mesh) const {
     const int n_patches = static_cast<int>(patches_.size());
     std::vector<PolynomialGraph> graphs(n_patches);
+    SharedPause pause;
 #pragma omp parallel
     {
         GraphFit fit(degree_, most_members_);
         Eigen::Matrix3Xd points(3, most_members_);
 #pragma omp for schedule(static)
         for (int i = 0; i < n_patches; ++i) {
+            if (pause.look(i)) continue;
             const Patch& patch = patches_[i];
             Eigen::Vector3d normal = Eigen::Vector3d::Zero();
             for (const auto& [cell, c] : patch.corners)
@@ -96,6 +102,7 @@ std::vector<PolynomialGraph> PatchRecovery::fit(const CurvedMesh& mesh) const {
             graphs[i] = fit(mesh.nodes[patch.vertex], normal.normalized(), points.leftCols(n));
         }
     }
+    pause.check();
     return graphs;
 }
 

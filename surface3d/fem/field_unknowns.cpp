@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::surface3d {
@@ -12,7 +13,9 @@ FieldUnknowns::FieldUnknowns(const CurvedMesh& mesh, int fields, int last_order)
         last_mesh_ = last_order == mesh.order ? mesh : with_order(mesh, last_order);
         size_ += last_mesh_.size(), width_ += last_mesh_.nodes_per_cell();
     }
+    check_pause();
     set_numbers(mesh, fields);
+    check_pause();
     set_pattern(mesh.triangles());
 }
 

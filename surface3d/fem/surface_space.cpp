@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/solve/pause.hpp"
+
 namespace tubule::surface3d {
 
 int default_degree(int order) {
@@ -17,7 +19,9 @@ SurfaceSpace::SurfaceSpace(const CurvedMesh& mesh, int degree)
       products_(width_ * width_, tabulation_.points()) {
     for (int q = 0; q < tabulation_.points(); ++q)
         products_.col(q) = (tabulation_.value.col(q) * tabulation_.value.col(q).transpose()).reshaped();
+    check_pause();
     set_colours();
+    check_pause();
     set_pattern();
 }
 

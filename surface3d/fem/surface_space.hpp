@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
 
@@ -57,15 +58,19 @@ public:
     // At the same points, functions of another order.
     Tabulation tabulation(int order) const;
 
-    // Runs `cell_work(cell)` for every cell, on all threads. No two cells that share a node are under way at once, and
-    // those that do always come in the same order: work may add to nodal values, with the same sum to the last bit.
+    // Runs `cell_work(cell)` for every cell, on all threads; ends early with Paused. No two cells that share a node are
+    // under way at once, and those that do always come in the same order: work may add to nodal values, with the same
+    // sum to the last bit.
     template <class CellWork>
     void for_each_cell(CellWork&& cell_work) const {
+        SharedPause pause;
 #pragma omp parallel
         for (const std::vector<int>& colour : colours_) {
 #pragma omp for schedule(static)
-            for (std::size_t i = 0; i < colour.size(); ++i) cell_work(colour[i]);
+            for (std::size_t i = 0; i < colour.size(); ++i)
+                if (!pause.look(i)) cell_work(colour[i]);
         }
+        pause.check();
     }
 
     // A zero matrix of the right pattern, and the sum of cell matrices into it.

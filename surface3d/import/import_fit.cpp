@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 
@@ -181,6 +182,7 @@ std::vector<Patch> fit_patches(const TriangleMesh& mesh, const Locality& localit
     const std::vector<Vector3d> normal = vertex_normals(mesh);
     std::vector<Patch> patches;
     for (int v = 0; v < int(mesh.points.size()); ++v) {
+        if (v % 256 == 0) check_pause();
         const auto use = [&](int w) { return normal[w].dot(normal[v]) > cos_turn; };
         const std::vector<int> points = near.rings(v, locality.wanted, use);
         patches.push_back(fit_patch(mesh, v, normal[v], points, locality));

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -59,6 +60,7 @@ void flip(TriangleMesh& mesh, const EdgeSide& left, const EdgeSide& right) {
 
 void make_delaunay(TriangleMesh& mesh) {
     for (bool again = true; again;) {
+        check_pause();
         again = false;
         std::map<EdgeKey, std::vector<EdgeSide>> edges;
         for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t)
@@ -110,12 +112,14 @@ TriangleMesh icosphere(int n) {
         return found->second;
     };
     for (const auto& face : faces)
-        for (int i = 0; i < n; ++i)
+        for (int i = 0; i < n; ++i) {
+            check_pause();
             for (int j = 0; i + j < n; ++j) {
                 mesh.triangles.push_back({point(face, i, j), point(face, i + 1, j), point(face, i, j + 1)});
                 if (i + j + 1 < n)
                     mesh.triangles.push_back({point(face, i + 1, j), point(face, i + 1, j + 1), point(face, i, j + 1)});
             }
+        }
     return mesh;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
 
 namespace tubule::surface3d {
@@ -21,6 +22,7 @@ CurvedMesh flat_mesh(const TriangleMesh& base, int order) {
     const bool periodic = base.period > 0;
 
     for (std::size_t t = 0; t < base.triangles.size(); ++t) {
+        if (t % 1024 == 0) check_pause();
         const auto& corner = base.triangles[t];
         const auto shift = [&](int c) { return periodic ? base.shifts[t][c] : 0; };
         const auto at = [&](const std::array<int, 3>& n) {
@@ -84,6 +86,7 @@ CurvedMesh with_order(const CurvedMesh& mesh, int order) {
         points.push_back({static_cast<double>(j) / order, static_cast<double>(l) / order, 0});
     const Tabulation table(mesh.order, points);
     for (int cell = 0; cell < out.triangles(); ++cell) {
+        if (cell % 1024 == 0) check_pause();
         Eigen::Matrix3Xd X(3, mesh.nodes_per_cell());
         for (int a = 0; a < mesh.nodes_per_cell(); ++a) X.col(a) = mesh.position(cell, a);
         for (int a = 0; a < out.nodes_per_cell(); ++a) {

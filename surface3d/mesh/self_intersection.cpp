@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/mesh/box_tree.hpp"
 
 namespace tubule::surface3d {
@@ -117,6 +118,7 @@ std::optional<std::pair<std::size_t, std::size_t>> first_intersection(const Tria
     const BoxTree<3> tree = boxes(mesh);
     const std::size_t none = mesh.triangles.size();
     for (std::size_t t = 0; t < none; ++t) {
+        if (t % 1024 == 0) check_pause();
         std::size_t first = none;
         tree.meeting(tree.item(t), [&](std::size_t s) {
             if (s > t && s < first && meet(mesh, mesh.triangles[t], mesh.triangles[s])) first = s;

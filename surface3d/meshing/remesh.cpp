@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "common/solve/pause.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/mesh/half_edges.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
@@ -193,6 +194,7 @@ void smooth(Work& w) {
 
 void improve(Work& w) {
     for (int pass = 0; pass < passes; ++pass) {
+        check_pause();
         split_long(w);
         collapse_short(w);
         flip_edges(w, false);
@@ -203,6 +205,7 @@ void improve(Work& w) {
         w.scale = std::clamp(w.scale * std::sqrt(excess), 1 / most_scale, most_scale);
     }
     for (int pass = 0; pass < last_passes; ++pass) {
+        check_pause();
         flip_edges(w, false);
         smooth(w);
     }
@@ -279,8 +282,10 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
     const int n = old.nodes_per_cell();
     out.fields.setZero(fields.rows(), out.mesh.size());
     std::vector<double> moved(nodes.size());
+    SharedPause pause;
 #pragma omp parallel for schedule(static)
     for (int i = 0; i < out.mesh.size(); ++i) {
+        if (pause.look(i)) continue;
         NewNode& node = nodes[i];
         node.foot = w.closest(node.flat, node.normal);
         if (node.foot.cell < 0) continue;
@@ -293,6 +298,7 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
         const Eigen::VectorXd phi = functions_at(old.order, node.foot.at);
         for (int a = 0; a < n; ++a) out.fields.col(i) += phi[a] * fields.col(old.node(node.foot.cell, a));
     }
+    pause.check();
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         if (!(nodes[i].foot.distance < near_foot * nodes[i].width))
             return lost(Stop::mesh_lost, "the new triangles are too far from the surface", nodes[i].flat,

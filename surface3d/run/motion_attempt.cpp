@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/solve/memory.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/motion_series.hpp"
@@ -152,6 +153,8 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
         take(next, m);
         set_next_step(tau, memory_.next_step, error);
         return std::nullopt;
+    } catch (const TooLarge& failure) {  // for steps of any length
+        return Refusal{0, {Stop::solver_failed, t, failure.what(), ""}};
     } catch (const SolveError& failure) {
         return failed(failure.what());
     }
@@ -195,12 +198,15 @@ void MotionAttempt::make_new_mesh() {
     const Eigen::VectorXd momenta = surface().momenta(state_);
     const int old_elements = summary.elements;
     std::unique_ptr<TimeScheme> old = std::move(scheme_);
-    use_mesh(better->mesh);
+    const auto keep_old = [&] { scheme_ = std::move(old), summary.elements = old_elements; };
     try {
+        use_mesh(better->mesh);
         state_ = surface().start(better->mesh, better->fields.transpose().reshaped(), momenta);
     } catch (const SolveError&) {
-        scheme_ = std::move(old), summary.elements = old_elements;
-        return;
+        return keep_old();
+    } catch (const Paused&) {
+        keep_old();
+        throw;
     }
     ++memory_.count.meshes;
     state_.time = time;
@@ -218,7 +224,7 @@ std::optional<StopReport> MotionAttempt::step() {
         memory_.next_step = refusal->shrink * tau();
         if (refusal->shrink == 0 || case_.surface.step || memory_.next_step < shortest_step * memory_.scale.relaxation)
             return refusal->report;
-        if (clock_.interrupted()) break;
+        check_pause();
     }
     trace.add(state_.time, now_.bending.energy);
     compare();
@@ -246,7 +252,11 @@ void MotionAttempt::go() {
     if (!stop) stop = impossible(now_.bending, state_.X);
     if (!stop) stop = check_crossing(true);
     if (stop && !early_) compare();
-    while (!stop) stop = step();
+    try {
+        while (!stop) stop = step();
+    } catch (const Paused& pause) {
+        stop = pause_report(pause, state_.time);
+    }
     summarise(*stop);
 }
 
@@ -265,13 +275,17 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
     const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / element_order(case_);
     memory_.moved += state_.step * now_.speed;
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
-    memory_.moved = 0;
-    auto crossing = find_self_intersection(surface().mesh(state_.X));
-    if (!crossing) return std::nullopt;
-    crossing->time = state_.time;
-    if (memory_.count.steps == 0)
-        crossing->advice = "change the shape; if only its triangles intersect, use more elements or another mesh";
-    return crossing;
+    try {
+        auto crossing = find_self_intersection(surface().mesh(state_.X));
+        memory_.moved = 0;
+        if (!crossing) return std::nullopt;
+        crossing->time = state_.time;
+        if (memory_.count.steps == 0)
+            crossing->advice = "change the shape; if only its triangles intersect, use more elements or another mesh";
+        return crossing;
+    } catch (const Paused&) {  // what is due at this time is written first; the next step looks again
+        return std::nullopt;
+    }
 }
 
 // Whether it is worth while, and allowed, to go on.

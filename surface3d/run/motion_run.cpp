@@ -123,9 +123,11 @@ void check_restart(const Case& c, const Record& record) {
 
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
     const RunClock clock(c, observer);
-    MotionRuns runs(c, start, observer, clock, restart);
-    RunPairs pairs(runs, c, observer, begin_time(c), restart ? &restart->record : nullptr);
-    return drive(c, observer, clock, pairs);
+    return clock.pausing([&] {
+        MotionRuns runs(c, start, observer, clock, restart);
+        RunPairs pairs(runs, c, observer, begin_time(c), restart ? &restart->record : nullptr);
+        return drive(c, observer, clock, pairs);
+    });
 }
 
 }  // namespace tubule::surface3d

@@ -78,7 +78,15 @@ public:
     MeshSequence(const Case& c, const Start& start) : case_(c), start_(start) {}
 
     RunSummary& next() override {
-        const double error = measure_next();
+        double error = 0;
+        try {
+            error = measure_next();
+        } catch (const Paused& pause) {
+            if (!measured_) throw;
+            summary_.stop = pause_report(pause, 0);
+            summary_.stop.message += ", before a finer mesh was measured";
+            return summary_;
+        }
         const Observables& o = measured_->o;
         ++meshes_;
         error_ = std::isfinite(error) ? error : reference_energy(o);  // all of it where nothing is known as yet
@@ -93,8 +101,8 @@ public:
         return summary_;
     }
 
-    const Measured& measured() const { return *measured_; }
-    double error() const { return error_; }  // of the energy, absolute
+    const std::optional<Measured>& measured() const { return measured_; }  // none before the first next()
+    double error() const { return error_; }                                // of the energy, absolute
 
 protected:
     // Measures the shape on the next mesh; the error of its energy, infinite where that is not known.
@@ -260,8 +268,9 @@ RunSummary run(const Case& c, const Start& start, RunObserver& observer, const R
     if (c.moves()) return run_motion(c, start, observer, restart);
     const RunClock clock(c, observer);
     const auto meshes = meshes_of(c, start);
-    RunSummary s = drive(c, observer, clock, *meshes);
-    const Measured& m = meshes->measured();
+    RunSummary s = clock.pausing([&] { return drive(c, observer, clock, *meshes); });
+    if (!meshes->measured()) return s;
+    const Measured& m = *meshes->measured();
     if (m.has_curvature()) observer.row(rest_series().values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });

@@ -13,10 +13,12 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/shapes/profile_curve.hpp"
+#include "common/solve/memory.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
+#include "surface3d/motion/surface_law.hpp"
 #include "surface3d/run/mesh_record.hpp"
 
 namespace tubule::surface3d {
@@ -25,6 +27,14 @@ namespace {
 // Irregular meshes: how far points move, of their shortest edge; any seed would do.
 constexpr double jitter = 0.2;
 constexpr unsigned seed = 1;
+
+// For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions.md, "Time and memory".
+constexpr double bytes_per_cell_entry = 36;
+
+// What a step solves for: velocity, H and K, and a pressure.
+int fields_of(const SurfaceLaw& law) {
+    return law.components() + 2 + law.inextensible;
+}
 
 int even(double n, int least) {
     return std::max(2 * static_cast<int>(std::lround(n / 2)), least);
@@ -221,6 +231,15 @@ Start::Start(const Case& c) {
     make_ = std::move(prepared.make);
     resizable_ = prepared.resizable;
     notes_ = std::move(prepared.notes);
+    if (c.moves()) fields_ = fields_of(motion_law(c.model));
+}
+
+StartMesh Start::mesh(int triangles, int order) const {
+    const double width = fields_ * (order + 1) * (order + 2) / 2;  // of the matrix of a triangle
+    if (resizable_)
+        require_memory(bytes_per_cell_entry * width * width * triangles,
+                       fmt::format("a surface of {} triangles of order {}", triangles, order));
+    return make_(triangles, order);
 }
 
 }  // namespace tubule::surface3d

@@ -25,8 +25,8 @@ public:
     // a mesh or exact curvatures that this shape does not have.
     explicit Start(const Case& c);
 
-    // With elements of this order and about this many triangles, where their number can be chosen.
-    StartMesh mesh(int triangles, int order) const { return make_(triangles, order); }
+    // With elements of this order and about this many triangles, where their number can be chosen. Throws TooLarge.
+    StartMesh mesh(int triangles, int order) const;
     bool resizable() const { return resizable_; }                     // whether it can; a file brings its own triangles
     const std::vector<std::string>& notes() const { return notes_; }  // what was changed on the way, whole sentences
 
@@ -36,6 +36,7 @@ private:
     Make make_;
     bool resizable_ = true;
     std::vector<std::string> notes_;
+    int fields_ = 1;  // that a run solves for at the nodes
 };
 
 }  // namespace tubule::surface3d

@@ -109,7 +109,7 @@ TEST(EquilibriumCase, refusals) {
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"volume\"\n[equilibrium.branch]\nvary = \"equilibrium.area\"", varies);
     expect("[accuracy]", "[time]\nend = 1.0\n[accuracy]",
-           "10:1: time must be absent: nothing moves in a case with [equilibrium]");
+           "11:7: time.end must be absent: nothing moves in a case with [equilibrium]");
     expect("kind = \"capsule\"\nradius = 0.5\nlength = 2.0", "kind = \"torus\"\nradius = 2.0\ntube_radius = 1.0",
            "7:8: shape.kind must not be \"torus\": equilibria are closed cells, or tubes with mirror symmetry");
     expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
@@ -119,7 +119,7 @@ TEST(EquilibriumCase, refusals) {
     expect("to = 0.0", "to = 0.12",
            " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; the number must be 1 to 10000");
     expect("modes = 1", "area = 1.0",
-           " equilibrium: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere");
+           " equilibrium.area: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere");
 }
 
 TEST(EquilibriumCase, writtenOutItIsTheSame) {

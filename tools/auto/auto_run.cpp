@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <set>
 #include <stdexcept>
 
 #include "axisym/run.hpp"
+#include "common/run/run_clock.hpp"
 #include "tools/auto/joined_file.hpp"
 #include "tools/auto/profile_watch.hpp"
 #include "tools/auto/waves.hpp"
@@ -25,28 +25,6 @@ constexpr int parts = 48, halvings = 12;
 constexpr double grown = 2;
 // Error of the logarithm of an amplitude, in e-folds, above which the time of the switch is reported as uncertain.
 constexpr double uncertain = 0.3;
-
-// The wall time of all parts together.
-class Clock {
-public:
-    explicit Clock(const Case& c) : limit_(c.time.limit) {}
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-    }
-    // What time.limit leaves for the next part.
-    void limit(Case& part) const {
-        if (limit_) part.time.limit = std::max(*limit_ - seconds(), 1e-3);
-    }
-    // The limit as the user knows it.
-    void reword(StopReport& stop) const {
-        if (stop.reason == Stop::time_limit)
-            stop.message = fmt::format("reached the time limit of {} s (time.limit)", *limit_);
-    }
-
-private:
-    std::optional<double> limit_;
-    std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
-};
 
 std::vector<double> until(const std::vector<double>& times, double end) {
     std::vector<double> out;
@@ -169,7 +147,11 @@ private:
 class AutoRun {
 public:
     AutoRun(const Case& c, const Choice& choice, RunObserver& file)
-        : case_(c), file_(file), clock_(c), choice_(choice), names_(joined_series_names(c, choice.axisymmetric)) {}
+        : case_(c),
+          file_(file),
+          clock_(c, file),
+          choice_(choice),
+          names_(joined_series_names(c, choice.axisymmetric)) {}
 
     RunSummary in_three_dimensions(const Restart* restart);
     RunSummary axisymmetric(const Restart* restart);
@@ -177,15 +159,13 @@ public:
     RunSummary after_switch(const Record& at, const Before& before, const Restart* restart);
 
 private:
-    RowMap axisym_rows() const {
-        return {names_, axisym::series_names(axisym_case(case_, case_.time.end, {})), 1, clock_.seconds()};
-    }
+    RowMap axisym_rows() const { return {names_, axisym::series_names(axisym_case(case_, case_.time.end, {})), 1}; }
     RunSummary watched(ProfileWatch& watch, const std::set<double>& for_rates, const Restart* restart);
     RunSummary with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch);
 
     const Case& case_;
     RunObserver& file_;
-    Clock clock_;
+    RunClock clock_;  // of all parts together
     const Choice& choice_;
     std::vector<std::string> names_;
     std::vector<std::string> warnings_;  // of the part before
@@ -196,7 +176,7 @@ RunSummary AutoRun::in_three_dimensions(const Restart* restart) {
     if (!restart) file_.note(fmt::format("tier surface3d: {}", choice_.reason));
     const Case c = surface_case(case_);
     const Before nothing;
-    SurfacePart part(file_, {names_, surface3d::series_names(c), 2, 0}, nothing);
+    SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, nothing);
     RunSummary s = surface3d::run(c, *choice_.start, part, restart);
     set_choice(s, "surface3d", choice_.reason);
     return s;
@@ -209,7 +189,6 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
     output.insert(output.end(), for_rates.begin(), for_rates.end());
     std::sort(output.begin(), output.end());
     Case c = axisym_case(case_, case_.time.end, output);
-    clock_.limit(c);
     RunSummary s = axisym::run(c, watch, restart);
     const NoiseGrowth& growth = watch.growth();
     if (s.stop.reason != Stop::stationary || growth.empty() || watch.reached()) return s;
@@ -218,7 +197,6 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
             growth.amplitude(m, s.stop.time) * std::exp(growth.last_rate(m) * (c.time.end - s.stop.time));
         if (end < case_.automatic.largest) continue;
         c.time.stationary.reset();
-        clock_.limit(c);
         const Restart from{*watch.last_frame()};
         return axisym::run(c, watch, &from);
     }
@@ -231,7 +209,6 @@ RunSummary AutoRun::axisymmetric(const Restart* restart) {
     if (restart) watch.resume(restart->record);
     RunSummary s = watched(watch, for_rates, restart);
     if (watch.reached()) return with_switch(*watch.reached(), watch);
-    clock_.reword(s.stop);
     set_choice(s, "axisym", why_axisymmetric(case_, watch.growth()));
     add_doubts(s, case_, watch.known(), watch.growth());
     return s;
@@ -241,13 +218,11 @@ RunSummary AutoRun::with_switch(const NoiseGrowth::Peak& at, const ProfileWatch&
     file_.discard();
     Case c = axisym_case(case_, at.time, until(case_.time.output, at.time));
     c.time.stationary.reset();
-    clock_.limit(c);
     FirstPart part(file_, axisym_rows(), watch.growth(), at.time);
     RunSummary s = axisym::run(c, part);
     add_doubts(s, case_, watch.known(), watch.growth());
     if (s.stop.reason != Stop::finished || !part.last) {
         if (part.last) part.write(*part.last);
-        clock_.reword(s.stop);
         set_choice(s, "axisym", fmt::format("m = {} would be too large at t = {:.6g}", at.m, at.time));
         return s;
     }
@@ -272,11 +247,12 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
         if (a < grown * case_.automatic.noise && a < largest) a = 0;
 
     Case c = surface_case(case_);
-    c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy};
-    clock_.limit(c);
-    SurfacePart part(file_, {names_, surface3d::series_names(c), 2, clock_.seconds()}, before);
-    RunSummary s = surface3d::run(c, part, restart);
-    clock_.reword(s.stop);
+    RunSummary s = clock_.pausing([&] {
+        c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy};
+        SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, before);
+        return surface3d::run(c, part, restart);
+    });
+    s.stop.time = std::max(s.stop.time, at.time);  // where it pauses before the first state in three dimensions
     s.estimated_error = std::max(s.estimated_error, known.error);
     s.as_accurate_as_asked = s.as_accurate_as_asked && known.error <= case_.accuracy.energy;
     s.warnings.insert(s.warnings.begin(), warnings_.begin(), warnings_.end());

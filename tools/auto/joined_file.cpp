@@ -37,8 +37,7 @@ std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymme
     return names;
 }
 
-RowMap::RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier, double seconds)
-    : wall_(std::find(file.begin(), file.end(), "wall_seconds") - file.begin()), tier_(tier), seconds_(seconds) {
+RowMap::RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier) : tier_(tier) {
     for (const std::string& name : file) {
         const auto found = std::find(own.begin(), own.end(), name);
         source_.push_back(name == tier_name    ? tier_number
@@ -50,7 +49,6 @@ RowMap::RowMap(const std::vector<std::string>& file, const std::vector<std::stri
 std::vector<double> RowMap::operator()(std::span<const double> row) const {
     std::vector<double> out;
     for (const int source : source_) out.push_back(source == tier_number ? tier_ : source == zero ? 0 : row[source]);
-    if (wall_ < out.size()) out[wall_] += seconds_;
     return out;
 }
 

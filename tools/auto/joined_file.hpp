@@ -16,16 +16,14 @@ std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymme
 // A tier's rows as those of the file.
 class RowMap {
 public:
-    // Of tier 1 or 2; `seconds` is the wall time that was used before.
-    RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier, double seconds);
+    // Of tier 1 or 2.
+    RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier);
     std::vector<double> operator()(std::span<const double> row) const;
 
 private:
     std::vector<int> source_;  // of each column, or one of these:
     static constexpr int zero = -1, tier_number = -2;
-    std::size_t wall_;
     int tier_;
-    double seconds_;
 };
 
 // What the file holds before a run in three dimensions goes on with it.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/run/run_pairs.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/auto/waves.hpp"
 
 namespace tubule {
@@ -38,10 +39,18 @@ void ProfileWatch::look_at(const Record& frame) {
     } catch (const std::exception& error) {
         ++known_.unknown;
         known_.why_unknown = error.what();
-        for (int m = 1; m <= growth_.modes() && !growth_.empty(); ++m) rates[m - 1] = growth_.last_rate(m);
+        rates = last_rates();
+    } catch (const Paused&) {  // the run ends with its next step: until then
+        rates = last_rates();
     }
     growth_.add(frame.time, rates);
     reached_ = growth_.reached(case_.automatic.largest);
+}
+
+std::vector<double> ProfileWatch::last_rates() const {
+    std::vector<double> rates(growth_.modes(), 0.0);
+    for (int m = 1; m <= growth_.modes() && !growth_.empty(); ++m) rates[m - 1] = growth_.last_rate(m);
+    return rates;
 }
 
 void ProfileWatch::frame(const std::function<Record()>& make) {

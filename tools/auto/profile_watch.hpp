@@ -41,6 +41,7 @@ public:
 
 private:
     void look_at(const Record& frame);
+    std::vector<double> last_rates() const;
     Record with_amplitudes(Record frame) const;
 
     const Case& case_;

@@ -17,6 +17,7 @@
 #include "common/case/read.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/result.hpp"
+#include "common/run/run_clock.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/progress.hpp"
@@ -204,7 +205,7 @@ std::optional<Opened> resume(const Case& c, const Engine& engine, const std::fil
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
                                     file.string(), c.path));
     const auto stop = stop_of(old);
-    if (c.equilibrium && !stop)
+    if (c.equilibrium && (!stop || can_go_on(*stop)))
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
     if (old.frames.empty() && !old.checkpoint) return create(c, engine, file);
@@ -266,7 +267,7 @@ int run_case(Case c, const RunOptions& options) {
         for (const Expectation& e : c.expect.values)
             if (e.time) c.time.output.push_back(*e.time);
 
-    const auto started = std::chrono::steady_clock::now();
+    const PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
     const auto engine = engine_for(c);
     std::optional<Opened> result = open_result(c, *engine, file, options.resume);
     if (!result) {
@@ -280,7 +281,7 @@ int run_case(Case c, const RunOptions& options) {
         ended = run_to_its_end(c, *engine, *result, recorder);
     }
     const RunSummary& summary = ended.summary;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    const double seconds = watch.seconds();
     // An earlier result stays where this run has no row to put in its place.
     const bool stays = !result->writer.began() && (ended.failed || !result->restart) && has_rows(file);
     if (!stays) {
@@ -330,6 +331,9 @@ int run_cases(const RunOptions& options) {
             one = run_case(c, options);
         } catch (const CaseError&) {
             throw;
+        } catch (const Paused& pause) {  // before there was a result to write to
+            say(stderr, "{}: {}\n", c.path, paused_at_start(pause).stop.message);
+            one = exit_code(pause.reason);
         } catch (const std::exception& error) {
             say(stderr, "{}: {}\n", c.path, explanation(error));
             one = exit_code(Stop::solver_failed);

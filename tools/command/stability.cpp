@@ -17,7 +17,9 @@
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"
+#include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
@@ -192,12 +194,17 @@ void refuse_contradictions(const StabilityOptions& o) {
 }
 
 int stability(const StabilityOptions& options) {
+    catch_interrupts();
+    const PauseWatch watch(std::nullopt, interrupted);
     try {
         refuse_contradictions(options);
         print_answer(answer(options, subject_of(options)));
         return 0;
     } catch (const NoPicture& failure) {
         return failure.status;
+    } catch (const Paused& pause) {
+        say(stderr, "{}: interrupted\n", options.file);
+        return exit_code(pause.reason);
     } catch (const std::invalid_argument& error) {
         const std::string message = error.what();
         const bool named = message.find(options.file) != std::string::npos;

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
 #include "tools/command/json.hpp"
@@ -197,15 +198,16 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
     ModelReport report{model, law, subject.tube, "", {}, {}, {}, {}};
     set_tension(subject, report);
     const auto add_row = [&](std::optional<int> n, double q, int m) {
+        check_pause();
         if (q == 0 && m < 2 && !(m == 0 && law.unconstrained())) return;  // its radius, or its place
         report.rows.push_back({m, n, q, theory::growth(report.tube, law, q, m), std::nullopt});
     };
+    const int waves = waves_of_interest(options, report, subject.length);
     for (int m = 0; m <= options.modes; ++m) {
         if (!options.q.empty())
             for (const double q : wave_numbers(options.q)) add_row({}, q, m);
         else
-            for (int n = 0; n <= waves_of_interest(options, report, subject.length); ++n)
-                add_row(n, 2 * pi * n / subject.length, m);
+            for (int n = 0; n <= waves; ++n) add_row(n, 2 * pi * n / subject.length, m);
         report.fastest.push_back(theory::fastest_wave(report.tube, law, m));
     }
     for (const WaveRow& row : report.rows)

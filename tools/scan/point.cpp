@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <ctime>
 #include <limits>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "common/case/read.hpp"
+#include "common/run/run_clock.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
 #include "tools/scan/uniform_fate.hpp"
@@ -173,18 +174,23 @@ int stop_word(Stop reason) {
 }
 
 PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted) {
-    const auto started = std::chrono::steady_clock::now();
+    const PauseWatch watch(c.time.limit, interrupted);
     const double cpu = cpu_seconds();
     PointResult p;
     try {
         p = computed(c, to_the_end, interrupted);
+    } catch (const Paused& pause) {
+        const StopReport stop = paused_at_start(pause).stop;
+        p = refused_point(stop.message);
+        p.outcome = outcome_of(stop.reason, {});
+        p.stop = stop_word(stop.reason);
     } catch (const CaseError& error) {
         p = refused_point(error.what());
     } catch (const std::exception& error) {
         p = refused_point(failure_of(c, error, {}).message);
         p.stop = stop_word(Stop::solver_failed);
     }
-    p[Measure::wall_seconds] = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    p[Measure::wall_seconds] = watch.seconds();
     p[Measure::cpu_seconds] = cpu_seconds() - cpu;
     return p;
 }

@@ -1,0 +1,170 @@
+#!/usr/bin/python3
+"""Limits of time and memory: `time.limit` and Ctrl-C end meshes, starts, equilibria, spectra and steps in time, and
+what cannot fit into memory is refused before it is tried. Argument: the program.
+
+The times are those that the user asked for, with generous room for slow machines; without these limits each of the runs
+takes many times longer."""
+import resource
+import signal
+import time
+import unittest
+
+from program import CAPSULE, QUICK, ProgramTest, about
+
+LIMIT, ROOM = 1, 12  # seconds: what is asked, and when it must have ended on any machine
+
+SURFACE = QUICK.replace('tier = "axisym"', 'tier = "surface3d"')
+# Its meridian is found by a search at every point, and its rim asks for many small elements.
+PANCAKE = """tier = "axisym"
+[energy]
+k20 = 1.0
+[model]
+kind = "overdamped"
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 1.0
+c = 0.0071
+[accuracy]
+energy = 0.095
+[discretisation]
+elements = 100000
+[time]
+end = 1.0
+"""
+# Area and volume of a shape far from the start, and an accuracy that takes long.
+EQUILIBRIUM = """tier = "axisym"
+[energy]
+k20 = 0.125
+k42 = 0.12
+[shape]
+kind = "ellipsoid"
+a = 0.7
+b = 0.7
+c = 1.7
+[accuracy]
+energy = 1e-9
+[equilibrium]
+area = 14.4
+volume = 0.0024
+"""
+BRANCH = CAPSULE + 'modes = 2\n[equilibrium.branch]\nvary = "energy.k42"\nto = 0.0\nstep = 0.001\n'
+
+
+class TimeLimit(ProgramTest):
+    def ends_in_time(self, command, text, *sets):
+        case = self.write("limited.toml", text)
+        begin = time.monotonic()
+        out, err = self.tubule(command, case, "--quiet", *sets, "--set", f"time.limit={LIMIT}", status=5)
+        self.assertLess(time.monotonic() - begin, LIMIT + ROOM)
+        self.assertIn(f"reached the time limit of {LIMIT} s (time.limit)", out + err)
+
+    def test_in_the_start_of_graphs(self):
+        self.ends_in_time("run", QUICK, "--set", "discretisation.elements=100000")
+
+    def test_in_the_start_of_curves(self):
+        self.ends_in_time("run", PANCAKE)
+
+    def test_in_the_mesh_of_a_surface(self):
+        self.ends_in_time("run", SURFACE, "--set", "discretisation.elements=100000", "--set", "discretisation.order=2")
+
+    def test_in_a_descent_to_an_equilibrium(self):
+        self.ends_in_time("equilibrium", EQUILIBRIUM)
+
+    def test_along_a_branch_whose_shapes_so_far_are_kept(self):
+        self.ends_in_time("equilibrium", BRANCH)
+        shown = self.shown(self.folder / "limited.hdf")[1]
+        self.assertGreater(len(shown), 0)
+        self.assertLess(len(shown), 121)
+
+    def test_a_case_at_rest_has_a_limit_and_nothing_else_of_time(self):
+        case = self.write("limited.toml", EQUILIBRIUM + "[time]\nend = 1.0\nlimit = 2\n")
+        self.assertIn("time.end must be absent: nothing moves in a case with [equilibrium]", self.refused("check", case))
+
+
+class CtrlC(ProgramTest):
+    def ends_when_interrupted(self, *command, after=1.0):
+        process = self.start(*command)
+        self.addCleanup(process.kill)
+        time.sleep(after)
+        self.assertIsNone(process.poll(), "ended before it was interrupted")
+        process.send_signal(signal.SIGINT)
+        begin = time.monotonic()
+        out, err = process.communicate()
+        self.assertLess(time.monotonic() - begin, ROOM)
+        self.assertEqual(process.returncode, 130, out + err)
+        self.assertIn("interrupted", out + err)
+
+    def test_in_an_equilibrium(self):
+        self.ends_when_interrupted("equilibrium", self.write("cell.toml", EQUILIBRIUM), "--set", "equilibrium.volume=1e-9")
+
+    def test_in_a_start(self):
+        self.ends_when_interrupted("run", self.write("pancake.toml", PANCAKE))
+
+    def test_in_growth_rates(self):
+        self.ends_when_interrupted("stability", self.case, "--waves", "10000", "--modes", "100", "--model", "all")
+
+    def test_a_second_one_ends_at_once_and_leaves_a_file_that_opens(self):
+        process = self.start("run", self.write("pancake.toml", PANCAKE))
+        self.addCleanup(process.kill)
+        time.sleep(1)
+        for _ in range(2):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        process.communicate()
+        self.assertEqual(process.returncode, -signal.SIGINT)
+        if (self.folder / "pancake.hdf").exists():
+            self.assertIn("pancake.hdf", self.tubule("show", "pancake.hdf")[0])
+
+
+class Memory(ProgramTest):
+    def test_a_mesh_that_does_not_fit_is_refused(self):
+        case = self.write("large.toml", SURFACE)
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.RLIM_INFINITY))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_AS, (resource.RLIM_INFINITY,) * 2)
+        out, err = self.tubule("run", case, "--set", "discretisation.elements=1000000", status=4)
+        self.assertRegex(
+            out + err,
+            r"a surface of 1000000 triangles of order 4 would take about \S+ GB of memory, but only \S+ GB are free: "
+            r"use fewer elements \(discretisation.elements\)",
+        )
+
+    def test_elements_that_rounding_asks_for_are_bounded(self):
+        # Waves of .1 on a radius of 2e9 are lost in rounding, which no mesh resolves: 4000 elements of a cell at most.
+        self.tubule("run", self.case, "--set", "shape.radius=2147483648", "--set", "time.limit=1", status=5)
+        self.assertLessEqual(about(self.result)["elements"], 4000)
+
+
+class NoEquilibrium(ProgramTest):
+    def fails(self, text, *words, status=4):
+        out, err = self.tubule("equilibrium", self.write("cell.toml", text), "--quiet", status=status)
+        for word in words:
+            self.assertIn(word, out + err)
+
+    def test_an_energy_without_minimum(self):
+        # f_HH = 2 k20 + 12 k40 H^2 = -2 + .012 on the tube: short waves lower the energy.
+        tube = 'tier = "axisym"\n[energy]\nk20 = -1.0\nk40 = 0.001\n[shape]\nkind = "tube"\nradius = 1.0\nlength = 4.0\n'
+        self.fails(tube + '[equilibrium]\nheld = "area"\n', "the energy has no minimum there", "see the moduli in [energy]")
+
+    def test_a_volume_that_no_shape_has(self):
+        # The isoperimetric inequality: at most 6^(3/2)/(6 pi^(1/2)) = 1.38198.
+        self.fails(
+            EQUILIBRIUM.replace("area = 14.4", "area = 6.0").replace("0.0024", "1.4"),
+            "cell.toml:15:10: equilibrium.volume must be at most 1.38198: no shape with this equilibrium.area encloses more",
+            status=2,
+        )
+
+    def test_a_volume_that_no_tube_has(self):
+        # Of period 4: a ball of area 6 encloses 1.38198, more than a cylinder, 36/(16 pi).
+        tube = 'tier = "axisym"\n[energy]\nk20 = 1.0\n[shape]\nkind = "tube"\nradius = 0.25\nlength = 4.0\n'
+        self.fails(
+            tube + "[equilibrium]\narea = 6.0\nvolume = 1.4\n",
+            "equilibrium.volume: a volume of 1.4 a period is impossible: an area of 6 encloses at most 1.38198",
+            status=2,
+        )
+
+
+if __name__ == "__main__":
+    import sys
+
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,76 @@
+// Work that is told to pause, and what does not fit into memory.
+#include "common/solve/pause.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/solve/memory.hpp"
+#include "tests/support/message_of.hpp"
+
+namespace tubule {
+namespace {
+
+bool never() {
+    return false;
+}
+constexpr double passed = -1;  // a limit that no clock is within
+
+TEST(Pause, nothingEndsWorkThatNobodyWatches) {
+    EXPECT_NO_THROW(check_pause());
+    EXPECT_NO_THROW(check_pause(1e9));
+    EXPECT_FALSE(SharedPause().look());
+}
+
+TEST(Pause, aLimitIsToldOnceSoThatTheStateCanBeSaved) {
+    const PauseWatch watch(passed, never);
+    SharedPause loop;
+    EXPECT_TRUE(loop.look());
+    try {
+        loop.check();
+        FAIL() << "not told";
+    } catch (const Paused& pause) {
+        EXPECT_EQ(pause.reason, Stop::time_limit);
+        EXPECT_EQ(pause.limit, passed);
+    }
+    EXPECT_NO_THROW(check_pause());
+    EXPECT_FALSE(SharedPause().look());
+    EXPECT_TRUE(watch.due());  // between steps it still is
+}
+
+TEST(Pause, theInnermostWatchIsAskedAndTimeCountsFromTheOutermost) {
+    const PauseWatch outer(passed, never);
+    {
+        const PauseWatch inner(std::nullopt, never);
+        EXPECT_NO_THROW(check_pause());
+        EXPECT_GE(inner.seconds(), 0);
+        EXPECT_NEAR(inner.seconds(), outer.seconds(), 1);
+    }
+    EXPECT_THROW(check_pause(), Paused);
+}
+
+TEST(Pause, anInterruptLeavesAStepTheTimeToEnd) {
+    bool raised = false;
+    const PauseWatch watch(std::nullopt, [&] { return raised; });
+    EXPECT_FALSE(watch.due());
+    raised = true;
+    EXPECT_EQ(watch.due().value().reason, Stop::interrupted);
+    EXPECT_NO_THROW(check_pause());         // half a second
+    EXPECT_THROW(check_pause(10), Paused);  // which is too short for this
+}
+
+TEST(Pause, workThatNothingCanEndIsNotBegunWhenItWouldGoFarBeyondTheLimit) {
+    const PauseWatch watch(100, never);
+    EXPECT_NO_THROW(check_pause(99));
+    EXPECT_NO_THROW(check_pause(104));  // 5 percent
+    EXPECT_THROW(check_pause(110), Paused);
+}
+
+TEST(Memory, saysWhatIsTooLargeAndWhatToTry) {
+    EXPECT_GT(free_memory(), 0);
+    EXPECT_NO_THROW(require_memory(1e6, "a vector"));
+    const std::string message = test::message_of<TooLarge>([] { require_memory(1e20, "a matrix"); });
+    EXPECT_TRUE(message.starts_with("a matrix would take about 1e+11 GB of memory, but only ")) << message;
+    EXPECT_TRUE(message.ends_with(" GB are free: use fewer elements (discretisation.elements)")) << message;
+}
+
+}  // namespace
+}  // namespace tubule
