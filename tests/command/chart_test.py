@@ -180,7 +180,7 @@ class Surroundings(Charts):
                 except OSError:  # it has ended
                     pass
 
-        with self.start("chart", self.case, "--vary", "discretisation.time_tolerance=1e-13,1e-14") as process:
+        with self.start("chart", self.case, "--vary", "discretisation.time_tolerance=1e-13,2e-14") as process:
             while not runs:
                 self.assertIsNone(process.poll())
                 find_runs(process.pid)

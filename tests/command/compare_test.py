@@ -149,7 +149,7 @@ class Runs(Compare):
     def test_refusals(self):
         self.assertIn("nowhere.hdf", self.refused("compare", "nowhere.hdf", self.fine))
         self.assertIn("case.toml", self.refused("compare", self.fine, self.case))
-        self.tubule("scan", self.case, "--over", "time.end=1e-3,2e-3", "--quiet", "-o", "scan.hdf")
+        self.tubule("scan", self.case, "--over", "energy.k42=0.1,0.2", "--quiet", "-o", "scan.hdf")
         self.assertIn("scan.hdf: is the result of a scan: this needs the result of a run",
                       self.refused("compare", self.fine, "scan.hdf"))  # fmt: skip
         self.assertIn("required", self.refused("compare", self.fine))

@@ -39,6 +39,8 @@ std::string words(const Model& model) {
 
 namespace {
 
+constexpr double largest_tension = 1e100;  // products with it are numbers
+
 // The exit status of the script, which has said why.
 struct NoPicture {
     int status;
@@ -186,6 +188,9 @@ std::string answer(const StabilityOptions& options, StabilitySubject subject) {
 }
 
 void refuse_contradictions(const StabilityOptions& o) {
+    if (o.tension && std::abs(*o.tension) > largest_tension)
+        throw std::invalid_argument(
+            fmt::format("--tension {:g} is too large to compute with: at most {:g}", *o.tension, largest_tension));
     if (!o.q.empty() && o.waves)
         throw std::invalid_argument("--q and --waves exclude each other: both choose the waves");
     if (!o.fit.empty() && (!o.q.empty() || o.waves || o.tension || o.frame || o.numerical || !o.plot.empty() ||
@@ -226,11 +231,11 @@ void add_stability(CLI::App& app, int& exit_status) {
     for (const ModelEntry& m : models) names.insert(names.end() - 1, m.name);
     command->add_option("--model", o->model, "another model than the case's, or all")->check(CLI::IsMember(names));
     command->add_option("--Re", o->Re, "of viscous models, where the case has none")
-        ->check(CLI::PositiveNumber)
-        ->check(refuse_infinite);
+        ->check(refuse_infinite)
+        ->check(CLI::PositiveNumber);
     command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
-        ->check(CLI::NonNegativeNumber)
-        ->check(refuse_infinite);
+        ->check(refuse_infinite)
+        ->check(CLI::NonNegativeNumber);
     command->add_option("--tension", o->tension, "sigma (default: from model, case and shape)")->check(refuse_infinite);
     command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
         ->check(CLI::Range(0, 100))

@@ -210,12 +210,6 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
             for (int n = 0; n <= waves; ++n) add_row(n, 2 * pi * n / subject.length, m);
         report.fastest.push_back(theory::fastest_wave(report.tube, law, m));
     }
-    for (const WaveRow& row : report.rows)
-        if (!std::isfinite(row.growth.rate()))
-            throw std::invalid_argument(fmt::format(
-                "the growth rate of m = {}, q = {:g} is not a finite number: tension {:g}, moduli, radius, Re "
-                "or gamma are too large or too small to compute with",
-                row.m, row.q, report.tube.tension));
     report.fastest_fitting = theory::fastest_fitting_wave(report.tube, law, subject.length, options.modes);
     if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
     return report;
