@@ -149,7 +149,8 @@ const std::vector<Target>& targets() {
                                          {"mesh", mesh_file, mesh_seeds},
                                          {"journal", journal_records, journal_seeds},
                                          {"journal_bytes", journal_bytes, journal_byte_seeds},
-                                         {"result", result_parts, result_seeds}};
+                                         {"result", result_parts, result_seeds},
+                                         {"result_index", result_index, index_seeds}};
     return all;
 }
 
