@@ -99,11 +99,13 @@ private:
     std::vector<T> next(T unknown) {
         const auto offset = in_.get<std::uint64_t>(), size = in_.get<std::uint64_t>();
         const auto crcs = in_.list<std::uint32_t>();
+        if (size % sizeof(T) != 0 || crcs.size() != size / Extent::chunk + (size % Extent::chunk != 0))
+            throw std::runtime_error("its index does not fit its checksums");
         std::vector<T> values(size / sizeof(T), unknown);
         whole_ = true;
         for (std::size_t i = 0; i < crcs.size(); ++i) {
             const std::size_t from = i * Extent::chunk, n = std::min(Extent::chunk, size - from);
-            const bool there = offset + from + n <= file_.size();
+            const bool there = offset <= file_.size() && from + n <= file_.size() - offset;
             const auto bytes = there ? file_.subspan(offset + from, n) : std::span<const std::byte>{};
             const bool good = there && crc32(0, bytes) == crcs[i];
             if (good) std::memcpy(values.data() + from / sizeof(T), bytes.data(), n);
@@ -118,7 +120,13 @@ private:
 };
 
 void fill(Record& record, Datasets& datasets) {
-    for (Array& array : record.arrays) array.data = datasets.numbers();
+    for (Array& array : record.arrays) {
+        array.data = datasets.numbers();
+        std::size_t size = 1;
+        for (const std::size_t extent : array.shape) size *= extent;
+        if (array.data.size() != size)
+            throw std::runtime_error(fmt::format("in its index the shape of {} does not fit its size", array.name));
+    }
 }
 
 void fill(SurfaceCells& mesh, Datasets& datasets) {
@@ -224,6 +232,7 @@ Contents contents_by_index(std::span<const std::byte> index, std::span<const std
     contents.case_text.sets = get_texts(in);
     contents.about = get_about(in);
     contents.series = get_texts(in);
+    if (contents.series.empty()) throw std::runtime_error("its index has no series");
     for (auto n = in.get<std::uint64_t>(); n > 0; --n) contents.meshes.push_back(get_mesh(in));
     for (auto n = in.get<std::uint64_t>(); n > 0; --n) contents.frames.push_back(get_outline(in));
     if (in.get<std::uint64_t>() != 0) contents.checkpoint = get_outline(in);
