@@ -190,8 +190,9 @@ struct ResultWriter::Impl {
     Journal journal;
     Contents contents;
     Record restart;
-    bool may_begin = false;  // there is, or was to resume from, something worth the file
-    bool began = false;      // the file and its journal are this writer's
+    std::vector<std::byte> rewound;  // image of a resumed result, made before its run begins and its time counts
+    bool has_row = false;
+    bool began = false;  // the file and its journal are this writer's
     bool finished = false;
 
     std::size_t image_size = 0;
@@ -200,12 +201,14 @@ struct ResultWriter::Impl {
 
     void consolidate() {
         const auto start = Clock::now();
-        const auto image = hdf5_image(contents);
+        write(hdf5_image(contents));
+        cost = consolidated_at - start;
+    }
+    void write(const std::vector<std::byte>& image) {
         durable::replace(file, image);
         journal.restart(contents.id);
         image_size = image.size();
         consolidated_at = Clock::now();
-        cost = consolidated_at - start;
     }
 
     // What was journalled is safe; it goes into the file when there is as much of it as the file has already (so that
@@ -222,18 +225,23 @@ struct ResultWriter::Impl {
     template <class Journalled, class Add>
     void record(const Journalled& journalled, const Add& add) {
         refuse_if_finished();
+        if (!rewound.empty()) {
+            write(std::exchange(rewound, {}));
+            begin();
+        }
         const auto sequence = contents.sequence + 1;
         if (began) journalled(sequence);
         add();
         contents.sequence = sequence;
-        if (began)
+        if (began) {
             consolidate_if_due();
-        else if (may_begin)
+        } else if (has_row) {
+            consolidate();
             begin();
+        }
     }
 
     void begin() {
-        consolidate();
         write_view(file, contents);
         began = true;
     }
@@ -280,7 +288,9 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
     } catch (const std::runtime_error& e) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
-    impl->may_begin = true;
+    const auto start = Clock::now();
+    impl->rewound = hdf5_image(impl->contents);
+    impl->cost = Clock::now() - start;
     return ResultWriter(std::move(impl));
 }
 
@@ -303,7 +313,7 @@ void ResultWriter::row(std::span<const double> values) {
     impl_->record([&](auto sequence) { impl_->journal.row(sequence, values); },
                   [&] {
                       contents.add_row(values);
-                      impl_->may_begin = true;
+                      impl_->has_row = true;
                   });
 }
 
@@ -330,10 +340,11 @@ void ResultWriter::checkpoint(const Record& state) {
 }
 
 void ResultWriter::discard() {
+    impl_->rewound.clear();
     impl_->record([&](auto sequence) { impl_->journal.discard(sequence); },
                   [&] {
                       impl_->contents.forget();
-                      impl_->may_begin = false;
+                      impl_->has_row = false;
                   });
 }
 
