@@ -167,11 +167,14 @@ void CurveAttempt::keep_good() {
 }
 
 // IDA sees only guards that change their sign later.
-std::optional<StopReport> CurveAttempt::check_start() const {
+std::optional<StopReport> CurveAttempt::check_start() {
     const double t = flow_->time();
     if (outputs_.done()) return StopReport{Stop::finished, t, "reached time.end", ""};
     for (const CurveGuard& guard : curve_guards())
-        if (!(guard.value(now_, setup_.c.accuracy.r_min) > 0)) return guard.report(now_, t);
+        if (!(guard.value(now_, setup_.c.accuracy.r_min) > 0)) {
+            write_row(t, now_, flow_->x());
+            return guard.report(now_, t);
+        }
     return std::nullopt;
 }
 

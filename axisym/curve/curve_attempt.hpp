@@ -41,7 +41,7 @@ private:
 
     const Snapshot& observe(double t, const double* y, const double* rate);
     void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
-    std::optional<StopReport> check_start() const;
+    std::optional<StopReport> check_start();
     std::optional<StopReport> step();
     std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);

@@ -50,7 +50,7 @@ public:
     double error(const EndedRun& other) override {
         RunSummary& s = run_->summary;
         if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
-            s.warnings.push_back("too few elements for a coarser run to compare with: the error is unknown");
+            s.warnings.emplace_back("too few elements for a coarser run to compare with: the error is unknown");
         else if (!comparable(other.stop, s.stop, case_.time.end))
             s.warnings.push_back(
                 fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is unknown",

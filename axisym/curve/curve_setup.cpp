@@ -14,7 +14,7 @@ namespace {
 // Measured choices: docs/decisions.md, "Curves in motion".
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
-constexpr double seam_size = 0.15, seam_per_accuracy = 5, seam_order = 2;
+constexpr double seam_size = 0.15, seam_per_accuracy = 5;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
@@ -38,13 +38,16 @@ double gauge_of(const Case& c, double energy, double area) {
     return law.viscosity != 0 ? energy * c.model.Re : energy;
 }
 
-// Elements of the asked size, small ones at seams.
-std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, double accuracy) {
+// Elements of the asked size, small ones at seams. These shrink faster than the rest, for the error is of first order
+// there and the difference of a pair must exceed it; not in a fluid, whose waves they make shorter: ten times the
+// steps.
+std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Case& c) {
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
-    // Faster than the rest, for the error is of first order there: the difference of a pair must exceed it.
-    const double shrunk = std::pow(first_curve_elements * size, seam_order);
-    const double at_seam = std::min(seam_size / first_curve_elements, seam_per_accuracy * accuracy) * shrunk;
+    const bool inertia = motion_law(c.model).inertia != 0;
+    const double shrunk = std::pow(first_curve_elements * size, 2),
+                 largest = seam_size * (inertia ? size : shrunk / first_curve_elements);
+    const double at_seam = std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk);
     return seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam);
 }
 
@@ -77,9 +80,8 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
     const int degree = c.discretisation.order;
-    space =
-        std::make_unique<CurveSpace>(start.meridian.topology, first_breaks(arc, settings, c.accuracy.energy), degree,
-                                     c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
+    space = std::make_unique<CurveSpace>(start.meridian.topology, first_breaks(arc, settings, c), degree,
+                                         c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
     const CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
     reference_energy = forms.reference_energy(x);
@@ -131,8 +133,8 @@ CurveBegin begin_state(const CurveSetup& setup) {
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     std::optional<CurveMotion::Start> consistent;
-    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast; and over before
-    // the first output.
+    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast; and over
+    // before the first output.
     double h = std::min(1e-10 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
                         0.1 * OutputTimes(setup.c).next());
     for (int tries = 0; !consistent; ++tries) try {

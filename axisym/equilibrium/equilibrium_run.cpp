@@ -266,7 +266,7 @@ std::string advice_for(Stop stop) {
 }
 
 // Writes the shape, or those of the branch, and says how it ended.
-StopReport find_shapes(const Task& task, Writer& write) {
+StopReport find_shapes(const Task& task, Writer& write, const RunClock& clock) {
     const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
     if (first.stop != Stop::finished || !task.set) {
         BranchPoint only;
@@ -278,7 +278,10 @@ StopReport find_shapes(const Task& task, Writer& write) {
                 advice_for(first.stop)};
     }
     BranchSettings settings = task.branch;
-    settings.found = [&](const BranchPoint& point) { write(point); };
+    settings.found = [&](const BranchPoint& point) {
+        write(point);
+        clock.pause_if_due();
+    };
     const Branch branch = follow_branch(task.problem, first, task.set, settings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
             advice_for(branch.stop)};
@@ -300,7 +303,7 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
     Writer write(c, task, observer);
     StopReport stop;
     try {
-        stop = find_shapes(task, write);
+        stop = find_shapes(task, write, clock);
     } catch (const Paused& pause) {
         stop = pause_report(pause, 0);
         stop.message += " before all shapes were found";
@@ -310,7 +313,7 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
     s.energy = write.last().observed.energy;
     s.reference_energy = write.last().reference_energy;
     s.elements = write.count() > 0 ? elements_of(write.last()) : 0;
-    s.estimated_error = write.worst();
+    s.estimated_error = write.count() > 0 ? write.worst() : 1;
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
     stop.time = std::max(write.count() - 1, 0);
     s.stop = stop;

@@ -278,6 +278,32 @@ void check_neck(Keys& k, const Case& c) {
         c.shape);
 }
 
+// Of equilibria of tier axisym.
+template <class Keys>
+void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
+    k.check("model.volume",
+            [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
+    k.check("model.kind", [&] {
+        return c.equilibrium->modes && law.inertia != 0
+                   ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
+                                 name(c.model))
+                   : "";
+    });
+    k.check("equilibrium.volume", [&]() -> std::string {
+        const EquilibriumChoices& e = *c.equilibrium;
+        if (is_tube(c.shape) || !e.area || !e.volume) return {};
+        const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
+        if (*e.volume <= most) return {};
+        return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);
+    });
+    k.check("shape.kind", [&] {
+        return std::holds_alternative<Torus>(c.shape)
+                   ? "must not be \"torus\": equilibria are closed cells, or tubes with "
+                     "mirror symmetry"
+                   : "";
+    });
+}
+
 // Conditions across tables.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
@@ -317,29 +343,7 @@ void check_together(Keys& k, const Case& c) {
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
     });
-    if (c.equilibrium) {
-        k.check("model.volume",
-                [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
-        k.check("model.kind", [&] {
-            return c.equilibrium->modes && law.inertia != 0
-                       ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
-                                     name(c.model))
-                       : "";
-        });
-        k.check("equilibrium.volume", [&]() -> std::string {
-            const EquilibriumChoices& e = *c.equilibrium;
-            if (is_tube(c.shape) || !e.area || !e.volume) return {};
-            const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
-            if (*e.volume <= most) return {};
-            return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);
-        });
-        k.check("shape.kind", [&] {
-            return std::holds_alternative<Torus>(c.shape)
-                       ? "must not be \"torus\": equilibria are closed cells, or tubes with "
-                         "mirror symmetry"
-                       : "";
-        });
-    }
+    if (c.equilibrium) check_equilibrium_keys(k, c, law);
     check_neck(k, c);
 }
 

@@ -44,7 +44,7 @@ TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
         RunSummary s;
         for (int times = 0;; ++times) {
             ASSERT_LT(times, 100);
-            watch.looks = 0, watch.most_looks = whole.counters.steps / 5;
+            watch.looks = 0, watch.most_looks = undisturbed.looks / 8;
             s = run(c, watch, restart ? &*restart : nullptr);
             if (s.stop.reason != Stop::interrupted) break;
             coarser += s.stop.message.find("of the coarser run") != std::string::npos;

@@ -84,7 +84,7 @@ class Equilibrium(ProgramTest):
         self.assertEqual(err, f"{self.case}: is a time-dependent case: an equilibrium needs a table [equilibrium]\n")
         cell = self.write("cell.toml", CASE)
         _, err = self.tubule("equilibrium", cell, "--set", "equilibrium.area=1.0", status=2)
-        self.assertEqual(err, f"{cell}: equilibrium: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere\n")
+        self.assertEqual(err, f"{cell}: equilibrium.area: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere\n")
         self.assertEqual(self.files(), {"case.toml", "cell.toml"})
 
 

@@ -54,7 +54,7 @@ def at_rest(start, exact, bounds, accuracy=1e-9, mesh="uniform", must_fall=True)
     tier 1. In 3D the surface is at rest, so curvatures are those of the patch recovery."""
 
     def measure(tools, cost):
-        still = changed(start, time={"end": 1e-9, "output": []})
+        still = changed(start, time={"end": 1e-6, "output": []})
         fine, loose = (axisym(tools, cost, still, asked) for asked in (accuracy, accuracy * LOOSER))
         values, other = beginning(fine), beginning(loose)
         rows = []
