@@ -14,7 +14,7 @@ namespace {
 
 // Measured choices: docs/decisions.md, "Time and memory".
 constexpr double always_there = 1e8;              // less is not worth a look
-constexpr double multiplications_a_second = 1e9;  // of a sparse factorisation, one thread
+constexpr double multiplications_a_second = 3e9;  // of a sparse factorisation, one thread
 
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 

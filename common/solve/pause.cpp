@@ -6,7 +6,7 @@
 namespace tubule {
 namespace {
 
-constexpr double patience = 0.5;  // seconds in which a step may come to its end
+constexpr double patience = 0.25;  // seconds in which a step may come to its end
 
 thread_local PauseWatch* current = nullptr;
 

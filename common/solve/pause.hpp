@@ -46,9 +46,9 @@ private:
 };
 
 // Asked within steps and starts, whose work is lost by a pause: throws Paused where the innermost watch of this thread
-// has been due for half a second. Each watch throws once: what saves the state afterwards is left alone. `ahead`: the
-// seconds that work will take which nothing can end; a limit that this would exceed by much is as good as passed.
-// To be called outside parallel regions, and from no callback of a C library.
+// has been due for a quarter of a second. Each watch throws once: what saves the state afterwards is left alone.
+// `ahead`: the seconds that work will take which nothing can end; a limit that this would exceed by much is as good as
+// passed. To be called outside parallel regions, and from no callback of a C library.
 void check_pause(double ahead = 0);
 
 // The same for loops on several threads and for callbacks. Made outside of them; asked anywhere.

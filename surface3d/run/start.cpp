@@ -29,7 +29,7 @@ constexpr double jitter = 0.2;
 constexpr unsigned seed = 1;
 
 // For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions.md, "Time and memory".
-constexpr double bytes_per_cell_entry = 36;
+constexpr double bytes_per_cell_entry = 45;
 
 // What a step solves for: velocity, H and K, and a pressure.
 int fields_of(const SurfaceLaw& law) {

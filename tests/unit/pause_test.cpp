@@ -53,7 +53,7 @@ TEST(Pause, anInterruptLeavesAStepTheTimeToEnd) {
     EXPECT_FALSE(watch.due());
     raised = true;
     EXPECT_EQ(watch.due().value().reason, Stop::interrupted);
-    EXPECT_NO_THROW(check_pause());         // half a second
+    EXPECT_NO_THROW(check_pause());         // a quarter of a second
     EXPECT_THROW(check_pause(10), Paused);  // which is too short for this
 }
 
