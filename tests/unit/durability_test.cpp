@@ -341,6 +341,7 @@ void expect_resumable(const fs::path& file, Model model) {
     }
 }
 
+// Long: one run, killed once at each of its operations, and all that must hold afterwards.
 TEST_F(Durability, KilledAtEveryOperationOfARun) {
     const auto& steps = run;
     Model old;

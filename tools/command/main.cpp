@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Core>
 #include <algorithm>
 #include <exception>
 #include <sstream>
@@ -58,6 +59,8 @@ int main(int argc, char** argv) {
     tubule::secure_streams();
     // Whatever the environment asks for: more threads than processors only wait, and too many cannot be started.
     omp_set_num_threads(std::min(omp_get_max_threads(), omp_get_num_procs()));
+    // Dense matrices are small here: threads of a product would spend their time waiting for each other.
+    Eigen::setNbThreads(1);
     try {
         return run(argc, argv);
     } catch (const tubule::CaseError& error) {
