@@ -26,6 +26,10 @@ double PauseWatch::seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
 }
 
+void PauseWatch::discount(double seconds) {
+    started_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(seconds));
+}
+
 std::optional<Paused> PauseWatch::due() const {
     if (limit_ && seconds() > *limit_) return Paused{Stop::time_limit, limit_};
     if (interrupted_()) return Paused{Stop::interrupted, limit_};

@@ -29,6 +29,8 @@ public:
     PauseWatch& operator=(const PauseWatch&) = delete;
 
     double seconds() const;
+    // That much of the time past does not count. For the outermost watch, before others are made.
+    void discount(double seconds);
     // Why it is time to pause, if it is: asked between steps, where the state is at hand.
     std::optional<Paused> due() const;
 
