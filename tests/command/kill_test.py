@@ -298,7 +298,7 @@ class Resume(ProgramTest):
         self.assertEqual(self.result.read_bytes(), before)
 
     def test_another_case_is_refused(self):
-        self.tubule("run", self.case, "--set", "time.limit=1e-9", status=5)
+        self.tubule("run", self.case, "--set", "time.limit=1e-9", "--set", "energy.k20=2", status=5)
         before = self.result.read_bytes()
         self.assertIn("another case or other --set", self.tubule("run", self.case, "--resume", status=2)[1])
         other = self.write("other.toml", QUICK.replace("0.12", "0.13"))
