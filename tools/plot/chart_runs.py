@@ -21,6 +21,7 @@ from pathlib import Path
 LARGEST_GROWTH = 1.1  # of the total energy over that of the start; more counts as unstable
 STATUS = {2: "refused", 130: "interrupted"}
 PR_SET_PDEATHSIG = 1
+INTERRUPTS = {signal.SIGINT, signal.SIGTERM}
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,7 @@ class Going:
 
 def die_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)  # blocked while the run is started
 
 
 def set_options(job):
@@ -287,12 +289,15 @@ class Runner:
     def start_some(self, left, going):
         while left and len(going) < self.at_once:
             self.number += 1
+            signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)  # between the start and `going` they would lose the run
             try:
                 going.append(self.program.start(left[0], self.number))
             except OSError:  # no more processes, or files, are to be had
                 if not going:
                     raise
                 return
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
             left.pop(0)
 
     def take(self, job, run, ended):
