@@ -15,6 +15,7 @@ public:
     // A run resumes here: forgets everything later.
     void cut_after(double t);
     bool empty() const { return time_.empty(); }
+    int size() const { return static_cast<int>(time_.size()); }
     double end() const { return time_.back(); }
 
     // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
