@@ -2,11 +2,33 @@
 
 #include <Eigen/LU>
 
+#include "common/solve/parallel.hpp"
+
 namespace tubule {
 namespace {
 
 constexpr double regularisation = 1e-5, tolerance = 1e-11;
 constexpr int most_iterations = 60;
+
+// A x by parts, on all threads. The number of parts does not depend on that of threads, nor do sums.
+class Product {
+public:
+    explicit Product(const Eigen::SparseMatrix<double>& A) : A_(A), sums_(A.rows(), parts) {}
+    template <class In, class Out>
+    void operator()(const In& x, Out&& y) {
+        parallel_for(parts, [&](std::size_t part) {
+            const auto begin = [&](std::size_t p) { return static_cast<Eigen::Index>(p) * A_.cols() / parts; };
+            const Eigen::Index first = begin(part), count = begin(part + 1) - first;
+            sums_.col(part).noalias() = A_.middleCols(first, count) * x.segment(first, count);
+        });
+        y = sums_.rowwise().sum();
+    }
+
+private:
+    static constexpr int parts = 4;
+    const Eigen::SparseMatrix<double>& A_;
+    Eigen::Matrix<double, Eigen::Dynamic, parts> sums_;
+};
 
 }  // namespace
 
@@ -33,8 +55,9 @@ BorderedSolver::Answer BorderedSolver::iterate(const Eigen::SparseMatrix<double>
     for (int j = 0; j < m; ++j) W.col(j) = factors_.solve(C.col(j));
     const Eigen::MatrixXd S = C.transpose() * W;
     const Eigen::PartialPivLU<Eigen::MatrixXd> schur(m > 0 ? S : Eigen::MatrixXd::Identity(1, 1).eval());
+    Product product(A);
     const Gmres::Operator whole = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {
-        y.head(n).noalias() = A * x.head(n);
+        product(x.head(n), y.head(n));
         if (m == 0) return;
         y.head(n).noalias() += C * x.tail(m);
         y.tail(m).noalias() = C.transpose() * x.head(n);

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
+
+#include "common/solve/parallel.hpp"
 
 // <cblas.h> is another library's on some systems.
 extern "C" {
@@ -56,10 +59,12 @@ void divide_by_transposed(int m, int n, const double* L, int ldl, double* B, int
 template <class Scalar>
 void subtract_below(int rows, int columns, int k, const Scalar* A, int lda, const Scalar* B, int ldb, Scalar* C,
                     std::ptrdiff_t ldc, bool parallel) {
-#pragma omp parallel for schedule(dynamic, 1) if (parallel)
-    for (int j = 0; j < columns; j += tile_columns)
+    const auto tile = [&](std::size_t t) {
+        const auto j = static_cast<int>(t) * tile_columns;
         subtract_product(rows - j, std::min(tile_columns, columns - j), k, A + j, lda, B + j, ldb, C + j + j * ldc,
                          static_cast<int>(ldc));
+    };
+    parallel_for(static_cast<std::size_t>((columns + tile_columns - 1) / tile_columns), tile, parallel);
 }
 
 // Of the lower triangle of A (n x n), in place and column by column.
@@ -116,11 +121,13 @@ Elimination eliminate(const Front<Scalar>& f, Scalar* scratch, double smallest_p
             found.failed += k;
             return found;
         }
-        double growth = found.growth;
-#pragma omp parallel for reduction(max : growth) if (parallel)
-        for (int i = next; i < m; i += tile_rows)
-            eliminate_rows(std::min(tile_rows, m - i), width, block, columns + i, products + i, m, growth);
-        found.growth = growth;
+        std::vector<double> growth(static_cast<std::size_t>((m - next + tile_rows - 1) / tile_rows), found.growth);
+        const auto tile = [&](std::size_t t) {
+            const int i = next + static_cast<int>(t) * tile_rows;
+            eliminate_rows(std::min(tile_rows, m - i), width, block, columns + i, products + i, m, growth[t]);
+        };
+        parallel_for(growth.size(), tile, parallel);
+        for (const double g : growth) found.growth = std::max(found.growth, g);
         if (next < n)
             subtract_below(m - next, n - next, width, columns + next, m, products + next, m, f.panel + next * ld + next,
                            ld, parallel);

@@ -1,10 +1,10 @@
 #include "common/solve/sparse_ldlt.hpp"
 
 #include <fmt/core.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/solve/memory.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse_engine.hpp"
 #include "common/solve/sparse_front.hpp"
@@ -24,8 +25,8 @@ using Matrix = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
 using std::ptrdiff_t;
 
-// Multiplications from which on a second thread is worth waking; it may take its time where others want it as well.
-constexpr double worth_a_thread = 1e7;
+// Multiplications from which on a second thread is worth waking: they take about ten times as long as that.
+constexpr double worth_a_thread = 5e5;
 
 double multiplications(double rows, double columns) {
     return columns * (rows * (rows - columns) + columns * columns / 3);
@@ -213,7 +214,7 @@ struct SparseLdlt<Scalar>::Impl {
             panel_at.push_back(panel_at.back() + size);
             scratch_size = std::max(scratch_size, size);
         }
-        const auto entries = static_cast<double>(panel_at.back() + updates.size + omp_get_max_threads() * scratch_size);
+        const auto entries = static_cast<double>(panel_at.back() + updates.size + loop_threads() * scratch_size);
         require_memory(entries * sizeof(Scalar), fmt::format("the factors of a matrix of size {}", tree.size));
         panels.reset(new Scalar[panel_at.back()]);
         update_data.reset(new Scalar[updates.size]);
@@ -279,43 +280,44 @@ struct SparseLdlt<Scalar>::Impl {
         const int* const place = tree.place_in_parent.data() + tree.row_begin[child] + tree.columns_of(child);
         const Scalar* const from = update_data.get() + updates.at[child];
         const ptrdiff_t left = f.rows - f.columns;
-#pragma omp parallel for schedule(dynamic, 16) if (parallel)
-        for (int j = 0; j < below; ++j) {
-            const Scalar* const column = from + ptrdiff_t{j} * below;
+        const auto add_column = [&](ptrdiff_t j) {
+            const Scalar* const column = from + j * below;
             Scalar* const to = place[j] < f.columns ? f.panel + ptrdiff_t{place[j]} * f.rows
                                                     : f.update + (place[j] - f.columns) * left - f.columns;
-            for (int i = j; i < below; ++i) to[place[i]] += column[i];
-        }
+            for (ptrdiff_t i = j; i < below; ++i) to[place[i]] += column[i];
+        };
+        parallel_for(static_cast<std::size_t>(below), add_column, parallel);
     }
 
-    void eliminate_supernode(const View& A, int s, bool parallel) {
+    void eliminate_supernode(const View& A, int s, int thread, bool parallel) {
         const Front<Scalar> f = front(s);
         const ptrdiff_t left = f.rows - f.columns;
         std::fill_n(f.panel, ptrdiff_t{f.rows} * f.columns, Scalar(0));
         insert_matrix(A, s, f);
         for (ptrdiff_t j = 0; j < left; ++j) std::fill_n(f.update + j * left + j, left - j, Scalar(0));
         for (const int child : children[s]) add_child(child, f, parallel);
-        auto& own = scratch[omp_get_thread_num()];
+        auto& own = scratch[thread];
         if (!own) own.reset(new Scalar[scratch_size]);
         eliminations[s] = eliminate(f, own.get(), smallest_pivot, parallel);
     }
 
     void eliminate_all(const View& A) {
-        if (static_cast<int>(scratch.size()) < omp_get_max_threads()) scratch.resize(omp_get_max_threads());
+        if (static_cast<int>(scratch.size()) < loop_threads()) scratch.resize(loop_threads());
         eliminations.assign(tree.count(), {});
         // Once a pivot has failed, or it is time to pause, the rest is of no use.
-        bool failed = false;
+        std::atomic<bool> failed = false;
         SharedPause pause;
-#pragma omp parallel for schedule(dynamic, 1) reduction(|| : failed) if (groups.work > worth_a_thread)
-        for (std::size_t g = 0; g < groups.subtrees.size(); ++g)
+        const auto subtree = [&](std::size_t g, int thread) {
             for (const int s : groups.subtrees[g]) {
                 if (failed || pause.look(s)) break;
-                eliminate_supernode(A, s, false);
-                failed = eliminations[s].failed >= 0;
+                eliminate_supernode(A, s, thread, false);
+                if (eliminations[s].failed >= 0) failed = true;
             }
+        };
+        parallel_for(groups.subtrees.size(), subtree, groups.work > worth_a_thread);
         for (const int s : groups.top) {
             if (failed || pause.look()) break;
-            eliminate_supernode(A, s, multiplications(tree.rows_of(s), tree.columns_of(s)) > worth_a_thread);
+            eliminate_supernode(A, s, 0, multiplications(tree.rows_of(s), tree.columns_of(s)) > worth_a_thread);
             failed = eliminations[s].failed >= 0;
         }
         pause.check();
@@ -370,14 +372,16 @@ struct SparseLdlt<Scalar>::Impl {
 
     void solve_all() const {
         const bool parallel = static_cast<double>(counters.fill) > worth_a_thread;
-#pragma omp parallel for schedule(dynamic, 1) if (parallel)
-        for (std::size_t g = 0; g < groups.subtrees.size(); ++g)
+        const auto forward = [&](std::size_t g) {
             for (const int s : groups.subtrees[g]) solve_forward(s);
+        };
+        const auto backward = [&](std::size_t g) {
+            for (auto s = groups.subtrees[g].rbegin(); s != groups.subtrees[g].rend(); ++s) solve_backward(*s);
+        };
+        parallel_for(groups.subtrees.size(), forward, parallel);
         for (const int s : groups.top) solve_forward(s);
         for (auto s = groups.top.rbegin(); s != groups.top.rend(); ++s) solve_backward(*s);
-#pragma omp parallel for schedule(dynamic, 1) if (parallel)
-        for (std::size_t g = 0; g < groups.subtrees.size(); ++g)
-            for (auto s = groups.subtrees[g].rbegin(); s != groups.subtrees[g].rend(); ++s) solve_backward(*s);
+        parallel_for(groups.subtrees.size(), backward, parallel);
     }
 };
 

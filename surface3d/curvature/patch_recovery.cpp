@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <optional>
 #include <set>
 
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/fem/projection.hpp"
@@ -80,28 +82,28 @@ PatchRecovery::PatchRecovery(const CurvedMesh& mesh)
 }
 
 std::vector<PolynomialGraph> PatchRecovery::fit(const CurvedMesh& mesh) const {
-    const int n_patches = static_cast<int>(patches_.size());
-    std::vector<PolynomialGraph> graphs(n_patches);
+    std::vector<PolynomialGraph> graphs(patches_.size());
     SharedPause pause;
-#pragma omp parallel
-    {
-        GraphFit fit(degree_, most_members_);
-        Eigen::Matrix3Xd points(3, most_members_);
-#pragma omp for schedule(static)
-        for (int i = 0; i < n_patches; ++i) {
-            if (pause.look(i)) continue;
-            const Patch& patch = patches_[i];
-            Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-            for (const auto& [cell, c] : patch.corners)
-                normal += tangent_point(cell_nodes(mesh, cell), corner_table_, c).normal;
-            const int n = static_cast<int>(patch.members.size());
-            for (int r = 0; r < n; ++r) {
-                const auto& [node, by] = patch.members[r];
-                points.col(r) = mesh.nodes[node] + by * mesh.period * Eigen::Vector3d::UnitZ();
-            }
-            graphs[i] = fit(mesh.nodes[patch.vertex], normal.normalized(), points.leftCols(n));
+    struct Own {  // of a thread
+        GraphFit fit;
+        Eigen::Matrix3Xd points;
+    };
+    std::vector<std::optional<Own>> all(loop_threads());
+    parallel_for(patches_.size(), [&](std::size_t i, int thread) {
+        if (pause.look(i)) return;
+        if (!all[thread]) all[thread].emplace(Own{{degree_, most_members_}, Eigen::Matrix3Xd(3, most_members_)});
+        auto& [fit, points] = *all[thread];
+        const Patch& patch = patches_[i];
+        Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+        for (const auto& [cell, c] : patch.corners)
+            normal += tangent_point(cell_nodes(mesh, cell), corner_table_, c).normal;
+        const int n = static_cast<int>(patch.members.size());
+        for (int r = 0; r < n; ++r) {
+            const auto& [node, by] = patch.members[r];
+            points.col(r) = mesh.nodes[node] + by * mesh.period * Eigen::Vector3d::UnitZ();
         }
-    }
+        graphs[i] = fit(mesh.nodes[patch.vertex], normal.normalized(), points.leftCols(n));
+    });
     pause.check();
     return graphs;
 }
@@ -120,15 +122,14 @@ Eigen::Vector3d PatchRecovery::position(const std::vector<PolynomialGraph>& grap
 CurvatureField PatchRecovery::nodal(const CurvedMesh& mesh) const {
     const std::vector<PolynomialGraph> graphs = fit(mesh);
     Columns11 values(11, mesh.size());
-#pragma omp parallel for schedule(static)
-    for (int node = 0; node < mesh.size(); ++node) {
+    parallel_for(mesh.nodes.size(), [&](std::size_t node) {
         Column11 mean = Column11::Zero();
         for (const auto& [patch, by, weight] : shares_[node]) {
             const Eigen::Vector3d x = mesh.nodes[node] + by * mesh.period * Eigen::Vector3d::UnitZ();
             mean += weight * column_of(graphs[patch].at(x));
         }
         values.col(node) = mean;
-    }
+    });
     return field_of(values);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/geometry/surface_point.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
@@ -64,19 +65,15 @@ public:
     template <class CellWork>
     void for_each_cell(CellWork&& cell_work) const {
         SharedPause pause;
-#pragma omp parallel
-        for (const std::vector<int>& colour : colours_) {
-#pragma omp for schedule(static)
-            for (std::size_t i = 0; i < colour.size(); ++i)
+        for (const std::vector<int>& colour : colours_)
+            parallel_for(colour.size(), [&](std::size_t i) {
                 if (!pause.look(i)) cell_work(colour[i]);
-        }
+            });
         pause.check();
     }
 
     // A zero matrix of the right pattern, and the sum of cell matrices into it.
-    const Eigen::SparseMatrix<double>& pattern() const {
-        return pattern_;
-    }
+    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
     void add(Eigen::SparseMatrix<double>& A, int cell, const CellMatrix& block) const {
         const int* slot = &slots_[static_cast<std::size_t>(cell) * width_ * width_];
         for (int i = 0; i < width_ * width_; ++i) A.valuePtr()[slot[i]] += block.data()[i];

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/curvature/polynomial_graph.hpp"
 #include "surface3d/fem/surface_space.hpp"
@@ -233,8 +234,7 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
     for (int s = 0; s < n_spans; ++s) r.spans.push_back(0.5 * length * std::pow(0.6, n_spans - 1 - s));
     r.defect = Eigen::MatrixXd::Zero(samples + 1, n_spans);
     SharedPause pause;
-#pragma omp parallel
-    {
+    parallel_for(samples + 1, [&](std::size_t i) {
         CurveDefect curve_defect(order);
         PatchDefect patch_defect(order);
         const auto defect = [&](double t, double theta, double dt, double dtheta) {
@@ -248,14 +248,12 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
                                   return point(p.x + x * dt * p.along + y * dtheta * p.around, p.along, p.around);
                               }));
         };
-#pragma omp for schedule(static)
-        for (int i = 0; i <= samples; ++i)
-            for (int m = 0; m < different && !pause.look(); ++m)
-                for (int s = 0; s < n_spans; ++s)
-                    r.defect(i, s) =
-                        std::max(r.defect(i, s), defect(parameter(i), 2 * pi * m / meridians, r.spans[s] / r.speed[i],
-                                                        r.spans[s] / (r.around[i] / (2 * pi))));
-    }
+        for (int m = 0; m < different && !pause.look(); ++m)
+            for (int s = 0; s < n_spans; ++s)
+                r.defect(i, s) =
+                    std::max(r.defect(i, s), defect(parameter(i), 2 * pi * m / meridians, r.spans[s] / r.speed[i],
+                                                    r.spans[s] / (r.around[i] / (2 * pi))));
+    });
     pause.check();
     return r;
 }

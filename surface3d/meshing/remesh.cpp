@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/mesh/half_edges.hpp"
@@ -283,21 +284,20 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
     out.fields.setZero(fields.rows(), out.mesh.size());
     std::vector<double> moved(nodes.size());
     SharedPause pause;
-#pragma omp parallel for schedule(static)
-    for (int i = 0; i < out.mesh.size(); ++i) {
-        if (pause.look(i)) continue;
+    parallel_for(nodes.size(), [&](std::size_t i) {
+        if (pause.look(i)) return;
         NewNode& node = nodes[i];
         node.foot = w.closest(node.flat, node.normal);
-        if (node.foot.cell < 0) continue;
+        if (node.foot.cell < 0) return;
         const double up = node.foot.periods * old.period;
         const Vector3d x = node.foot.x - up * Vector3d::UnitZ();
         const Vector3d smooth = recovery.position(graphs, old, node.foot.cell, node.foot.at, x);
         moved[i] = (smooth - x).norm() / node.width;
         out.mesh.nodes[i] = smooth + (up - node.shift * old.period) * Vector3d::UnitZ();
-        if (fields.rows() == 0) continue;
+        if (fields.rows() == 0) return;
         const Eigen::VectorXd phi = functions_at(old.order, node.foot.at);
         for (int a = 0; a < n; ++a) out.fields.col(i) += phi[a] * fields.col(old.node(node.foot.cell, a));
-    }
+    });
     pause.check();
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         if (!(nodes[i].foot.distance < near_foot * nodes[i].width))

@@ -122,42 +122,49 @@ Eigen::VectorXd MovingSurface::pressure_at_nodes(const MotionState& state) const
     return out;
 }
 
-// Velocities at the nodes, a column each, component by component: translations, and rotations that the
-// surface allows.
 Eigen::MatrixXd MovingSurface::rigid_motions(const CurvedMesh& mesh) const {
+    Places at(4, nodes());
+    at << Eigen::RowVectorXd::Ones(nodes()), node_positions(mesh);
+    return rigid_motions(at, mesh.period > 0);
+}
+
+// Velocities, a column each, component by component: translations, and rotations that the surface allows.
+Eigen::MatrixXd MovingSurface::rigid_motions(const Places& at, bool tube) const {
     const int n = nodes();
-    const bool tube = mesh.period > 0;
-    const VectorField x = node_positions(mesh);
     Eigen::MatrixXd out(3 * n, tube ? 4 : 6);
     for (int motion = 0; motion < out.cols(); ++motion) {
         const int axis = tube && motion == 3 ? 2 : motion % 3;
         const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
         for (int d = 0; d < 3; ++d) {
             const int j = (d + 1) % 3, k = (d + 2) % 3;
-            out.col(motion).segment(d * n, n) = motion < 3 ? Eigen::VectorXd::Constant(n, e[d])
-                                                           : (e[j] * x.row(k) - e[k] * x.row(j)).transpose().eval();
+            auto to = out.col(motion).segment(d * n, n);
+            if (motion < 3)
+                to = e[d] * at.row(0).transpose();
+            else
+                to = (e[j] * at.row(1 + k) - e[k] * at.row(1 + j)).transpose();
         }
     }
     return out;
 }
 
-// (r, v) of these motions r: momentum and angular momentum of a velocity v, except for the density.
-Eigen::MatrixXd MovingSurface::momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const {
-    const Eigen::SparseMatrix<double> mass = mass_matrix(space_, mesh);
-    const int n = nodes();
-    Eigen::MatrixXd out(motions.rows(), motions.cols());
-    for (int d = 0; d < 3; ++d) out.middleRows(d * n, n) = mass * motions.middleRows(d * n, n);
-    return out;
+// (r, v) of these motions r: momentum and angular momentum of a velocity v, except for the density. P_k holds 1 and x,
+// so that no mass matrix is needed.
+Eigen::MatrixXd MovingSurface::momenta(const CurvedMesh& mesh) const {
+    const Tabulation& table = space_.tabulation();
+    const Places at = load<4>(space_, mesh, [&](int, const CellColumns<3>& X, int q, CellColumns<4>& sum) {
+        const SurfacePoint<double> p = tangent_point(X, table, q);
+        sum += (table.weight[q] * p.area * Eigen::Vector4d(1, p.x[0], p.x[1], p.x[2])) * table.value.col(q).transpose();
+    });
+    return rigid_motions(at, mesh.period > 0);
 }
 
 Eigen::MatrixXd MovingSurface::open_rigid_motions(const CurvedMesh& mesh) const {
-    return holds_rigid_motions_ ? momenta(mesh, rigid_motions(mesh)) : Eigen::MatrixXd(0, 0);
+    return holds_rigid_motions_ ? momenta(mesh) : Eigen::MatrixXd(0, 0);
 }
 
 Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
     if (!law_.flows || law_.inertia == 0) return {};
-    const CurvedMesh m = mesh(state.X);
-    return momenta(m, rigid_motions(m)).transpose() * state.u;
+    return momenta(mesh(state.X)).transpose() * state.u;
 }
 
 Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau) const {
@@ -170,7 +177,7 @@ Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau
 void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
     if (kept.size() == 0) return;
     const CurvedMesh m = mesh(to.X);
-    const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m, motions);
+    const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m);
     const Eigen::VectorXd lack = kept - of.transpose() * to.u;
     const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
     to.u += back;

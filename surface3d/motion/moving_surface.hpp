@@ -83,8 +83,11 @@ public:
     Correction correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
 
 private:
+    // 1 and x at the nodes, or their integrals against each function: one column a node.
+    using Places = Eigen::Matrix<double, 4, Eigen::Dynamic>;
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
-    Eigen::MatrixXd momenta(const CurvedMesh& mesh, const Eigen::MatrixXd& motions) const;
+    Eigen::MatrixXd rigid_motions(const Places& at, bool tube) const;
+    Eigen::MatrixXd momenta(const CurvedMesh& mesh) const;
     Extent lack(const CurvedMesh& mesh) const;
     double lack_of_volume(const CurvedMesh& mesh) const;
 

@@ -1,5 +1,7 @@
 #include "surface3d/motion/step_solver.hpp"
 
+#include "common/solve/parallel.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -49,8 +51,11 @@ void StepSolver::make_symmetric(const StepBase& base) {
         if (unknowns_.H >= 0) scale[unknowns_.H + i] = factor(f.HH);
         if (unknowns_.K >= 0) scale[unknowns_.K + i] = factor(f.KK);
     }
-    for (Eigen::Index k = 0; k < system_.A.nonZeros(); ++k)
-        system_.A.valuePtr()[k] *= scale[system_.A.innerIndexPtr()[k]];
+    Eigen::SparseMatrix<double>& A = system_.A;
+    parallel_for(static_cast<std::size_t>(A.cols()), [&](std::size_t j) {
+        for (int k = A.outerIndexPtr()[j]; k < A.outerIndexPtr()[j + 1]; ++k)
+            A.valuePtr()[k] *= scale[A.innerIndexPtr()[k]];
+    });
     system_.b.array() *= scale.array();
 }
 

@@ -122,6 +122,12 @@ class Structure(unittest.TestCase):
                           and 'Many fields: ' not in comment_above(lines, i.first)]
         self.none_of(offenders)
 
+    def test_loops_are_not_those_of_openmp(self):
+        """They wait for each other by spinning: common/solve/parallel.hpp."""
+        self.none_of([f'{file.relative_to(root)}:{n}: {line.strip()}'
+                      for file in files('.cpp', '.hpp')
+                      for n, line in enumerate(file.read_text().split('\n'), 1) if line.lstrip().startswith('#pragma omp')])
+
     def test_nothing_names_a_place_on_one_machine(self):
         place_of_one = re.compile(r'(?<![\w.])/(?:home|root|work|mnt|srv)/')
         self.none_of([f'{file.relative_to(root)}:{n}: {line.strip()}'

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/parallel.hpp"
 #include "tools/compare/distance.hpp"
 #include "tools/compare/same_kind.hpp"
 
@@ -54,8 +55,9 @@ std::vector<Sample> quadrature_points(const Surface& surface, const Surface& oth
 
 std::vector<Foot> feet(const std::vector<Sample>& samples, const Surface& b, const RigidMotion& motion) {
     std::vector<Foot> out(samples.size());
-#pragma omp parallel for schedule(dynamic, 16) if (samples.size() > coarse_samples * 2)
-    for (std::size_t i = 0; i < samples.size(); ++i) out[i] = b.foot(motion(samples[i].x));
+    parallel_for(
+        samples.size(), [&](std::size_t i) { out[i] = b.foot(motion(samples[i].x)); },
+        samples.size() > coarse_samples * 2);
     return out;
 }
 
@@ -211,14 +213,13 @@ RigidMotion alignment(const Surface& a, const Surface& b) {
 
     std::vector<Fit> fits;
     for (const RigidMotion& begin : beginnings(a, b, all)) fits.push_back({begin, 0});
-#pragma omp parallel for schedule(dynamic, 4)
-    for (std::size_t i = 0; i < fits.size(); ++i) fits[i].mean_square = mean_square(few, feet(few, b, fits[i].motion));
+    parallel_for(fits.size(),
+                 [&](std::size_t i) { fits[i].mean_square = mean_square(few, feet(few, b, fits[i].motion)); });
     const auto better = [](const Fit& l, const Fit& r) { return l.mean_square < r.mean_square; };
     std::stable_sort(fits.begin() + 2, fits.end(), better);
     fits.resize(std::min(fits.size(), tried_closely + 2));
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = 0; i < fits.size(); ++i)
-        fits[i] = fitted(few, b, free, size, fits[i].motion, most_steps, coarse_gain);
+    parallel_for(fits.size(),
+                 [&](std::size_t i) { fits[i] = fitted(few, b, free, size, fits[i].motion, most_steps, coarse_gain); });
     // A symmetric shape fits in many ways: the smallest rotation is chosen.
     const double enough =
         as_good * std::min_element(fits.begin(), fits.end(), better)->mean_square + 1e-20 * size * size;

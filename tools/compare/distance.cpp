@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/parallel.hpp"
 #include "tools/compare/same_kind.hpp"
 
 namespace tubule::compare {
@@ -42,8 +43,7 @@ double climb(const Surface& from, const Surface& to, const RigidMotion& motion, 
 OneWay one_way(const Surface& from, const Surface& to, const RigidMotion& motion) {
     const std::vector<Sample> samples = from.samples(to.grain());
     std::vector<double> away(samples.size());
-#pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = 0; i < samples.size(); ++i) away[i] = to.foot(motion(samples[i].x)).distance;
+    parallel_for(samples.size(), [&](std::size_t i) { away[i] = to.foot(motion(samples[i].x)).distance; });
 
     OneWay out;
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -69,11 +69,10 @@ OneWay one_way(const Surface& from, const Surface& to, const RigidMotion& motion
         if (chosen.size() == pieces_searched || away[i] < out.largest / 2) break;
     }
     std::vector<double> higher(chosen.size());
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < chosen.size(); ++c) {
+    parallel_for(chosen.size(), [&](std::size_t c) {
         const Sample& sample = samples[chosen[c]];
         higher[c] = climb(from, to, motion, sample.place, sample.reach, away[chosen[c]]);
-    }
+    });
     for (std::size_t c = 0; c < chosen.size(); ++c)
         if (higher[c] > out.largest) out.largest = higher[c], out.where = samples[chosen[c]].x;
     return out;
