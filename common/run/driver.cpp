@@ -24,7 +24,8 @@ void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
 }  // namespace
 
 RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
-    for (;;) {
+    for (int number = 1;; ++number) {
+        watch.next_run(number, number);
         RunSummary& s = runs.next();
         s.estimated_error = std::max(s.estimated_error, rounding);
         s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;

@@ -19,9 +19,7 @@ public:
     bool reported() const { return reported_; }
     double seconds() const { return clock_.seconds(); }
     std::size_t mesh(const SurfaceCells& cells) { return watch_.mesh(cells); }
-    void progress(double time, double energy, double step) {
-        if (reported_) watch_.progress(time, energy, step);
-    }
+    void progress(double time, double energy, double step) { watch_.progress(time, energy, step); }
     // Output at this time has already been written by the interrupted run.
     void go_on_from(double time) { last_row_ = last_frame_ = time; }
 

@@ -58,12 +58,16 @@ RunPairs::RunPairs(PairedRuns& runs, const Case& c, RunObserver& watch, double b
 
 RunSummary& RunPairs::next() {
     if (!coarser_) {
+        ++number_;
+        watch_.next_run(number_, number_ + 1);
         if (!resumes_) runs_.show_start();
         RunSummary& other = runs_.run_coarser();
         if (can_go_on(other.stop.reason)) return unfinished(other);
         if (!reported_began_) watch_.discard();  // the start, and what the coarser run was saved with
         coarser_ = runs_.ended();
     }
+    ++number_;
+    watch_.next_run(number_, number_);
     RunSummary& s = runs_.run_reported(*coarser_);
     const double error = runs_.error(*coarser_);
     s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;

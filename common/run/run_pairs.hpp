@@ -64,6 +64,7 @@ private:
     RunObserver& watch_;
     double begin_time_;
     bool resumes_ = false, reported_began_ = false;  // a run; the one to be reported
+    int number_ = 0;                                 // of the run under way
     std::optional<EndedRun> coarser_;
 };
 

@@ -11,7 +11,8 @@
 namespace tubule {
 namespace {
 
-constexpr double bar_interval = 0.1, line_interval = 10;  // seconds
+constexpr double bar_interval = 0.1, line_interval = 10, first_line = 1;  // seconds
+constexpr double least_known = 0.05;  // of the time of the run: before, nothing is said of what is left
 
 }  // namespace
 
@@ -47,11 +48,16 @@ std::string duration(double seconds) {
 
 Progress::Progress(double begin, double end, ProgressStyle style)
     : begin_(begin), end_(end), style_(std::move(style)), last_time_(begin), last_wall_(style_.clock()) {
-    next_ = last_wall_ + style_.interval();
+    next_ = last_wall_ + std::min(style_.interval(), first_line);
 }
 
 Progress::~Progress() {
     if (drawn_) style_.wipe();
+}
+
+void Progress::next_run(int number, int of) {
+    run_ = of > 1 ? fmt::format("run {} of {}  ", number, of) : "";
+    last_time_ = begin_, last_wall_ = style_.clock(), speed_ = 0;
 }
 
 void Progress::operator()(double time, double energy, double step) {
@@ -61,6 +67,7 @@ void Progress::operator()(double time, double energy, double step) {
 }
 
 void Progress::show(double time, double energy, double step, double now) {
+    if (time < last_time_) last_time_ = begin_, speed_ = 0;  // the run has begun again
     // Steps grow by orders of magnitude during a run: only its recent speed says what is left.
     const double recent = (time - last_time_) / (now - last_wall_);
     speed_ = speed_ > 0 ? 0.7 * speed_ + 0.3 * recent : recent;
@@ -69,8 +76,10 @@ void Progress::show(double time, double energy, double step, double now) {
     next_ = now + style_.interval();
 
     const double fraction = std::clamp((time - begin_) / (end_ - begin_), 0.0, 1.0);
-    const auto words = fmt::format("{:3.0f}%  time {:.4g} of {:.4g}  energy {:.6g}  step {:.2g}  left {}",
-                                   100 * fraction, time, end_, energy, step, duration((end_ - time) / speed_));
+    auto words = fmt::format("{}{:3.0f}%  time {:.4g} of {:.4g}  energy {:.6g}  step {:.2g}", run_, 100 * fraction,
+                             time, end_, energy, step);
+    if (fraction >= least_known && speed_ > 0)
+        words += fmt::format("  left {}", duration(std::max(end_ - time, 0.0) / speed_));
     style_.show(static_cast<std::size_t>(fraction * ProgressStyle::bar_width), words);
     drawn_ = true;
 }

@@ -11,7 +11,7 @@ struct ProgressStyle {
     bool quiet = false;                    // nothing at all
     std::FILE* out = stderr;               // results go to stdout
     bool terminal = is_terminal(stderr);   // bar, redrawn at most 10 times a second; else a line every 10 s,
-                                           // the first after 10 s, so that short runs are silent
+                                           // the first after 1 s, so that short runs are silent
     std::function<double()> clock = wall;  // seconds
 
     static bool is_terminal(std::FILE* file);
@@ -32,6 +32,8 @@ public:
     Progress& operator=(const Progress&) = delete;
     ~Progress();
 
+    // A run begins, of so many as far as is known; it is named where there are several.
+    void next_run(int number, int of);
     // Call after every step with the time reached, the energy and the step size; costs one reading of the clock.
     void operator()(double time, double energy, double step);
 
@@ -39,6 +41,7 @@ private:
     void show(double time, double energy, double step, double now);
 
     double begin_, end_;
+    std::string run_;  // which one, in words
     ProgressStyle style_;
     double next_;  // when to show something again
     double last_time_, last_wall_;

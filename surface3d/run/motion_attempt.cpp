@@ -229,7 +229,7 @@ std::optional<StopReport> MotionAttempt::step() {
     trace.add(state_.time, now_.bending.energy);
     compare();
     write_row();
-    out_.progress(state_.time, now_.bending.energy, state_.step);
+    if (out_.reported()) out_.progress(state_.time, now_.bending.energy, state_.step);
     const bool at_output = left_until_output() <= 1e-12 * case_.time.end;
     auto stop = check_state();
     if (!stop) stop = check_crossing(at_output);

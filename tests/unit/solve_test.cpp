@@ -336,17 +336,19 @@ TEST(Progress, linesOffATerminal) {
             progress(0.005 * i, 5 - 0.0125 * i, 0.005);
         }
     }
-    // One line each 10 s. After 10 s: 80 steps, time 0.4 of 2; at 0.04 a second the other 1.6 take 40 s, and so on.
+    // After 1 s, then one line each 10 s. After 11 s: 88 steps, time 0.44 of 2; at 0.04 a second the other 1.56 take 39
+    // s, and so on. Before 5 percent nothing is said of what is left.
     EXPECT_EQ(screen.text(),
-              " 20%  time 0.4 of 2  energy 4  step 0.005  left 40 s\n"
-              " 40%  time 0.8 of 2  energy 3  step 0.005  left 30 s\n");
+              "  2%  time 0.04 of 2  energy 4.9  step 0.005\n"
+              " 22%  time 0.44 of 2  energy 3.9  step 0.005  left 39 s\n"
+              " 42%  time 0.84 of 2  energy 2.9  step 0.005  left 29 s\n");
 }
 
 TEST(Progress, shortRunsAreSilentOffATerminal) {
     Screen screen;
     {
         Progress progress(0, 1, screen.style(false));
-        screen.now += 9.9;
+        screen.now += 0.9;
         progress(0.99, 1, 0.1);
     }
     EXPECT_EQ(screen.text(), "");
@@ -390,6 +392,27 @@ TEST(Progress, aFullDiskDoesNotMatter) {
         screen.now += 100;
         EXPECT_NO_THROW(progress(0.5, 1, 0.1));
     }
+}
+
+// The second run is slower, and begins where the first one began: what is left is known from its own steps.
+TEST(Progress, namesTheRunAndIsNeverNegative) {
+    Screen screen;
+    Progress progress(0, 1, screen.style(false));
+    progress.next_run(1, 2);
+    screen.now += 10;
+    progress(0.75, 1, 0.1);
+    progress.next_run(2, 2);
+    screen.now += 10;
+    progress(0.1, 1, 0.1);
+    screen.now += 10;
+    progress(0.05, 1, 0.1);  // begun again, as finer runs do
+    screen.now += 10;
+    progress(1.01, 1, 0.1);  // beyond the end, by rounding
+    EXPECT_EQ(screen.text(),
+              "run 1 of 2   75%  time 0.75 of 1  energy 1  step 0.1  left 3 s\n"
+              "run 2 of 2   10%  time 0.1 of 1  energy 1  step 0.1  left 1:30\n"
+              "run 2 of 2    5%  time 0.05 of 1  energy 1  step 0.1  left 3:10\n"
+              "run 2 of 2  100%  time 1.01 of 1  energy 1  step 0.1  left 0 s\n");
 }
 
 TEST(Progress, startsWhereAResumedRunDoes) {

@@ -131,6 +131,7 @@ public:
         before = {};
         last.reset();
     }
+    void next_run(int number, int of) override { file_.next_run(number, of); }
     void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
     bool interrupted() override { return file_.interrupted(); }
 

@@ -44,6 +44,7 @@ public:
     void frame(const std::function<Record()>& make) override { file_.frame(make); }
     void checkpoint(const Record& state) override { file_.checkpoint(state); }
     void discard() override;
+    void next_run(int number, int of) override { file_.next_run(number, of); }
     void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
     bool interrupted() override { return file_.interrupted(); }
 

@@ -30,6 +30,7 @@ public:
     void frame(const std::function<Record()>& make) override;
     void checkpoint(const Record& state) override;
     void discard() override;
+    void next_run(int number, int of) override { file_.next_run(number, of); }
     void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
     bool interrupted() override { return reached_ || file_.interrupted(); }
 

@@ -71,6 +71,7 @@ public:
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
     void checkpoint(const Record& state) override { writer_.checkpoint(state); }
     void discard() override { writer_.discard(); }
+    void next_run(int number, int of) override { progress_.next_run(number, of); }
     void progress(double time, double energy, double step) override { progress_(time, energy, step); }
     bool interrupted() override { return tubule::interrupted(); }
     void note(const std::string& words) override {
