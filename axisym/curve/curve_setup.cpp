@@ -133,9 +133,9 @@ CurveBegin begin_state(const CurveSetup& setup) {
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     std::optional<CurveMotion::Start> consistent;
-    // As short as rounding in the linear algebra permits, since a start that is not smooth changes fast; and over
-    // before the first output.
-    double h = std::min(1e-10 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
+    // Short, since a start that is not smooth changes fast, and over before the first output; yet long enough that
+    // rounding at the small elements of a seam does not prevent the next step (docs/decisions.md, "Curves in motion").
+    double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
                         0.1 * OutputTimes(setup.c).next());
     for (int tries = 0; !consistent; ++tries) try {
             consistent = setup.motion->consistent(y, h);
