@@ -12,11 +12,11 @@ namespace {
 
 constexpr int steps_between_looks = 10;
 // Measured choices: docs/decisions.md, "How large is the error of a curve in motion?".
-constexpr double error_per_defect = 0.4;  // of the energy balance
+constexpr double error_per_defect = 0.5;  // of the energy balance
 constexpr double least_error = 0.02;      // of what is asked for: no estimate is trusted below
 constexpr double start_steps = 40;        // of a run whose steps grow to its end
 constexpr double least_share = 0.2;       // of the difference of a pair, which is the error of the coarser run
-constexpr double hopeless_rise = 0.1;  // of E_ref: of a run that is not asked for an accuracy
+constexpr double hopeless_rise = 0.1;     // of E_ref: of a run that is not asked for an accuracy
 
 }  // namespace
 
