@@ -21,12 +21,13 @@ struct Watch : Recorder {
     int looks = 0, most_looks = 1000000;
     bool interrupted() override { return ++looks > most_looks; }
 
-    // As a result file is rewound: to the checkpoint, or to the last frame.
-    Restart rewound() {
+    // As a result file is rewound: to the checkpoint, or to the last frame. Nothing if the run has saved none.
+    std::optional<Restart> rewound() {
+        if (frames.empty() && checkpoints.empty()) return std::nullopt;
         const bool saved = !checkpoints.empty() && (frames.empty() || checkpoints.back().time >= frames.back().time);
         const Record record = saved ? checkpoints.back() : frames.back();
         std::erase_if(rows, [&](const auto& row) { return row[0] > record.time; });
-        return {record};
+        return Restart{record};
     }
 };
 
@@ -96,7 +97,7 @@ TEST(CurveResume, theCoarserRunIsSavedAndGoesOn) {
         ASSERT_EQ(watch.checkpoints.size(), 1u);
         EXPECT_GT(watch.checkpoints[0].time, 0);
         // Not computed again: the time of the next interruption is later.
-        const Restart restart = watch.rewound();
+        const Restart restart = watch.rewound().value();
         Watch next;
         next.most_looks = 1;
         run(c, next, &restart);
