@@ -26,6 +26,26 @@ r_min = {value = 0.9, abs = 0.2}
 energy_42 = {value = -7, abs = 1e-3}
 """
 
+# Moves in three dimensions: 1 s.
+SURFACE = """tier = "surface3d"
+[energy]
+k20 = 1.0
+[model]
+kind = "overdamped"
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 0.9
+c = 0.8
+[accuracy]
+energy = 1e-2
+[discretisation]
+elements = 80
+order = 3
+[time]
+end = 0.02
+"""
+
 
 class Run(ProgramTest):
     def test_result_is_named_after_the_case_and_in_the_current_folder(self):
@@ -256,6 +276,19 @@ class Check(ProgramTest):
             path = os.fsencode(self.folder) + b"/" + name
             os.rename(self.write("plain.toml", QUICK), path)
             tomllib.loads(self.tubule("check", os.fsdecode(path))[0])
+
+    def test_what_it_takes_is_told(self):
+        """The number of steps within a factor 2; times are for the study."""
+        words = self.tubule("check", self.case)[1]
+        self.assertRegex(words, r"case.toml: expected: \d+ elements; about \d+ steps, [^,]+, \d+ MB\n$")
+        self.assertEqual(self.tubule("check", self.case, "--quick")[1], "")
+        surface = self.write("surface.toml", SURFACE)
+        words = self.tubule("check", surface)[1]
+        found = re.search(r"expected: about 80 triangles of order 3; about (\d+) steps, [^,]+, \d+ MB\n$", words)
+        self.assertTrue(found, words)
+        self.tubule("run", surface, "--quiet", "-o", "surface.hdf")
+        steps = about(self.folder / "surface.hdf")["steps"]
+        self.assertTrue(0.5 < int(found[1]) / steps < 2, f"{words}, but {steps} steps")
 
     def test_all_bad_cases_are_told(self):
         one = self.write("one.toml", QUICK.replace("kind", "knid"))

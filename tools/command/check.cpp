@@ -12,6 +12,8 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/streams.hpp"
+#include "tools/command/text.hpp"
+#include "tools/run/forecast.hpp"
 
 namespace tubule {
 
@@ -19,6 +21,7 @@ namespace {
 
 struct CheckOptions {
     std::vector<std::string> cases, sets;
+    bool quick = false;
 };
 
 // On one line, in UTF-8: the output must be a case whatever its file is called.
@@ -29,6 +32,17 @@ std::string shown_path(const std::string& path) {
     return shown;
 }
 
+// For people: the answer itself is the case, the same at each call.
+void tell_expected(const Case& c) {
+    std::string told;
+    try {
+        told = words(forecast(c));
+    } catch (const std::exception& error) {
+        told = "unknown: " + explanation(error);
+    }
+    say(stderr, "{}: expected: {}\n", shown_path(c.path), told);
+}
+
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
 int check(const CheckOptions& options) {
     int status = 0;
@@ -36,6 +50,7 @@ int check(const CheckOptions& options) {
         try {
             const Case c = read_case(path, options.sets);
             print_answer(fmt::format("# OK {}\n{}\n", shown_path(path), effective_toml(c)));
+            if (!options.quick) tell_expected(c);
         } catch (const CaseError& error) {
             say(stderr, "{}\n", error.what());
             status = 2;
@@ -47,11 +62,13 @@ int check(const CheckOptions& options) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_status) {
-    CLI::App* command = app.add_subcommand("check", "Validate cases and print the resolved cases");
+    CLI::App* command =
+        app.add_subcommand("check", "Validate cases, print the resolved cases and what they are expected to take");
     const auto options = std::make_shared<CheckOptions>();
     command->add_option("CASE", options->cases, "case files")->required();
     command->add_option("--set", options->sets, "override a key, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
+    command->add_flag("--quick", options->quick, "run nothing to tell steps, time and memory");
     end_help(*command, {"tubule check cases/peanut.toml", "tubule check cases/peanut.toml --set accuracy.energy=1e-6"},
              {{0, "all cases are valid"}, {2}}, {"case_files"});
     command->callback([options, &exit_status] { exit_status = check(*options); });

@@ -27,6 +27,7 @@
 #include "tools/command/text.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
+#include "tools/run/forecast.hpp"
 
 namespace tubule {
 
@@ -272,11 +273,14 @@ int run_case(Case c, const RunOptions& options) {
     const auto engine = engine_for(c);
     const double before = watch.seconds();
     std::optional<Opened> result = open_result(c, *engine, file, options.resume);
-    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!result) {
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
+    if (!options.quiet && !result->restart)
+        if (const auto forecast = engine->forecast_if_long())
+            say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
+    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     Ended ended;
     {
         Recorder recorder(c, result->writer, options.quiet || c.equilibrium,

@@ -85,7 +85,7 @@ class Program:
 
     def check(self, job):
         """The case with all overrides as TOML text, or its error."""
-        done = self.printed("check", job.case, *set_options(job))
+        done = self.printed("check", "--quick", job.case, *set_options(job))
         return (done.stdout, None) if done.returncode == 0 else (None, done.stderr.strip())
 
     def check_quantity(self, job):
@@ -93,7 +93,7 @@ class Program:
         if not re.fullmatch("[A-Za-z0-9_]+", self.quantity):
             return f"quantity {self.quantity!r}: is no name of a series"
         expected = f"expect.{self.quantity}={{value=0.0,abs=1.0}}"
-        error = self.printed("check", job.case, "--set", expected).stderr
+        error = self.printed("check", "--quick", job.case, "--set", expected).stderr
         found = re.search(f"unknown key expect.{self.quantity}(; did you mean .*?\\?)?", error)
         return f"quantity {self.quantity}: no series has this name{found[1] or ''}" if found else None
 

@@ -4,11 +4,14 @@
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
+#include "surface3d/run/motion_forecast.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/auto/joined_file.hpp"
 
 namespace tubule {
 namespace {
+
+constexpr double long_run = 60;  // seconds
 
 class Axisymmetric : public Engine {
 public:
@@ -42,6 +45,11 @@ public:
     std::vector<std::string> series_names() const override { return surface3d::series_names(case_); }
     void check_restart(const Record& record) const override {
         if (case_.moves()) surface3d::check_restart(case_, record);
+    }
+    std::optional<Forecast> forecast_if_long() const override {
+        if (!case_.moves() || !surface3d::may_be_long(case_, start_)) return std::nullopt;
+        const Forecast f = surface3d::forecast_motion(case_, start_);
+        return f.seconds.value_or(0) > long_run ? std::optional(f) : std::nullopt;
     }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/run/forecast.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/run.hpp"
 
@@ -21,6 +23,10 @@ public:
 
     // Throws std::runtime_error where a run cannot resume from this record, such as one of another version.
     virtual void check_restart(const Record& record) const = 0;
+
+    // What a run will take that takes more than a minute; nothing of others, or where that cannot be told at little
+    // cost.
+    virtual std::optional<Forecast> forecast_if_long() const { return std::nullopt; }
 
     // Runs the case, or resumes from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
     // tier's own run.

@@ -1,0 +1,53 @@
+// What a run is expected to take, found by a pilot run that is cheaper or ends early.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "common/case/case.hpp"
+#include "common/run/run.hpp"
+#include "common/solve/interrupt.hpp"
+
+namespace tubule {
+
+struct Forecast {
+    std::string resolution;                // in words
+    std::optional<double> steps, seconds;  // of wall time on this machine as it is now; nothing where it cannot be told
+    double bytes = 0;
+};
+
+// Counts the steps of a run.
+class Pilot : public RunObserver {
+public:
+    bool interrupted() override { return tubule::interrupted(); }
+    void next_run(int number, int of) override { *this = Pilot(number, of); }
+    void progress(double time, double, double step) override {
+        ++steps_, time_ = time;
+        growth_ = step_ > 0 ? step / step_ : 1, step_ = step;
+    }
+
+    int steps() const { return steps_; }       // of the last run that began
+    bool last_run() const { return last_; }    // as far as is known
+    bool moved() const { return steps_ > 0; }  // or it has not come to its first step
+
+    // Of a run that pauses here, until `end`: the factor from the steps done to all of them, if they stay as long as
+    // the last one. Where they still grow, something between that and going on to grow.
+    double all_by_done(double end) const {
+        double left = std::max(end - time_, 0.0) / step_;
+        if (growth_ > 1.1) left = std::sqrt(left * std::log1p(left * (growth_ - 1)) / std::log(growth_));
+        return (steps_ + left) / steps_;
+    }
+
+    Pilot() = default;
+
+private:
+    Pilot(int number, int of) : last_(number == of) {}
+
+    int steps_ = 0;
+    double time_ = 0, step_ = 0, growth_ = 1;
+    bool last_ = true;
+};
+
+}  // namespace tubule

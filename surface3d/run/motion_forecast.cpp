@@ -1,0 +1,100 @@
+#include "surface3d/run/motion_forecast.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/solve/interrupt.hpp"
+#include "common/solve/pause.hpp"
+#include "common/solve/sparse.hpp"
+#include "surface3d/motion/motion_forms.hpp"
+#include "surface3d/run/motion_attempt.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+// Measured choices: docs/decisions.md, "What will a run take?".
+constexpr double pilot_limit = 6;         // seconds of each pilot run
+constexpr double limit = 15;              // of all of them, and their starts
+constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number
+constexpr double time_order = 2;          // of all schemes that control their steps, at least
+constexpr double cost_power = 1.1;        // of the number of triangles: the cost of a step
+constexpr double with_coarser_run = 1.3;  // runs, the coarser one that tells the error included
+constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
+constexpr double usual_steps = 100, usual_step = 0.5e-3;      // at the loosest tolerance; seconds for a triangle
+
+// Of both runs: their matrices and factors.
+double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
+    const double width = MotionUnknowns(mesh, motion_law(c.model), c.energy).width();
+    return bytes_at_rest + bytes_per_entry * triangles * width * width;
+}
+
+double steps_by_tolerance(double from, double to) {
+    return std::pow(from / to, 1 / (time_order + 1));
+}
+
+struct PilotRun {
+    double steps = 0, seconds_per_step = 0;
+    bool useful = false;
+};
+
+// On so many triangles. What the mesh loses is lost by few triangles only; another one may do.
+PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double tolerance, double until) {
+    Case c = asked;
+    c.time.limit = until;
+    c.time.output.clear();
+    c.accuracy.energy = std::max(c.accuracy.energy, 0.05);
+    Pilot pilot;
+    const RunClock clock(c, pilot);
+    MotionAttempt run(c, pilot, clock, {.elements = triangles, .tolerance = tolerance}, nullptr);
+    try {
+        run.begin(start);
+        const double before = clock.seconds();
+        run.go();
+        const Stop stop = run.summary.stop.reason;
+        const bool lost = stop == Stop::resolution_lost || stop == Stop::mesh_lost || stop == Stop::solver_failed;
+        if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
+        const bool whole = stop != Stop::time_limit && !lost;
+        return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (clock.seconds() - before) / pilot.steps(),
+                true};
+    } catch (const SolveError&) {
+    }
+    return {};
+}
+
+}  // namespace
+
+bool may_be_long(const Case& c, const Start&) {
+    const MotionSettings s = first_settings(c);
+    const double steps = c.surface.step ? c.time.end / *c.surface.step
+                                        : usual_steps * std::max(1.0, steps_by_tolerance(1e-4, s.tolerance));
+    return steps * s.elements * usual_step > 20;
+}
+
+Forecast forecast_motion(const Case& c, const Start& start) {
+    const PauseWatch watch(limit, interrupted);
+    const MotionSettings wanted = first_settings(c);
+    Forecast out;
+    try {
+        const CurvedMesh some = start.mesh(least_triangles, element_order(c)).mesh;
+        const int triangles = start.resizable() ? wanted.elements : some.triangles();
+        out.resolution = fmt::format("about {} triangles of order {}", triangles, element_order(c));
+        out.bytes = bytes_of(c, some, triangles);
+        const double tolerance = std::max(wanted.tolerance, pilot_tolerance);
+        for (int few = std::min(least_triangles, triangles); !out.steps && few <= 4 * least_triangles; few *= 2) {
+            const int own = start.resizable() ? std::min(few, triangles) : triangles;
+            const PilotRun pilot = pilot_run(c, start, own, tolerance, watch.seconds() + pilot_limit);
+            if (pilot.useful) {
+                out.steps = pilot.steps * (c.surface.step ? 1 : steps_by_tolerance(tolerance, wanted.tolerance));
+                const double per_step = pilot.seconds_per_step * std::pow(1.0 * triangles / own, cost_power);
+                out.seconds = with_coarser_run * *out.steps * per_step;
+            }
+            if (own == triangles) break;
+        }
+    } catch (const Paused&) {  // the start alone takes long
+    }
+    return out;
+}
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,67 @@
+#include "tools/run/forecast.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/run/run_clock.hpp"
+#include "common/solve/progress.hpp"
+#include "surface3d/run/motion_forecast.hpp"
+#include "tools/run/engine.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr double pilot_limit = 2;          // seconds
+constexpr double reported_by_coarser = 4;  // cost of the runs of a pair
+
+double memory_in_use() {
+    rusage used{};
+    getrusage(RUSAGE_SELF, &used);
+    return 1024.0 * static_cast<double>(used.ru_maxrss);
+}
+
+Forecast by_its_beginning(Case c) {
+    c.time.limit = pilot_limit;
+    const auto engine = engine_for(c);
+    Pilot pilot;
+    const RunClock clock(c, pilot);
+    const RunSummary s = engine->run(pilot);
+    Forecast out;
+    if (s.elements > 0) out.resolution = fmt::format("{} elements", s.elements);
+    out.bytes = memory_in_use();
+    const double seconds = clock.seconds();
+    if (s.stop.reason != Stop::time_limit) {
+        out.seconds = seconds;
+        if (pilot.moved()) out.steps = pilot.steps();
+    } else if (pilot.moved()) {
+        const double factor = pilot.all_by_done(c.time.end);
+        out.steps = factor * pilot.steps();
+        out.seconds = factor * seconds * (pilot.last_run() ? 1 : 1 + reported_by_coarser);
+    }
+    return out;
+}
+
+// Two digits.
+std::string rounded(double value) {
+    const double last = std::pow(10, std::floor(std::log10(std::max(value, 1e-300))) - 1);
+    return fmt::format("{:g}", std::round(value / last) * last);
+}
+
+}  // namespace
+
+Forecast forecast(const Case& c) {
+    if (c.tier != Tier::surface3d || !c.moves()) return by_its_beginning(c);
+    return surface3d::forecast_motion(c, surface3d::Start(c));
+}
+
+std::string words(const Forecast& f) {
+    std::string out = f.resolution.empty() ? "" : f.resolution + "; ";
+    if (f.steps) out += fmt::format("about {} steps, ", rounded(*f.steps));
+    out += f.seconds ? (*f.seconds < 1 ? "less than a second" : "about " + duration(*f.seconds)) : "unknown time";
+    return out + fmt::format(", {} MB", rounded(f.bytes / 1e6));
+}
+
+}  // namespace tubule

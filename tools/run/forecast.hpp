@@ -1,0 +1,18 @@
+// What a case is expected to take, before it runs.
+#pragma once
+
+#include <string>
+
+#include "common/case/case.hpp"
+#include "common/run/forecast.hpp"
+
+namespace tubule {
+
+// Takes a few seconds at most: of surfaces in motion a pilot run (surface3d/run/motion_forecast), of all else the first
+// seconds of the run itself. Throws as an engine and its run.
+Forecast forecast(const Case& c);
+
+// "about 180 triangles of order 4; about 41 steps, 5 s, 120 MB"
+std::string words(const Forecast& f);
+
+}  // namespace tubule
