@@ -321,6 +321,8 @@ void check_together(Keys& k, const Case& c) {
         k.check("discretisation.scheme", [&]() -> std::string {
             if (!scheme.controls_steps && !c.surface.step)
                 return fmt::format("\"{}\" needs discretisation.step: it does not adapt the step", scheme.name);
+            if (!scheme.with_inertia && law.inertia != 0)
+                return fmt::format("must not be \"{}\" for a fluid: bending waves grow in its steps", scheme.name);
             if (scheme.general) return {};
             if (!law.inextensible) return fmt::format("must not be \"{}\" for a gradient flow", scheme.name);
             if (law.inertia == 0 && law.friction == 0)

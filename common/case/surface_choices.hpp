@@ -34,12 +34,14 @@ struct SchemeEntry {
     bool default_with_inertia = false, default_without_inertia = false;  // where a case names no scheme
     bool controls_steps = true;  // estimates its error; else a case gives discretisation.step
     bool controls_mesh = true;   // keeps triangles even, and the volume; else no new meshes are made
+    bool with_inertia = true;    // else no fluid
     bool smooths = false;        // takes discretisation.smoothing
     bool general = true;         // else no gradient flow, no Stokes flow without friction, no terms but k20, k40, k42
 };
 inline constexpr std::array schemes{
     SchemeEntry{.name = "bdf2", .default_without_inertia = true},
     SchemeEntry{.name = "alpha", .default_with_inertia = true},
+    SchemeEntry{.name = "bdf", .with_inertia = false},
     SchemeEntry{.name = "euler"},
     SchemeEntry{.name = "paper", .controls_steps = false, .controls_mesh = false, .smooths = true, .general = false},
 };

@@ -145,7 +145,7 @@ VectorField solve_along(const AlongSurface& along_surface, const Eigen::SparseMa
 }  // namespace
 
 VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields,
-                                 const Projection& project, const Eigen::VectorXd& flux, double relaxation, double te) {
+                                 const Projection& project, const Eigen::VectorXd& flux, double relaxation) {
     const VectorField& normal = fields.normal;
     const System system = assemble(
         space, mesh, normal, follows_curvature_ ? weights(space, mesh, fields) : Eigen::VectorXd::Ones(space.cells()));
@@ -155,7 +155,7 @@ VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& me
 
     VectorField w = VectorField::Zero(3, space.size());
     meet_flux(system, project, normal, flux, w);
-    const VectorField left = system.pull / (relaxation + te) - times(system.L, w);
+    const VectorField left = system.pull / relaxation - times(system.L, w);
     const AlongSurface along_surface(normal, mesh.period > 0);
     w += solve_along(along_surface, system.L, laplacian_,
                      without_multiplier(system, project, normal, along_surface, left));

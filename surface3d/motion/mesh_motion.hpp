@@ -9,7 +9,7 @@
 namespace tubule::surface3d {
 
 // Finds the velocity w with (w.nu, phi) = (u.nu, phi) that deforms the mesh least, while it relaxes to a good one:
-// (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/(relaxation + te), with a multiplier m: theory.md (10.14). With a
+// (grad w, grad Z) + (m nu, Z) = -(a grad X, grad Z)/relaxation, with a multiplier m: theory.md (10.14). With a
 // = 1 and Euler steps, in the limit of zero relaxation time, this is the motion of Barrett, Garcke and Nuernberg, whose
 // positions do not converge with the step. The right-hand side is evaluated at X, like the matrices, so that it does
 // not depend on earlier motion of the nodes: evaluated at extrapolated positions with a short relaxation time, it would
@@ -21,7 +21,7 @@ public:
 
     // `mesh`: X, which `fields` and `project` belong to; `flux`: (u.nu, phi) of every node. SolveError.
     VectorField velocity(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields,
-                         const Projection& project, const Eigen::VectorXd& flux, double relaxation, double te);
+                         const Projection& project, const Eigen::VectorXd& flux, double relaxation);
 
 private:
     bool follows_curvature_;

@@ -36,7 +36,8 @@ struct MotionState {
 
 struct MotionStep {
     MotionState state;
-    double error = 0;       // of the positions over this step along the normal, largest, estimated
+    double error = 0;       // of the positions over this step along the normal, largest, estimated;
+    int order = 2;          // it grows with the power order + 1 of the length of the step
     double correction = 0;  // energy spent on the correction of area and volume
 };
 

@@ -50,7 +50,7 @@ MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u,
     keep_momenta(momenta, 0, s);
     const CurvedMesh now = mesh(s.X);
     const MotionFields f = fields(now);
-    s.w = mesh_velocity(now, f, flux(s.u, now, f), 0);
+    s.w = mesh_velocity(now, f, flux(s.u, now, f), control_.relaxation);
     return s;
 }
 
@@ -63,8 +63,8 @@ MotionFields MovingSurface::fields(const CurvedMesh& mesh) {
 }
 
 VectorField MovingSurface::mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields,
-                                         const Eigen::VectorXd& flux, double te) {
-    return mesh_motion_.velocity(space_, mesh, fields, *projection_, flux, control_.relaxation, te);
+                                         const Eigen::VectorXd& flux, double relaxation) {
+    return mesh_motion_.velocity(space_, mesh, fields, *projection_, flux, relaxation);
 }
 
 Eigen::VectorXd MovingSurface::flux(const Eigen::VectorXd& u, const CurvedMesh& mesh,

@@ -53,7 +53,7 @@ public:
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
     // The velocity of the nodes for the normal velocity of the surface given by `flux`; `fields` are the last ones.
     VectorField mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields, const Eigen::VectorXd& flux,
-                              double te);
+                              double relaxation);
     // At the nodes of the mesh: velocities of the surface, pressures.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
     Eigen::VectorXd pressure_at_nodes(const MotionState& state) const;

@@ -28,7 +28,7 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
     const Eigen::VectorXd x = solve(base, rate, out.keeps_volume, out.lambda);
     out.u = x.head(stage.u.size());
     if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
-    out.w = surface_.mesh_velocity(at, base.fields, mesh_flux(base, out.u), stage.te);
+    out.w = surface_.mesh_velocity(at, base.fields, mesh_flux(base, out.u), stage.relaxation);
     out.X = stage.Xbar + stage.te * out.w;
     out.fields = std::move(base.fields);
     return out;

@@ -15,6 +15,7 @@ struct Stage {
     Eigen::VectorXd ubar;
     VectorField X, w;   // expected positions, velocity of the nodes,
     Eigen::VectorXd u;  // velocity
+    double relaxation;  // time in which the mesh becomes even; shorter ones than about te overshoot
 };
 
 struct StageSolution {

@@ -151,7 +151,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
         const MotionMeasures m = measure(surface(), next.state, &state_);
         if (const auto refusal = judge(next, m)) return refusal;
         take(next, m);
-        set_next_step(tau, memory_.next_step, error);
+        set_next_step(tau, memory_.next_step, error, next.order);
         return std::nullopt;
     } catch (const TooLarge& failure) {  // for steps of any length
         return Refusal{0, {Stop::solver_failed, t, failure.what(), ""}};
@@ -173,9 +173,9 @@ void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
 }
 
 // A step that was cut short by an output says little about how long the next one may be.
-void MotionAttempt::set_next_step(double tau, double asked, double error) {
+void MotionAttempt::set_next_step(double tau, double asked, double error, int order) {
     if (case_.surface.step) return;
-    const double factor = error > 0 ? std::clamp(safety / std::cbrt(error), 0.4, growth) : growth;
+    const double factor = error > 0 ? std::clamp(safety / std::pow(error, 1.0 / (order + 1)), 0.4, growth) : growth;
     memory_.next_step = std::max(tau * factor, tau < asked ? std::min(asked, growth * tau) : 0.0);
 }
 

@@ -55,7 +55,7 @@ private:
     std::optional<StopReport> impossible(const Observables& o, const VectorField& X) const;
     std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
     void take(const MotionStep& next, const MotionMeasures& m);
-    void set_next_step(double tau, double asked, double error);
+    void set_next_step(double tau, double asked, double error, int order);
     bool wants_new_mesh() const;
     void make_new_mesh();
 

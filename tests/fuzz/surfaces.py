@@ -71,7 +71,7 @@ def case(rng):
     choices = {"elements": rng.randint(80, 180), "order": rng.randint(2, 4)}
     choices["mesh"] = rng.choice(("uniform", "uniform", "irregular", "graded" if keys["kind"] != "torus" else "uniform"))
     if rng.random() < 0.6:
-        choices["scheme"] = rng.choice(("bdf2", "alpha", "euler"))
+        choices["scheme"] = rng.choice(("bdf2", "alpha", "euler") if kind == "fluid" else ("bdf", "bdf2", "alpha", "euler"))
     # A sphere of size R changes in about R^4/k20 (friction), R^3 sqrt(rho/k20) (inertia): a small part of that.
     time = {"end": number(size**4 * 10 ** rng.uniform(-5, -2)), "limit": LIMIT}
     scene = {"tier": "surface3d", "energy": energy, "model": model, "shape": keys}

@@ -35,7 +35,7 @@ struct Scene {
             .transpose();
     }
     VectorField motion(const Eigen::VectorXd& of_flux, bool graded, double relaxation) const {
-        return MeshMotion(graded).velocity(space, mesh, fields, project, of_flux, relaxation, 0);
+        return MeshMotion(graded).velocity(space, mesh, fields, project, of_flux, relaxation);
     }
 
     CurvedMesh mesh;

@@ -120,6 +120,10 @@ TEST(ShapeKeys, WhatEachTierTakes) {
               "moving surface");
     EXPECT_EQ(still(time_span + "[discretisation]\nscheme = \"paper\"\n"),
               "case.toml:9:10: discretisation.scheme \"paper\" needs discretisation.step: it does not adapt the step");
+    const std::string by_bdf = "[discretisation]\nscheme = \"bdf\"\n";
+    EXPECT_EQ(still(time_span + "[model]\nkind = \"stokes\"\n" + by_bdf), "accepted");
+    EXPECT_EQ(still(time_span + "[model]\nkind = \"fluid\"\n" + by_bdf),
+              "case.toml:11:10: discretisation.scheme must not be \"bdf\" for a fluid: bending waves grow in its steps");
     EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
               "case.toml:7:9: accuracy.r_min must be absent: without a table [time] nothing moves");
 }

@@ -33,7 +33,8 @@ StageSolution OneStageScheme::solve(const MotionState& from, const PastState* pa
                          stage.ubar,
                          ahead(stage.level, from.X, &PastState::X),
                          ahead(stage.level, from.w, &PastState::w),
-                         ahead(stage.level, from.u, &PastState::u)};
+                         ahead(stage.level, from.u, &PastState::u),
+                         surface().control().relaxation + stage.te};
     const VectorField begin = from.X + (stage.Xbar - from.X) / stage.level, end = ahead(1, from.X, &PastState::X);
     MovingSurface& s = surface();
     return solver_.solve(expected, s.rate_to_keep(s.mesh(expected.X), begin, end, stage.te / stage.level, missed));
@@ -63,7 +64,7 @@ OneStageScheme::Finished OneStageScheme::finish(const MotionState& from, const P
     const double error = estimated_error(from, past, stage, solved.fields.normal, to);
     const KeptExtent kept = solver_.keep_extent(solved, to);
     surface().keep_momenta(momenta, 0, to);  // on the surface as it is now
-    return {{std::move(to), error, kept.energy}, kept.lacking};
+    return {{.state = std::move(to), .error = error, .correction = kept.energy}, kept.lacking};
 }
 
 }  // namespace tubule::surface3d
