@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_series.hpp"
+#include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -47,6 +48,7 @@ void CurveAttempt::begin() {
     const Snapshot s = measure(*setup_.motion, at.shown.data(), at.rate.data());
     past_.total_start = s.total();
     past_.total_least = past_.total_start;
+    out_.note(doubt_before(setup_.c, s.o.energy, summary.reference_energy));
     compare(0, s);
     trace.add(0, s.o.energy, 0);
     add_to_trace(at.time);
@@ -101,7 +103,8 @@ double CurveAttempt::what_may_change(double t) const {
 std::optional<StopReport> CurveAttempt::check(double t) {
     const std::optional<double> stationary = setup_.c.time.stationary;
     if (auto pause = clock_.find_pause(t)) return pause;
-    if (stationary && what_may_change(t) < *stationary * summary.reference_energy)
+    if (stationary && past_.settling.is_settled(setup_.c, t, now_.balance.dissipation, now_.o.area) &&
+        what_may_change(t) < *stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
     return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
@@ -194,6 +197,10 @@ void CurveAttempt::go() {
     }
     summary.stop = *stop;
     summary.energy = now_.o.energy;
+    if (const std::string doubt =
+            doubt_after(setup_.c, stop->reason, past_.total_start, now_.total(), summary.reference_energy);
+        !doubt.empty())
+        summary.warnings.push_back(doubt);
     summary.counters = flow_->counters();
     out_.end(*stop, flow_->time(), [this] { return record(); });
     describe_effort(summary);

@@ -12,6 +12,7 @@
 #include "common/run/output_times.hpp"
 #include "common/run/run_output.hpp"
 #include "common/run/run_pairs.hpp"
+#include "common/run/settling.hpp"
 
 namespace tubule::axisym {
 
@@ -37,6 +38,7 @@ private:
         double total_least = 0;                  // of all steps
         Eigen::VectorXd y, rate;                 // of the last good step
         double time = 0;
+        Settling settling;
     };
 
     const Snapshot& observe(double t, const double* y, const double* rate);

@@ -8,6 +8,7 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_start.hpp"
+#include "common/run/error_scale.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -123,6 +124,7 @@ void GraphAttempt::begin() {
     make_flow(x, stage_->forms.rate(x), 0, 0);
     error_.carry_on(*stage_, now_.o);  // so far that of the first mesh
     past_.energy_start = now_.o.energy;
+    out_.note(doubt_before(case_, past_.energy_start, summary.reference_energy));
     write(0, now_.o, flow_->x(), flow_->v());
 }
 
@@ -191,7 +193,7 @@ std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Obser
     const double t = flow_->time();
     if (outcome == Flow::Outcome::guard) return graph_guards()[flow_->tripped()].report(o, *stage_, flow_->x(), t);
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
-    if (case_.time.stationary &&
+    if (case_.time.stationary && past_.settling.is_settled(case_, t, o.dissipation, o.area) &&
         o.dissipation * (case_.time.end - t) < *case_.time.stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t,
                           fmt::format("the energy dissipates at a rate of only {:.3g}", o.dissipation), ""};
@@ -329,6 +331,10 @@ void GraphAttempt::end_with(const StopReport& stop) {
     if (!gave_up) out_.end(stop, t, [&] { return record(t, now_.o, flow_->x(), flow_->v()); });
     summary.stop = stop;
     summary.energy = now_.o.energy;
+    if (const std::string doubt =
+            doubt_after(case_, stop.reason, past_.energy_start, summary.energy, summary.reference_energy);
+        !doubt.empty())
+        summary.warnings.push_back(doubt);
     summary.estimated_error = stated_over_computed * error_.largest / summary.reference_energy;
     summary.time_tolerance = settings_.time_tolerance;
     summary.counters = past_.counters;

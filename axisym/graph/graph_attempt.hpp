@@ -14,6 +14,7 @@
 #include "axisym/integration/run_summary.hpp"
 #include "common/run/output_times.hpp"
 #include "common/run/run_output.hpp"
+#include "common/run/settling.hpp"
 
 namespace tubule::axisym {
 
@@ -38,6 +39,7 @@ private:
     struct Past {
         double energy_start = 0, dissipated = 0;
         FlowCounters counters;
+        Settling settling;
     };
     // The last good state.
     struct Good {

@@ -33,10 +33,10 @@ public:
     bool moved() const { return steps_ > 0; }  // or it has not come to its first step
 
     // Of a run that pauses here, until `end`: the factor from the steps done to all of them, if they stay as long as
-    // the last one. Where they still grow, something between that and going on to grow.
+    // the last one, or, where they still grow, go on to do so for the most part.
     double all_by_done(double end) const {
         double left = std::max(end - time_, 0.0) / step_;
-        if (growth_ > 1.1) left = std::sqrt(left * std::log1p(left * (growth_ - 1)) / std::log(growth_));
+        if (growth_ > 1.1) left = std::min(left, 1.5 * std::log1p(left * (growth_ - 1)) / std::log(growth_));
         return (steps_ + left) / steps_;
     }
 

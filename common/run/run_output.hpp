@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 
 #include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
@@ -20,6 +21,9 @@ public:
     double seconds() const { return clock_.seconds(); }
     std::size_t mesh(const SurfaceCells& cells) { return watch_.mesh(cells); }
     void progress(double time, double energy, double step) { watch_.progress(time, energy, step); }
+    void note(const std::string& words) {
+        if (reported_ && !words.empty()) watch_.note(words);
+    }
     // Output at this time has already been written by the interrupted run.
     void go_on_from(double time) { last_row_ = last_frame_ = time; }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/run/error_scale.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/run/guards.hpp"
@@ -77,6 +78,7 @@ void MotionAttempt::begin(const Start& from) {
     state_.time = begin_time(case_);
     if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
     look();
+    out_.note(doubt_before(case_, now_.bending.energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     trace.add(state_.time, now_.bending.energy);
     error_now_ = difference_now().value_or(memory_.scale.reference_energy);
@@ -292,7 +294,8 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
 std::optional<StopReport> MotionAttempt::check_progress() {
     const double t = state_.time;
     if (auto pause = clock_.find_pause(t)) return pause;
-    if (case_.time.stationary && what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
+    if (case_.time.stationary && settling_.is_settled(case_, t, now_.dissipation, now_.bending.area) &&
+        what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     return stall_.look(t, state_.step, first_step * memory_.scale.relaxation,
                        memory_.balance.lowest_total / memory_.scale.reference_energy, case_.accuracy.energy);
@@ -357,6 +360,10 @@ void MotionAttempt::summarise(const StopReport& stop) {
     summary.details = {{"pairs", std::int64_t{memory_.settings.pair}}};
     if (!scheme_) return;
     warn_of_drift();
+    if (const std::string doubt =
+            doubt_after(case_, stop.reason, memory_.balance.total_start, total(), summary.reference_energy);
+        !doubt.empty())
+        summary.warnings.push_back(doubt);
     write_row();
     out_.end(stop, state_.time, [this] { return record(); });
     const int nodes = static_cast<int>(state_.X.cols());

@@ -10,6 +10,7 @@
 #include "common/run/output_times.hpp"
 #include "common/run/run_output.hpp"
 #include "common/run/run_pairs.hpp"
+#include "common/run/settling.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
 #include "surface3d/run/motion_checks.hpp"
 #include "surface3d/run/motion_frame.hpp"
@@ -90,6 +91,7 @@ private:
     MotionMeasures now_;
     MotionMemory memory_;
     StallDetector stall_;
+    Settling settling_;
     std::optional<StopReport> early_;  // the run cannot start, or is already complete
     double error_now_ = 0;
 };

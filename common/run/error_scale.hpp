@@ -1,0 +1,16 @@
+// Whether errors as large as asked would hide what is asked for.
+#pragma once
+
+#include <string>
+
+#include "common/case/case.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule {
+
+// Words if so, else empty; energies of the surface, E_ref of theory.md (11.1). Before a run: errors may be larger than
+// the energy. After it: than what the energy, kinetic energy included, has fallen by.
+std::string doubt_before(const Case& c, double energy, double E_ref);
+std::string doubt_after(const Case& c, Stop stop, double start, double end, double E_ref);
+
+}  // namespace tubule

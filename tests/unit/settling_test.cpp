@@ -1,0 +1,81 @@
+// Surfaces that come to rest: motions whose distance to rest is known at every time.
+#include "common/run/settling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/run/error_scale.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr double area = 4 * pi;  // of size 1
+
+Case case_with(double stationary) {
+    Case c;
+    c.model.kind = ModelKind::gradient_flow;
+    c.time.end = 1000;
+    c.time.stationary = stationary;
+    return c;
+}
+
+// A distance a exp(-t/10) has the speed a exp(-t/10)/10; what it dissipates, with friction 1, is its square times the
+// area.
+double dissipation(double a, double t) {
+    const double speed = a * std::exp(-t / 10) / 10;
+    return speed * speed * area;
+}
+
+TEST(Settling, WaitsUntilTheDistanceIsSmall) {
+    Case c = case_with(1e-4);  // distances of 0.01
+    c.time.end = 100;
+    Settling settling;
+    double settled_at = -1;
+    for (double t = 0; t < 100 && settled_at < 0; t += 0.5)
+        if (settling.is_settled(c, t, dissipation(0.034, t), area)) settled_at = t;
+    EXPECT_NEAR(settled_at, 10 * std::log(3.4), 0.5);
+}
+
+TEST(Settling, NoiseOfTheSpeedIsNoRest) {
+    Case c = case_with(1e-4);
+    c.time.end = 100;
+    Settling settling;
+    for (int i = 0; i < 1000; ++i)  // 1e-3 of it, from step to step
+        EXPECT_FALSE(settling.is_settled(c, 0.01 * i, dissipation(0.034, 0.01 * i) * (1 + 0.002 * (i % 2)), area)) << i;
+}
+
+TEST(Settling, NothingSettlesThatDoesNotSlowDown) {
+    const Case c = case_with(1e-4);
+    Settling settling;
+    EXPECT_FALSE(settling.is_settled(c, 0, 1e-8, area));  // how it changes is unknown as yet
+    EXPECT_FALSE(settling.is_settled(c, 1, 1e-8, area));
+    EXPECT_FALSE(settling.is_settled(c, 30, 1e-8, area));
+    EXPECT_TRUE(settling.is_settled(c, 60, 1e-8, area));
+    EXPECT_TRUE(settling.is_settled(c, 90, 2e-8, area));
+    EXPECT_TRUE(settling.is_settled(c, 91, 0, area));
+}
+
+TEST(Settling, NoFartherThanUntilTheEnd) {
+    Case c = case_with(1e-4);
+    c.time.end = 0.6;  // at a speed of 0.0034, less than 0.01
+    Settling settling;
+    settling.is_settled(c, 0, dissipation(0.034, 0), area);
+    settling.is_settled(c, 0.5, dissipation(0.034, 0.5), area);
+    EXPECT_TRUE(settling.is_settled(c, 0.55, dissipation(0.034, 0.55), area));
+}
+
+TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
+    Case c;
+    c.accuracy.energy = 0.01;
+    EXPECT_EQ(doubt_before(c, 1, 100), "");
+    EXPECT_EQ(doubt_before(c, -1, 100), "");
+    EXPECT_NE(doubt_before(c, 0.9, 100), "");
+    EXPECT_EQ(doubt_after(c, Stop::finished, 10, 9, 100), "");
+    EXPECT_NE(doubt_after(c, Stop::finished, 10, 9.1, 100), "");
+    EXPECT_EQ(doubt_after(c, Stop::pinch_off, 10, 9.1, 100), "");
+    EXPECT_EQ(doubt_after(c, Stop::finished, 10, 10, 100), "") << "it was at rest";
+}
+
+}  // namespace
+}  // namespace tubule
