@@ -101,8 +101,12 @@ void keys(Keys& k, Velocity& velocity, const Model& model) {
 }
 
 template <class Keys>
-void keys(Keys& k, Accuracy& accuracy, bool moves) {
+void keys(Keys& k, Accuracy& accuracy, bool moves, Tier tier) {
     k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
+    if (moves && tier != Tier::axisym)
+        k.flag("estimate", accuracy.estimate);
+    else
+        k.absent("estimate", "must be absent: only valid for motions in three dimensions");
     if (moves)
         k.number("r_min", accuracy.r_min, {.above = 0});
     else
@@ -415,7 +419,7 @@ void keys(Keys& k, Case& c) {
     else
         automatic_keys(k, c);
     k.table("shape", [&](auto& k) { keys(k, c.shape); });
-    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier != Tier::surface3d || c.moves()); });
+    k.table("accuracy", [&](auto& k) { keys(k, c.accuracy, c.tier != Tier::surface3d || c.moves(), c.tier); });
     k.table("discretisation", [&](auto& k) {
         if (c.tier == Tier::surface3d)
             keys(k, c.surface, c.moves());

@@ -36,14 +36,20 @@ struct SchemeEntry {
     bool controls_mesh = true;   // keeps triangles even, and the volume; else no new meshes are made
     bool with_inertia = true;    // else no fluid
     bool smooths = false;        // takes discretisation.smoothing
+    int order = 2;               // of its errors in the step, at least
     bool general = true;         // else no gradient flow, no Stokes flow without friction, no terms but k20, k40, k42
 };
 inline constexpr std::array schemes{
     SchemeEntry{.name = "bdf2", .default_without_inertia = true},
     SchemeEntry{.name = "alpha", .default_with_inertia = true},
     SchemeEntry{.name = "bdf", .with_inertia = false},
-    SchemeEntry{.name = "euler"},
-    SchemeEntry{.name = "paper", .controls_steps = false, .controls_mesh = false, .smooths = true, .general = false},
+    SchemeEntry{.name = "euler", .order = 1},
+    SchemeEntry{.name = "paper",
+                .controls_steps = false,
+                .controls_mesh = false,
+                .smooths = true,
+                .order = 1,
+                .general = false},
 };
 
 enum class Scheme : std::size_t {};  // a line of `schemes`

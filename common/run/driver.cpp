@@ -28,7 +28,7 @@ RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, Esti
         watch.next_run(number, number);
         RunSummary& s = runs.next();
         s.estimated_error = std::max(s.estimated_error, rounding);
-        s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
+        s.as_accurate_as_asked = !c.accuracy.estimate || s.estimated_error <= c.accuracy.energy;
         if (can_go_on(s.stop.reason)) return s;
         if (!runs.refine(s)) {
             judge(s, c, runs.fixed_by());

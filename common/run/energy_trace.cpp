@@ -21,6 +21,10 @@ void EnergyTrace::cut_after(double t) {
     time_.resize(n), energy_.resize(n), slope_.resize(std::min(n, slope_.size()));
 }
 
+int EnergyTrace::points_after(double t) const {
+    return static_cast<int>(time_.end() - std::upper_bound(time_.begin(), time_.end(), t));
+}
+
 double EnergyTrace::operator()(double t) const {
     const int after = static_cast<int>(std::lower_bound(time_.begin(), time_.end(), t) - time_.begin());
     if (slope_.empty()) return through_neighbours(t, after);

@@ -17,6 +17,7 @@ public:
     bool empty() const { return time_.empty(); }
     int size() const { return static_cast<int>(time_.size()); }
     double end() const { return time_.back(); }
+    int points_after(double t) const;
 
     // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
     // too near to them.

@@ -1,6 +1,7 @@
 #include "surface3d/motion/motion_measures.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -65,6 +66,25 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 
 }  // namespace
 
+double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
+    if (mesh.order != 4) return 0;
+    // Nodes halfway between two others, in VTK's order: of the triangle, and of its quarters.
+    constexpr std::array<std::array<int, 3>, 3> whole{{{4, 0, 1}, {7, 1, 2}, {10, 2, 0}}};
+    constexpr std::array<std::array<int, 3>, 9> quarters{
+        {{3, 0, 4}, {5, 4, 1}, {6, 1, 7}, {8, 7, 2}, {9, 2, 10}, {11, 10, 0}, {12, 4, 10}, {13, 4, 7}, {14, 7, 10}}};
+    double coarse = 0, fine = 0;
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        const auto misses = [&](const std::array<int, 3>& at) {
+            const auto value = [&](int a) { return values[mesh.node(cell, at[a])]; };
+            const double miss = value(0) - (value(1) + value(2)) / 2;
+            return miss * miss;
+        };
+        for (const auto& at : whole) coarse += misses(at) / whole.size();
+        for (const auto& at : quarters) fine += misses(at) / quarters.size();
+    }
+    return fine > 0 ? std::max(std::log2(coarse / fine) / 2, 0.0) : 2;
+}
+
 MotionMeasures measure(MovingSurface& surface, const MotionState& s, const MotionState* before) {
     const Bending& bending = surface.bending();
     const SurfaceLaw& law = surface.law();
@@ -99,6 +119,7 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
     measure_neck(mesh, m);
     measure_symbol(mesh, bending, m);
+    m.smoothness = smoothness_of(mesh, m.fields.H);
     return m;
 }
 

@@ -23,6 +23,7 @@ struct MotionMeasures {
     MeshTurn turn;
     double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
     Eigen::Vector3d narrowest;     // where that is
+    double smoothness = 0;         // order with which H is interpolated on this mesh, see smoothness_of()
     double symbol = 0;             // smallest principal symbol, theory.md (2.14), x between the principal curvatures
     Eigen::Vector3d least_symbol;  // where it is
 };
@@ -30,6 +31,11 @@ struct MotionMeasures {
 // Of a state on the mesh of `surface`, whose projection is brought there. `before`: where the step that led to it
 // began; the acceleration is 0 without.
 MotionMeasures measure(MovingSurface& surface, const MotionState& state, const MotionState* before = nullptr);
+
+// The order of linear interpolation of nodal values on elements of order 4, from its errors on the triangles and on
+// their quarters: 2 where the mesh resolves them, below 1 where they are rough on the scale of an element. 0, which is
+// not known, for elements of another order.
+double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values);
 
 // INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.
 double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);

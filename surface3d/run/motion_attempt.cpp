@@ -10,6 +10,7 @@
 #include "common/solve/memory.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/run/guards.hpp"
+#include "surface3d/run/motion_error.hpp"
 #include "surface3d/run/motion_series.hpp"
 #include "surface3d/run/motion_start.hpp"
 
@@ -39,10 +40,10 @@ double dissipated_in(double tau, double before, double rate, double now, double 
 }  // namespace
 
 MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
-                             const EndedRun* coarser)
+                             MotionError* error)
     : case_(c),
       clock_(clock),
-      coarser_(coarser),
+      error_(error),
       out_(watch, clock, settings.role == Role::reported),
       outputs_(c, begin_time(c)) {
     memory_.settings = settings;
@@ -66,7 +67,7 @@ void MotionAttempt::begin(const Start& from) {
     summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
     if (const auto fold = find_fold(mesh_quality(start.mesh))) {
-        early_ = *fold;
+        stop_ = *fold;
         return;
     }
     remember_start(case_, start, space, memory_);
@@ -81,9 +82,12 @@ void MotionAttempt::begin(const Start& from) {
     out_.note(doubt_before(case_, now_.bending.energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     trace.add(state_.time, now_.bending.energy);
-    error_now_ = difference_now().value_or(memory_.scale.reference_energy);
+    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_.bending.energy));
+    compare();
+    error_now_ = std::max(error_now_, memory_.error);
     write_row();
     write_frame();
+    check_start();
 }
 
 // Without inertia the surface is not at rest at the start: the velocity of a very short step, which the error of the
@@ -106,8 +110,18 @@ void MotionAttempt::resume(const Restart& restart) {
     look();
     outputs_.go_on_from(state_.time);
     out_.go_on_from(state_.time);
-    trace = pair_memory(restart.record).own;
-    if (outputs_.done()) early_ = StopReport{Stop::finished, state_.time, "reached time.end", ""};
+    if (error_) error_->resume(restart.record, summary.elements);
+    if (outputs_.done())
+        stop_ = StopReport{Stop::finished, state_.time, "reached time.end", ""};
+    else
+        check_start();
+}
+
+// Whether it is worth while to go on at all.
+void MotionAttempt::check_start() {
+    stop_ = check_state();
+    if (!stop_) stop_ = impossible(now_.bending, state_.X);
+    if (!stop_) stop_ = check_crossing(true);
 }
 
 void MotionAttempt::look() {
@@ -243,23 +257,22 @@ std::optional<StopReport> MotionAttempt::step() {
     }
     if (!stop) stop = check_progress();
     if (stop) return stop;
-    out_.safeguard([this] { return record(); });
+    if (out_.reported()) out_.safeguard([this] { return record(); });
     if (wants_new_mesh()) make_new_mesh();
     return std::nullopt;
 }
 
 void MotionAttempt::go() {
-    std::optional<StopReport> stop = early_;
-    if (!stop) stop = check_state();
-    if (!stop) stop = impossible(now_.bending, state_.X);
-    if (!stop) stop = check_crossing(true);
-    if (stop && !early_) compare();
+    while (!stop_) advance();
+    summarise(*stop_);
+}
+
+void MotionAttempt::advance() {
     try {
-        while (!stop) stop = step();
+        stop_ = step();
     } catch (const Paused& pause) {
-        stop = pause_report(pause, state_.time);
+        stop_ = pause_report(pause, state_.time);
     }
-    summarise(*stop);
 }
 
 // Whether the surface and its energy can be believed.
@@ -294,6 +307,8 @@ std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
 std::optional<StopReport> MotionAttempt::check_progress() {
     const double t = state_.time;
     if (auto pause = clock_.find_pause(t)) return pause;
+    if (error_ && memory_.error > error_->give_up * memory_.scale.reference_energy)
+        return StopReport{Stop::resolution_lost, t, "far less accurate than asked for, already", ""};
     if (case_.time.stationary && settling_.is_settled(case_, t, now_.dissipation, now_.bending.area) &&
         what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
@@ -307,17 +322,15 @@ double MotionAttempt::what_may_change() const {
     return std::max({now_.dissipation * left, now_.kinetic, now_.acceleration * left * left});
 }
 
-// From the coarser run of the pair, now; nothing where that is unknown.
-std::optional<double> MotionAttempt::difference_now() const {
-    return coarser_ ? coarser_->trace.difference(state_.time, now_.bending.energy) : std::nullopt;
-}
-
-// What a row states is at least what its energy has risen by: then both runs of the pair may be wrong alike.
+// What a row states is at least what its energy has risen by, and the defect of its balance: there both runs of the
+// pair may be wrong alike.
 void MotionAttempt::compare() {
-    const auto difference = difference_now();
-    const double rise = total() - memory_.balance.lowest_total;
-    error_now_ = std::max(difference.value_or(memory_.scale.reference_energy), rise);
-    if (difference) memory_.error = std::max({memory_.error, *difference, rise});
+    if (!out_.reported()) return;
+    std::optional<double> error;
+    if (error_) error = error_->at(state_.time, now_.bending.energy, now_.smoothness);
+    const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
+    error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
+    if (error) memory_.error = std::max({memory_.error, *error, rise});
 }
 
 // Of a volume that is to be kept, relative to that of the start.
@@ -349,7 +362,7 @@ void MotionAttempt::write_frame() {
 Record MotionAttempt::record() {
     const std::size_t mesh = out_.mesh(cells_of(surface().mesh(state_.X)));
     Record out = motion_record(surface(), state_, now_, memory_, mesh);
-    add_to_record(out, trace, coarser_);
+    if (error_) error_->save(out);
     return out;
 }
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/run/energy_trace.hpp"
 #include "common/run/output_times.hpp"
 #include "common/run/run_output.hpp"
-#include "common/run/run_pairs.hpp"
 #include "common/run/settling.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
 #include "surface3d/run/motion_checks.hpp"
@@ -20,22 +20,30 @@
 
 namespace tubule::surface3d {
 
+class MotionError;
+
 class MotionAttempt {
 public:
-    // All references must outlive the attempt.
+    // All references must outlive the attempt. `error` tells that of the run; none where it is not to be known.
     MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
-                  const EndedRun* coarser);
+                  MotionError* error);
 
-    // One of the first two, then go().
+    // One of the first two; then go(), or steps as they are wanted.
     void begin(const Start& start);
     void resume(const Restart& restart);
     void go();
+    void advance();
+    void end(const StopReport& stop) { stop_ = stop; }  // there are no more
 
     RunSummary summary;
     EnergyTrace trace;
-    // Largest errors, absolute: of the energy against the coarser run; of the balance with dissipation, which shows
-    // what both runs of a pair lose alike.
-    double difference() const { return memory_.error; }
+    const std::optional<StopReport>& stop() const { return stop_; }
+    const MotionSettings& settings() const { return memory_.settings; }
+    const MotionState& state() const { return state_; }  // no nodes: it could not begin
+    CurvedMesh mesh() const { return scheme_->surface().mesh(state_.X); }
+    Record saved() const { return state_record(state_, memory_); }
+    // Largest errors, absolute: of the energy; of the balance with dissipation.
+    double error() const { return memory_.error; }
     double defect() const { return memory_.balance.defect; }
 
 private:
@@ -49,6 +57,7 @@ private:
     void use_mesh(const CurvedMesh& mesh);
     void set_moving();
     void look();
+    void check_start();
 
     // A step.
     std::optional<StopReport> step();
@@ -68,7 +77,6 @@ private:
     double volume_drift() const;
 
     // What is written.
-    std::optional<double> difference_now() const;
     void compare();
     void warn_of_drift();
     void write_row();
@@ -83,7 +91,7 @@ private:
 
     const Case& case_;
     const RunClock& clock_;
-    const EndedRun* coarser_;
+    MotionError* error_;
     RunOutput out_;
     OutputTimes outputs_;
     std::unique_ptr<TimeScheme> scheme_;
@@ -92,7 +100,7 @@ private:
     MotionMemory memory_;
     StallDetector stall_;
     Settling settling_;
-    std::optional<StopReport> early_;  // the run cannot start, or is already complete
+    std::optional<StopReport> stop_;
     double error_now_ = 0;
 };
 

@@ -65,8 +65,8 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
 
 }  // namespace
 
-bool may_be_long(const Case& c, const Start&) {
-    const MotionSettings s = first_settings(c);
+bool may_be_long(const Case& c, const Start& start) {
+    const MotionSettings s = first_settings(c, start);
     const double steps = c.surface.step ? c.time.end / *c.surface.step
                                         : usual_steps * std::max(1.0, steps_by_tolerance(1e-4, s.tolerance));
     return steps * s.elements * usual_step > 20;
@@ -74,9 +74,9 @@ bool may_be_long(const Case& c, const Start&) {
 
 Forecast forecast_motion(const Case& c, const Start& start) {
     const PauseWatch watch(limit, interrupted);
-    const MotionSettings wanted = first_settings(c);
     Forecast out;
     try {
+        const MotionSettings wanted = first_settings(c, start);
         const CurvedMesh some = start.mesh(least_triangles, element_order(c)).mesh;
         const int triangles = start.resizable() ? wanted.elements : some.triangles();
         out.resolution = fmt::format("about {} triangles of order {}", triangles, element_order(c));

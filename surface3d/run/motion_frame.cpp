@@ -18,7 +18,7 @@ void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_next_step", m.next_step), f.number("restart_relaxation", m.scale.relaxation);
     f.number("restart_elements", m.settings.elements), f.number("restart_tolerance", m.settings.tolerance);
     f.number("restart_difference", m.settings.difference), f.number("restart_pair", m.settings.pair);
-    f.number("restart_role", m.settings.role);
+    f.number("restart_role", m.settings.role), f.number("restart_coarser_by", m.settings.coarser_by);
     f.number("restart_area", m.scale.area), f.number("restart_volume", m.scale.volume);
     f.number("restart_least_variation", m.scale.least_variation),
         f.number("restart_lowest_total", m.balance.lowest_total);
@@ -30,7 +30,22 @@ void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_mesh_since", m.count.mesh_since), f.number("restart_meshes", m.count.meshes);
 }
 
+void add_state(Record& out, const MotionState& s, const MotionMemory& memory) {
+    RecordWriter writer(out);
+    state_fields(writer, s);
+    if (s.memory) s.memory->save(writer, s);
+    memory_fields(writer, memory);
+}
+
 }  // namespace
+
+Record state_record(const MotionState& s, const MotionMemory& memory) {
+    Record out;
+    out.time = s.time, out.kind = RecordKind::surface;
+    out.arrays = {array("points", s.X)};
+    add_state(out, s, memory);
+    return out;
+}
 
 Record motion_record(const MovingSurface& surface, const MotionState& s, const MotionMeasures& m,
                      const MotionMemory& memory, std::size_t mesh_number) {
@@ -45,10 +60,7 @@ Record motion_record(const MovingSurface& surface, const MotionState& s, const M
     if (s.p.size() > 0) out.arrays.push_back(array("p", surface.pressure_at_nodes(s)));
     for (const Array& more : {array("H", m.fields.H), array("K", m.fields.K), array("energy_density", density_at)})
         out.arrays.push_back(more);
-    state_fields(RecordWriter(out), s);
-    RecordWriter writer(out);
-    if (s.memory) s.memory->save(writer, s);
-    memory_fields(writer, memory);
+    add_state(out, s, memory);
     return out;
 }
 

@@ -41,7 +41,7 @@ struct MotionMemory {
     MotionBalance balance;
     MotionCounters count;
     double next_step = 0;
-    double error = 0;  // largest difference from the coarser run
+    double error = 0;  // largest so far, of the energy, absolute
     double moved = 0;  // the nodes, at most, since the last look for self-intersection
 };
 
@@ -49,6 +49,9 @@ struct MotionMemory {
 // of the state under names that begin with restart_.
 Record motion_record(const MovingSurface& surface, const MotionState& state, const MotionMeasures& measures,
                      const MotionMemory& memory, std::size_t mesh_number);
+
+// The state alone, without data to be looked at.
+Record state_record(const MotionState& state, const MotionMemory& memory);
 
 struct MotionRestart {
     MotionState state;

@@ -14,8 +14,8 @@ namespace tubule::surface3d {
 // Throws std::runtime_error if the record does not hold what a run goes on from.
 void check_restart(const Case& c, const Record& record);
 
-// Each run is one of a pair: the energies of the coarser one, of fewer triangles and larger steps, tell the error of
-// the finer one, which is written. Pairs become finer until the energy is as accurate as asked at all times.
+// A coarser run goes along with each run and tells its error (MotionError). Runs become finer until the energy is as
+// accurate as asked at all times.
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart);
 
 }  // namespace tubule::surface3d

@@ -1,7 +1,8 @@
-// How fine a run in motion is, and the pairs of runs that tell their error.
+// How fine a run in motion is, and the coarser run that tells its error.
 #pragma once
 
 #include "common/case/case.hpp"
+#include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
 
@@ -17,21 +18,28 @@ struct MotionSettings {
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
     int pair = 1;           // its number
     Role role = Role::reported;
+    double coarser_by = 1;  // of a coarser run: so many times fewer triangles
 };
 
 // The case's, or the default of its model.
 Scheme time_scheme(const Case& c);
 
-// What the case gives, or what its accuracy asks for.
-MotionSettings first_settings(const Case& c);
+// What the case gives, or what its accuracy asks for: as many triangles as the energy of the start takes.
+MotionSettings first_settings(const Case& c, const Start& start);
 bool settings_given(const Case& c);
 
-// Of the other run of a pair.
-MotionSettings coarser(const MotionSettings& s, Role role);
+// About how many triangles the coarser run is to have.
+int fewer_triangles(int triangles);
+// The coarser run, which has so many times fewer triangles (elements of another order: 1). Its errors in time grow by
+// a little more than those in space.
+MotionSettings coarser(const Case& c, const MotionSettings& s, Role role, double coarser_by);
 
-// Of the next pair, after one whose energies differ so much and whose balance is off so much, where less is asked; all
-// absolute.
-MotionSettings finer(const MotionSettings& s, double asked, double difference, double defect);
+// The error of a run over its difference from the coarser one, by the least orders that errors can be relied on to
+// have where H is so smooth (MotionMeasures).
+double error_by_difference(const Case& c, const MotionSettings& s, const MotionSettings& coarser, double smoothness);
+
+// Of the next pair, after one whose error and defect of the balance are so large, where less is asked; all absolute.
+MotionSettings finer(const MotionSettings& s, double asked, double error, double defect);
 
 // Whether more triangles are worth a try.
 bool can_be_finer(const MotionSettings& s);

@@ -34,6 +34,12 @@ VectorField start_velocity(const Case& c, const StartMesh& start) {
     return u;
 }
 
+Observables observe_start(const Case& c, const StartMesh& start) {
+    const SurfaceSpace space(start.mesh);
+    const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
+    return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
+}
+
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);

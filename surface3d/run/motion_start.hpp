@@ -11,6 +11,9 @@ double begin_time(const Case& c);
 // Velocities at the nodes; none at rest.
 VectorField start_velocity(const Case& c, const StartMesh& start);
 
+// Energies, area and volume of a start, as its motion sees them.
+Observables observe_start(const Case& c, const StartMesh& start);
+
 // Area, volume, reference energy, relaxation of the mesh, how well H is known.
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);
 

@@ -1,0 +1,58 @@
+// The error of a run in motion, from a coarser run that goes along with it.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "surface3d/run/motion_attempt.hpp"
+
+namespace tubule::surface3d {
+
+// The coarser run has fewer triangles and larger steps, such that errors in space and in time are larger by about the
+// same factor R, whichever of them it is: the difference of the energies is R - 1 times the error.
+// It is always a little ahead, so that the error is known as the run goes. It has elements of another order where fewer
+// triangles would be too few, are not ours to choose, or lose the surface on the way.
+class MotionError {
+public:
+    // All references must outlive it. `of`: the run whose error it is.
+    MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const MotionSettings& of);
+
+    // With the run, which has so many triangles, or where that goes on. resume() throws as RecordReader. The error of
+    // the start, which is known from a finer mesh: where the shape is not smooth, two meshes may be off by the same.
+    double begin(int triangles, double energy);
+    void resume(const Record& record, int triangles);
+    void save(Record& record) const;
+
+    // Of this energy, absolute; the smoothness is that of MotionMeasures. Nothing where the coarser run has no energy:
+    // it has ended before, or it was told to pause, as the run will be.
+    std::optional<double> at(double time, double energy, double smoothness);
+    // Why and when the coarser run ended, if it has.
+    std::optional<StopReport> stop() const;
+
+    double give_up = HUGE_VAL;  // beyond this error, of E_ref, the run is not worth going on
+
+private:
+    // The coarser run refers to its case.
+    struct Coarser {
+        Case c;
+        std::optional<MotionAttempt> run;
+    };
+
+    std::unique_ptr<Coarser> make(Role role, const MotionSettings& settings) const;
+    void begin(int triangles);
+    void begin(Role role, double coarser_by);
+    double error_of_start(double energy) const;
+
+    const Case& case_;
+    const Start& start_;
+    RunObserver& watch_;
+    const RunClock& clock_;
+    MotionSettings of_;
+    std::unique_ptr<Coarser> coarser_;
+};
+
+// Throws as RecordReader if a run with an error could not go on from this.
+void check_error_restart(const Case& c, const Record& record);
+
+}  // namespace tubule::surface3d
