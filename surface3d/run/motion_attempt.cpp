@@ -238,8 +238,8 @@ std::optional<StopReport> MotionAttempt::step() {
     while (const auto refusal = attempt(tau())) {
         ++memory_.count.rejected;
         memory_.next_step = refusal->shrink * tau();
-        if (refusal->shrink == 0 || case_.surface.step || memory_.next_step < shortest_step * memory_.scale.relaxation)
-            return refusal->report;
+        const double shortest = shortest_step * memory_.scale.relaxation;  // 0 where numbers are too large for any step
+        if (refusal->shrink == 0 || case_.surface.step || !(memory_.next_step > shortest)) return refusal->report;
         check_pause();
     }
     trace.add(state_.time, now_.bending.energy);

@@ -120,7 +120,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
              "15:1: unknown key shape.mode.0.l; did you mean 'n'? Allowed here: amplitude, n, m, phase"},
         Edit{"energy = 1e-6", "rmin = 1e-6",
              "17:1: unknown key accuracy.rmin; did you mean 'r_min'? Allowed here: "
-             "energy, r_min"},
+             "energy, estimate, r_min"},
         Edit{"order", "oder",
              "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
              "order, smoothness, time_tolerance, time_order, symmetry, parametrisation"},
@@ -550,7 +550,7 @@ TEST(CheckCommand, PrintsTheEffectiveCaseAndLooksAtAllCases) {
     std::ofstream(good_path) << good;
     std::ofstream(bad_path) << with("radius", "raduis");
 
-    const auto [output, status] = run_program("check --set energy.k42=0.5 " + good_path);
+    const auto [output, status] = run_program("check --quick --set energy.k42=0.5 " + good_path);
     EXPECT_EQ(status, 0);
     const Case c = parse_case(good, {"energy.k42=0.5"}, good_path);
     EXPECT_EQ(output, "# OK " + good_path + "\n" + effective_toml(c) + "\n");
