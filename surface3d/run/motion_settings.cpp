@@ -18,7 +18,7 @@ constexpr double ahead_in_time = 1.3;                  // errors in time grow by
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
 constexpr double spare = 1.5;                          // the next pair is to be so many times better than asked
 constexpr double later = 2;                            // errors grow from the start on
-constexpr double tolerance_per_accuracy = 1.5;         // tolerance = this * asked accuracy^1.5
+constexpr double tolerance_per_accuracy = 0.9;         // tolerance = this * asked accuracy^1.5
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
 constexpr double loosest_of_coarser = 4e-4;            // beyond it they leave waves that no mesh resolves
 constexpr double least_longer = 2;
