@@ -142,7 +142,7 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
     const bool given = settings_given(setup_.c);
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
                  unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0,
-                 share = std::clamp(start_steps / trace.size(), least_share, 1.0);
+                 share = std::clamp(start_steps / std::max(trace.size(), 1), least_share, 1.0);
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
     const std::optional<double> difference = coarser_->trace.difference(t, s.o.energy);
     error_now_ = std::max(difference ? share * *difference : error_now_, least);

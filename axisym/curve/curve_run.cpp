@@ -70,8 +70,7 @@ public:
         const bool good = last.as_accurate_as_asked && !failed(last.stop);
         if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
         if (failed(last.stop) && ++failures_ > most_failures) return false;
-        const bool known = last.estimated_error < 1;
-        settings_ = finer(settings_, known ? last.estimated_error / case_.accuracy.energy : 1);
+        settings_ = finer(settings_, last.error_is_known() ? last.estimated_error / case_.accuracy.energy : 1);
         return true;
     }
 

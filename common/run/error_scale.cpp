@@ -26,9 +26,9 @@ std::string doubt_after(const Case& c, Stop stop, double start, double end, doub
     const double allowed = c.accuracy.energy * E_ref, change = std::abs(end - start);
     if (kind_of(stop).exit_code != 0 || !(allowed > change) || change <= no_change * E_ref) return "";
     return fmt::format(
-        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy changed by {:.3g} "
-        "only",
-        c.accuracy.energy, allowed, E_ref, change);
+        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy changed by only "
+        "{:.3g}: ask for less than {:.1g}",
+        c.accuracy.energy, allowed, E_ref, change, change / E_ref);
 }
 
 }  // namespace tubule

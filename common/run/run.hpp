@@ -34,12 +34,14 @@ struct RunSummary {
     StopReport stop;
     double energy = 0;            // at the stop
     double reference_energy = 0;  // E_ref, theory.md (11.1): asked and estimated errors are relative to it
-    double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref
+    double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref; 1 where it is unknown
     bool as_accurate_as_asked = true;
     int elements = 0;  // at the stop; of a tube over one period
     std::vector<std::string> warnings;
     std::string effort;  // in words, such as "85 steps, 96 elements"
     About details;       // more of it, by name
+
+    bool error_is_known() const { return estimated_error < 1; }
 };
 
 }  // namespace tubule

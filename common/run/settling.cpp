@@ -6,7 +6,7 @@
 namespace tubule {
 namespace {
 
-constexpr double window = 0.01;  // of the time left: over so long the rate is measured, from the second time on
+constexpr double window = 0.01;  // of the time left: the rate is measured over this long; its first measurement is skipped
 
 }  // namespace
 

@@ -7,17 +7,16 @@
 
 namespace tubule {
 
-// Energy is quadratic in the distance to a minimum, and little changes along a soft mode: time.stationary = e allows
-// for distances of sqrt(e) of the size of the surface.
+// The energy is quadratic in the distance to a minimum and nearly flat along a soft mode: time.stationary = e allows
+// distances of sqrt(e) times the size of the surface.
 class Settling {
 public:
-    // Whether the surface is expected to move by no more than that from now on: at its present speed, as the
-    // dissipation tells it, and at the rate at which that falls, until the end. To be asked after every step. True
-    // where the speed does not fall: then nothing settles.
+    // Whether the surface will move by no more than that until the end, if its speed (from the dissipation) goes on to
+    // fall at its present rate. Call it after every step. True where the speed does not fall: waiting would not help.
     bool is_settled(const Case& c, double time, double dissipation, double area);
 
 private:
-    double since_ = 0, speed_since_ = -1;  // when the rate began to be measured; not yet
+    double since_ = 0, speed_since_ = -1;  // where the measurement of the rate began; -1: not yet
     std::optional<double> rate_;           // measured last
 };
 

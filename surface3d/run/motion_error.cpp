@@ -66,6 +66,10 @@ Saved saved_of(Record& record) {
         throw std::runtime_error(
             "cannot resume from this frame: its coarser run has no cells of these nodes; run the case without "
             "--resume");
+    if (out.stop < -1 || out.stop >= static_cast<int>(stop_kinds.size()))
+        throw std::runtime_error(
+            "cannot resume from this frame: its coarser run ended for an unknown reason; run the case without "
+            "--resume");
     record.time = out.time;
     return out;
 }

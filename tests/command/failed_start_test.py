@@ -64,7 +64,7 @@ class FailedStart(ProgramTest):
                 # The start itself may have an energy, 1e300 or so, and then a row.
                 if len(series(self.result)["time"]) > 0:
                     continue
-                # Rows that are none are no reason to keep it.
+                # A result without rows may be replaced.
                 self.failing(command, self.case, "--set", key, "--set", "energy.k40=1e+300")
                 self.assertIn("energy.k40 = 1e+300", about(self.result)["stop_message"])
                 self.result.unlink()

@@ -474,7 +474,7 @@ class Shown(ScanTest):
         text = picture.read_text()
         for words in ("amplitude A", "k\u2084\u2082", *(f"{name} (" for name in set(outcomes(self.result).flat))):
             self.assertIn(words, text)
-        self.assertNotIn("longest unduloid", text)  # k42 > 0: there is no closed form
+        self.assertNotIn("longest unduloid", text)  # only k42 = 0 has this closed form
         self.scan("case.toml", "--over", f"{AMPLITUDE}=0.1,0.2,0.3")
         self.tubule("plot", self.result, "-o", picture)
         self.assertIn("energy where the run stopped", picture.read_text())

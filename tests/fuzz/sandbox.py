@@ -71,20 +71,19 @@ class Sandbox:
         return subprocess.Popen(command, cwd=self.folder, preexec_fn=begin, env=environment, **options)
 
     def run(self, *arguments, statuses=EXIT_STATUSES, limit=60.0, **options):
-        """Runs the program to its end. A crash, a hang of more than `limit` seconds, an exit status that is not among
-        `statuses`, and words from the inside of the program are findings."""
+        """Runs the program to its end. A crash, a hang (see ended()), an exit status that is not among `statuses`, and
+        words from the inside of the program are findings."""
         return self.judged(self.start(*arguments, **options), arguments, statuses, limit)
 
     def judged(self, process, what, statuses=EXIT_STATUSES, limit=60.0):
         began = time.monotonic()
         what = shlex.join(map(str, what))[:300]
-        try:
-            out, err = process.communicate(timeout=limit * (10 if self.sanitized else 1))
-        except subprocess.TimeoutExpired:
+        ending = ended(process, limit * (10 if self.sanitized else 1))
+        if ending is None:
             process.kill()
             process.communicate()
-            raise Finding("hang", f"{what} runs for more than {limit} s") from None
-        out, err = out or b"", err or b""
+            raise Finding("hang", f"{what} runs for more than {limit} s")
+        out, err = (stream or b"" for stream in ending)
         done = Done(process.returncode, text(out), text(err), time.monotonic() - began)
         said = done.out[-500:] + done.err[-2000:]
         if done.status < 0 and done.status not in statuses:
@@ -94,6 +93,31 @@ class Sandbox:
         if done.status not in statuses:
             raise Finding("exit-status", f"{what}: exit status {done.status}\n{said}")
         return done
+
+
+def ended(process, limit):
+    """What the process wrote, or None if it hangs: it has used more than `limit` seconds of a processor, or none of it
+    for so long. Other work on the machine then makes no finding."""
+    used, used_at = 0, time.monotonic()
+    while True:
+        try:
+            return process.communicate(timeout=1)
+        except subprocess.TimeoutExpired:
+            now = processor_seconds(process.pid)
+            if now > used:
+                used, used_at = now, time.monotonic()
+            if used > limit or time.monotonic() - used_at > limit:
+                return None
+
+
+def processor_seconds(pid):
+    """Of a process and of its children that have ended."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as file:
+            fields = file.read().rpartition(")")[2].split()
+    except FileNotFoundError:
+        return 0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def text(raw):

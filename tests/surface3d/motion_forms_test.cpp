@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
 #include <cmath>
 
 #include "common/shapes/sphere.hpp"
@@ -281,6 +283,39 @@ TEST(StepMatrix, ConvectionIsSkewInARigidRotation) {
     rest.base.mesh_velocity.row(1) = rest.base.velocity.segment(n, n).transpose();
     rest.assembled();
     EXPECT_LT((rest.block(0, n, 0, n) - without).norm(), 1e-13 * without.norm());
+}
+
+// The least beta with sup_u (q, div_P u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |D(u)|^2 dS.
+double inf_sup(const CurvedMesh& mesh) {
+    const SurfaceLaw law = motion_law({.kind = ModelKind::stokes, .Re = 2, .gamma = 1, .keeps_volume = false});
+    AtRest rest(mesh, law, {.k = {1, 0, 0}}, 1);
+    rest.assembled();
+    const int nv = 3 * mesh.size(), p = rest.unknowns.size() - rest.unknowns.p;
+    const Eigen::SparseMatrix<double> norm = rest.system.A.block(0, 0, nv, nv);
+    const Eigen::MatrixXd B = rest.block(0, nv, rest.unknowns.p, p);
+    const SurfaceSpace pressures(rest.unknowns.last_mesh());
+    const Eigen::MatrixXd mass = mass_matrix(pressures, rest.unknowns.last_mesh());
+    const Eigen::MatrixXd schur = B.transpose() * Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(norm).solve(B);
+    return std::sqrt(Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(schur, mass).eigenvalues()[0]);
+}
+
+TEST(InfSup, HoldsOnFinerMeshesOfEveryOrder) {
+    for (const int order : {2, 3, 4})
+        for (const int n : {1, 2, 3})
+            EXPECT_GT(inf_sup(mesh_of(wavy, icosphere(n), order)), 0.9) << "order " << order << ", mesh " << n;
+}
+
+TEST(InfSup, HoldsOnEveryMeshThatARunAccepts) {
+    // Triangles nearly as bad as those that end a run (quality 0.03, motion_checks.cpp), long or irregular: no run
+    // comes to a mesh without this stability before it stops for its mesh.
+    for (const int order : {2, 3, 4}) {
+        const CurvedMesh thin = mesh_of(Tube{1, 6, {{0.2, 1, 0, 0}}}, tube_rings(1, 6, 2, 48), order);
+        EXPECT_LT(mesh_quality(thin).worst, 0.07);
+        EXPECT_GT(inf_sup(thin), 0.6) << order;
+        const CurvedMesh irregular = mesh_of(wavy, jittered(icosphere(2), 0.8, 1), order);
+        EXPECT_LT(mesh_quality(irregular).worst, 0.1);
+        EXPECT_GT(inf_sup(irregular), 0.9) << order;
+    }
 }
 
 TEST(StepMatrix, FluxAndPressureLoad) {

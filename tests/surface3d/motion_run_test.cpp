@@ -433,6 +433,10 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
         std::erase_if(damaged.arrays, [&](const Array& other) { return other.name == a.name; });
         EXPECT_THROW(check(damaged), std::runtime_error) << a.name;
     }
+    Record stopped_oddly = frame;
+    for (auto& [name, value] : stopped_oddly.numbers)
+        if (name == "restart_coarser_run_stop") value = 99;
+    EXPECT_THROW(check(stopped_oddly), std::runtime_error);
     // Again and again: in the run that is found wanting, in the one that will do, or in the coarser runs beside them.
     int times = 0, in_first_pair = 0;
     std::optional<Restart> restart;

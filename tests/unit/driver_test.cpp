@@ -73,7 +73,7 @@ TEST(Driver, SaysWhatIsMissed) {
     EXPECT_EQ(warned.stop.reason, Stop::finished);
     ASSERT_EQ(warned.warnings.size(), 1u);
     EXPECT_EQ(warned.warnings[0],
-              "the estimated error of the energy is 1 of E_ref, but 0.002 was asked for: the triangles are given");
+              "the error of the energy is unknown, but 0.002 was asked for: the triangles are given");
 }
 
 TEST(Driver, PausesBeforeAFinerRun) {

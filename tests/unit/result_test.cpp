@@ -47,7 +47,7 @@ SurfaceCells two_shifted_cells() {
     return {2, 9, {0, 1, 2, 4, 5, 6, 2, 1, 3, 5, 7, 8}, 2.5, {0, 0, -1, 0, 0, 0, 1, 2, 1, 0, 0, 1}};
 }
 
-// A frame on one of them: point data of each kind, and state of the run that is none.
+// A frame on one of them: point data of each kind, and a state of the run that means nothing.
 Record surface_record_at(double time, std::size_t mesh) {
     Record record{time, {{"energy", -1.0 / 3}}, {}, mesh};
     const auto add = [&](const std::string& name, std::vector<std::size_t> shape, std::size_t size) {

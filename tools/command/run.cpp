@@ -165,7 +165,7 @@ void report(const Case& c, const RunSummary& s, const std::string& file, double 
     say(stdout, "{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
     if (!s.stop.advice.empty()) say(stdout, "    {}\n", s.stop.advice);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
-    if (s.reference_energy > 0 && s.estimated_error < 1)
+    if (s.reference_energy > 0 && s.error_is_known())
         say(stdout, "    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
             s.estimated_error, s.reference_energy, c.accuracy.energy);
     else if (s.reference_energy > 0)

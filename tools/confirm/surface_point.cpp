@@ -156,7 +156,7 @@ std::string surface_case(const Case& c, const PointResult& axisymmetric, const C
     s.time.output = output_times(c, axisymmetric, s.time.end);
     add_waves(s, choices.noise);
     const std::string text = effective_toml(s);
-    parse_case(text, {}, c.path);  // what is no case is refused before anything is run
+    parse_case(text, {}, c.path);  // refuses a bad case before anything runs
     return text;
 }
 

@@ -21,7 +21,7 @@ NAMES = {
 
 
 def as_label(words):
-    """What a user or a file calls something, as text of a picture: no mathematics, "?" for what is no character."""
+    """A name given by a user or a file, as text of a picture: "$" is no mathematics, undecodable bytes become "?"."""
     return words.encode(errors="replace").decode().replace("$", r"\$")
 
 
