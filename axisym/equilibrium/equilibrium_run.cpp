@@ -94,12 +94,10 @@ Task task_of(const Case& c) {
         BranchSettings& branch = task.branch;
         branch.from = start_of(*b.parameter, task.problem), branch.to = *b.to;
         branch.shapes = task.settings;
+        if (const std::string wrong = wrong_branch(branch.from, branch.to, *b.step); !wrong.empty())
+            throw CaseError(fmt::format("{}: equilibrium.branch {}", c.path, wrong));
         const double way = branch.to - branch.from;
         const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
-        if (way == 0 || steps > 10000)
-            throw CaseError(
-                fmt::format("{}: equilibrium.branch: {} to {} by {} makes {} steps; the number must be 1 to 10000",
-                            c.path, branch.from, branch.to, *b.step, steps));
         for (int i = 0; i <= steps; ++i)
             branch.output.push_back(i < steps ? branch.from + i * std::copysign(*b.step, way) : branch.to);
     }

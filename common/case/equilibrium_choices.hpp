@@ -1,6 +1,9 @@
 // Table [equilibrium]: a case whose answer is a stationary shape, or a branch of them, instead of a motion.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -22,6 +25,14 @@ struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
     std::optional<double> to, step;
 };
+
+// Words if a branch has no shapes, or too many; else empty.
+inline std::string wrong_branch(double from, double to, double step) {
+    constexpr int most = 10000;
+    const double steps = std::ceil(std::abs(to - from) / step - 1e-9);
+    if (steps >= 1 && steps <= most) return {};
+    return fmt::format("from {} to {} by {} makes {:.7g} steps; the number must be 1 to {}", from, to, step, steps, most);
+}
 
 struct EquilibriumChoices {
     Held held = Held::area_and_volume;

@@ -282,6 +282,15 @@ void check_neck(Keys& k, const Case& c) {
         c.shape);
 }
 
+// Where a branch begins, if the case says so and not the area or volume of its start.
+inline std::optional<double> branch_begin(const Case& c) {
+    const int parameter = *c.equilibrium->branch.parameter;
+    if (parameter == vary_area) return c.equilibrium->area;
+    if (parameter == vary_volume) return c.equilibrium->volume;
+    if (parameter == vary_reduced_volume) return c.equilibrium->reduced_volume;
+    return parameter == vary_H0 ? c.energy.H0 : c.energy.k[parameter];
+}
+
 // Of equilibria of tier axisym.
 template <class Keys>
 void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
@@ -299,6 +308,12 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
         const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
         if (*e.volume <= most) return {};
         return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);
+    });
+    k.check("equilibrium.branch", [&]() -> std::string {
+        const BranchChoices& b = c.equilibrium->branch;
+        if (!b.parameter || !b.to || !b.step) return {};
+        const std::optional<double> from = branch_begin(c);
+        return from ? wrong_branch(*from, *b.to, *b.step) : "";
     });
     k.check("shape.kind", [&] {
         return std::holds_alternative<Torus>(c.shape)

@@ -117,7 +117,9 @@ TEST(EquilibriumCase, refusals) {
     expect("[accuracy]", "[model]\nkind = \"fluid\"\n[accuracy]",
            "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia");
     expect("to = 0.0", "to = 0.12",
-           " equilibrium.branch: 0.12 to 0.12 by 0.05 makes 0 steps; the number must be 1 to 10000");
+           "14:1: equilibrium.branch from 0.12 to 0.12 by 0.05 makes 0 steps; the number must be 1 to 10000");
+    expect("step = 0.05", "step = 1e-9",
+           "14:1: equilibrium.branch from 0.12 to 0 by 1e-09 makes 1.2e+08 steps; the number must be 1 to 10000");
     expect("modes = 1", "area = 1.0",
            " equilibrium.area: a reduced volume of 22.2733 is impossible: the largest is 1, that of a sphere");
 }
