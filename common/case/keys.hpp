@@ -1,6 +1,7 @@
 // The keys of a case file. Every table describes its keys once, as a template over a visitor `Keys`:
 // Reader (reader.hpp) reads and checks a file with it, Writer (write.cpp) writes one. The verbs:
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
+//   ramp       a number, or a table of times and values                    key, target
 //   absent     a key that belongs to other cases, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
 //   table, optional_table, tables (a list of tables), entries (tables under open names)    key, target, description
@@ -73,6 +74,35 @@ void keys(Keys& k, Shape& shape) {
     std::visit([&](auto& which) { keys(k, which); }, shape);
 }
 
+// The keys of what a membrane keeps and, where it is free, of what acts on it.
+template <class Keys>
+void ensemble_keys(Keys& k, Model& model) {
+    const bool inextensible = model_entry(model.kind).inextensible;
+    Choices<AreaRule> rules{{"fixed", AreaRule::fixed}};
+    inextensible ? rules.emplace_back("reservoir", AreaRule::reservoir) : rules.emplace_back("free", AreaRule::free);
+    k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
+    k.choice("area", model.area, rules);
+    k.choice("period", model.free_period, {{"fixed", false}, {"free", true}});
+    const auto load = [&](const char* key, Ramp& target, bool is_free, const std::string& remedy) {
+        if (is_free)
+            k.ramp(key, target);
+        else
+            k.absent(key, "must be absent: only valid with " + remedy);
+    };
+    load("tension", model.tension, area_rule(model) != AreaRule::fixed,
+         fmt::format("area = \"{}\"; what a fixed area needs is the series tension", rules.back().first));
+    load("pressure", model.pressure, !model.keeps_volume.value_or(inextensible),
+         "volume = \"free\"; what a fixed volume needs is the series pressure");
+    load("force", model.force, model.free_period,
+         "period = \"free\"; what a fixed period needs is the series force");
+    k.check("period", [&]() -> std::string {
+        const MotionLaw law = motion_law(model);
+        if (!law.free_period || law.keeps_volume || !law.area_is_free()) return {};
+        return "must not be \"free\" with free volume and area: E + tension A - pressure V - force L of a straight tube "
+               "is linear in L and has no rest state; fix area or volume";
+    });
+}
+
 template <class Keys>
 void keys(Keys& k, Model& model) {
     Choices<ModelKind> kinds;
@@ -85,7 +115,7 @@ void keys(Keys& k, Model& model) {
         for (const char* key : {"Re", "gamma"})
             k.absent(key, "must be absent: only valid with kind = " + quoted_names(&ModelEntry::viscous));
     }
-    k.choice("volume", model.keeps_volume, {{"free", false}, {"fixed", true}});
+    ensemble_keys(k, model);
 }
 
 template <class Keys>
@@ -296,6 +326,8 @@ template <class Keys>
 void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     k.check("model.volume",
             [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
+    k.check("model.area",
+            [&] { return c.model.area ? "must be absent: equilibrium.held says what is held fixed" : ""; });
     k.check("model.kind", [&] {
         return c.equilibrium->modes && law.inertia != 0
                    ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
@@ -323,10 +355,33 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     });
 }
 
+// What a case says about tension, pressure, force and reservoirs, where its tier does not compute it.
+template <class Keys>
+void check_ensemble(Keys& k, const Case& c, const MotionLaw& law) {
+    k.check("model.period", [&] {
+        return law.free_period && !is_tube(c.shape) ? "must not be \"free\": only a tube has a period" : "";
+    });
+    const auto refuse = [&](const char* key, bool chosen) {
+        k.check(key, [&]() -> std::string {
+            if (!chosen) return {};
+            return fmt::format("is not computed in {} yet", c.equilibrium               ? "cases with [equilibrium]"
+                                                            : c.tier == Tier::axisym    ? "tier \"axisym\""
+                                                            : c.tier == Tier::surface3d ? "tier \"surface3d\""
+                                                                                        : "tier \"auto\"");
+        });
+    };
+    refuse("model.area", law.reservoir || law.keeps_area);
+    refuse("model.period", law.free_period);
+    refuse("model.tension", !law.tension.is_zero());
+    refuse("model.pressure", !law.pressure.is_zero());
+    refuse("model.force", !law.force.is_zero());
+}
+
 // Conditions across tables.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
+    check_ensemble(k, c, law);
     const SchemeEntry scheme = c.surface.scheme ? entry(*c.surface.scheme) : SchemeEntry{};
     if (c.tier == Tier::automatic) {
         k.check("discretisation.scheme", [&]() -> std::string {

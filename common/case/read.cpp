@@ -36,6 +36,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
     }
     note_places(root, "", c.places);
     if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;
+    if (!c.model.area && !c.equilibrium) c.model.area = area_rule(c.model);
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;
     if (c.tier != Tier::axisym && c.moves() && !root.at_path("accuracy.energy")) c.accuracy.energy = 1e-3;
     if (root.contains("expect") && !c.expect.stop) c.expect.stop = Stop::finished;

@@ -99,9 +99,9 @@ void Reader::text(const std::string& key, std::string& target, bool needed) {
     target = node->as_string()->get();
 }
 
-void Reader::increasing(const std::string& key, std::vector<double>& target, const Range& range) {
+void Reader::increasing(const std::string& key, std::vector<double>& target, const Range& range, bool needed) {
     const std::string what = "a list of increasing numbers";
-    const toml::node* node = find(key, what, false);
+    const toml::node* node = find(key, what, needed);
     if (!node) return;
     target.clear();
     for (const toml::node& item : as_list(*node, path_of(key), what)) {
@@ -112,6 +112,41 @@ void Reader::increasing(const std::string& key, std::vector<double>& target, con
                                         path, target.back(), x, path_of(key), what));
         target.push_back(x);
     }
+}
+
+void Reader::ramp(const std::string& key, Ramp& target) {
+    const std::string what = "a number, or {time = [...], value = [...]}";
+    const toml::node* node = find(key, what, false);
+    if (!node) return;
+    if (node->is_number())
+        target = number_in(*node, path_of(key), {});
+    else if (node->is_table())
+        ramp_in(*node->as_table(), key, target);
+    else
+        refuse_value(where(*node), path_of(key), what, *node);
+}
+
+void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& target) const {
+    std::vector<double> times, values;
+    read(table, path_of(key), where(table), [&](Reader& k) {
+        k.increasing("time", times, {.from = 0}, required);
+        k.numbers("value", values, required);
+        k.check("value", [&] {
+            return times.empty()                   ? "needs at least one time"
+                   : times.size() != values.size() ? "must be as many numbers as there are times"
+                                                   : "";
+        });
+    });
+    target = Ramp(times, values);
+}
+
+void Reader::numbers(const std::string& key, std::vector<double>& target, bool needed) {
+    const std::string what = "a list of numbers";
+    const toml::node* node = find(key, what, needed);
+    if (!node) return;
+    target.clear();
+    for (const toml::node& item : as_list(*node, path_of(key), what))
+        target.push_back(number_in(item, fmt::format("{}.{}", path_of(key), target.size()), {}));
 }
 
 double Reader::number_in(const toml::node& node, const std::string& path, const Range& range) const {

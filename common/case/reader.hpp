@@ -53,7 +53,12 @@ public:
 
     void flag(const std::string& key, bool& target);
     void text(const std::string& key, std::string& target, bool needed = false);
-    void increasing(const std::string& key, std::vector<double>& target, const Range& range);
+    void increasing(const std::string& key, std::vector<double>& target, const Range& range, bool needed = false);
+
+    void numbers(const std::string& key, std::vector<double>& target, bool needed = false);
+
+    // A number, or {time = [...], value = [...]}.
+    void ramp(const std::string& key, Ramp& target);
 
     void absent(const std::string& key, const std::string& complaint) {
         if (pass_ == Pass::names)
@@ -137,6 +142,7 @@ private:
     void refuse_unknown() const;
     [[noreturn]] void refuse(const std::string& key, const std::string& complaint) const;
 
+    void ramp_in(const toml::table& table, const std::string& key, Ramp& target) const;
     std::string path_of(const std::string& key) const;
     std::string where(const toml::node& node) const;
 

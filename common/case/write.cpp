@@ -16,6 +16,12 @@ std::string toml_number(T value) {
     return digits == "-0" ? "-0.0" : digits;
 }
 
+std::string toml_list(const std::vector<double>& values) {
+    std::vector<std::string> numbers;
+    for (const double value : values) numbers.push_back(toml_number(value));
+    return fmt::format("[{}]", fmt::join(numbers, ", "));
+}
+
 // The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML requires, then its
 // tables.
 class Writer {
@@ -48,9 +54,12 @@ public:
         if (!value.empty()) line(key, toml_string(value));
     }
     void increasing(const std::string& key, const std::vector<double>& values, const Range&) {
-        std::vector<std::string> numbers;
-        for (const double value : values) numbers.push_back(toml_number(value));
-        if (!values.empty()) line(key, fmt::format("[{}]", fmt::join(numbers, ", ")));
+        if (!values.empty()) line(key, toml_list(values));
+    }
+    void ramp(const std::string& key, const Ramp& ramp) {
+        line(key, ramp.times().empty() ? toml_number(ramp.values().front())
+                                       : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()),
+                                                     toml_list(ramp.values())));
     }
 
     void absent(const std::string&, const std::string&) {}

@@ -6,9 +6,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/model/ramp.hpp"
+
 namespace tubule {
 
 enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
+
+// What holds the area: nothing; the area itself, by one number in gradient flow and locally in inextensible models; or
+// a reservoir, which feeds an inextensible membrane uniformly.
+enum class AreaRule { free, fixed, reservoir };
 
 // What a case says about its law of motion.
 struct Model {
@@ -16,6 +22,10 @@ struct Model {
     double Re = 1;                     // of viscous models: 1/Re is the viscosity
     double gamma = 0;                  // of viscous models: friction
     std::optional<bool> keeps_volume;  // by default as the model has it
+    std::optional<AreaRule> area{};    // by default free in gradient flow, else fixed
+    bool free_period = false;          // of tubes
+    // Given where area, volume and period are free: theory.md (3.16).
+    Ramp tension{}, pressure{}, force{};
 };
 
 // One model. Names and allowed keys of case files, options and messages are derived from this table.
@@ -51,26 +61,46 @@ inline std::string quoted_names(bool ModelEntry::*has) {
 }
 
 // The dimensionless law of motion of a membrane, theory.md (3.1), u its velocity and b the bending force:
-//   inertia (d_t u + grad_w u) = 2 viscosity div D(u) - friction u - grad p - p H nu + b nu - lambda nu
-// An extensible membrane moves along its normal alone: friction u.nu = b - lambda, without p.
+//   inertia (d_t u + grad_w u) = 2 viscosity div D(u) - friction u - grad p - p H nu + b nu + pressure nu
+// with lambda = -pressure where the volume is kept. An extensible membrane moves along its normal alone, without p:
+// friction u.nu = b + tension H + pressure. The multiplier of an area that is kept as a whole is a tension, too.
 struct MotionLaw {
     double inertia = 0;        // 0 or 1
     double viscosity = 0;      // 1/Re
     double friction = 0;       // gamma
-    bool inextensible = true;  // div u = 0 along the membrane, by the pressure p
+    bool inextensible = true;  // div u is the same everywhere, by the pressure p; 0 without a reservoir
     bool keeps_volume = true;  // by the number lambda
+    bool keeps_area = false;   // of extensible membranes: as a whole, by one number
+    bool reservoir = false;    // of inextensible ones: feeds the membrane uniformly; the mean of p is -tension
+    bool free_period = false;  // of tubes: the period follows the axial force
+    // What falls is F = E + tension A - pressure V - force L: theory.md (3.16).
+    Ramp tension{}, pressure{}, force{};
 
-    // The L2 gradient flow of the energy alone: nothing is kept.
-    bool unconstrained() const { return !inextensible && !keeps_volume; }
+    // The L2 gradient flow of F: nothing is kept.
+    bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
+    bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
+    // Whether F is E alone at all times.
+    bool without_loads() const { return tension.is_zero() && pressure.is_zero() && force.is_zero(); }
 };
+
+inline AreaRule area_rule(const Model& model) {
+    return model.area.value_or(model_entry(model.kind).inextensible ? AreaRule::fixed : AreaRule::free);
+}
 
 inline MotionLaw motion_law(const Model& model) {
     const ModelEntry& has = model_entry(model.kind);
+    const AreaRule area = area_rule(model);
     return {.inertia = has.inertia ? 1.0 : 0.0,
             .viscosity = has.viscous ? 1 / model.Re : 0,
             .friction = has.viscous ? model.gamma : 1,
             .inextensible = has.inextensible,
-            .keeps_volume = model.keeps_volume.value_or(has.inextensible)};
+            .keeps_volume = model.keeps_volume.value_or(has.inextensible),
+            .keeps_area = !has.inextensible && area == AreaRule::fixed,
+            .reservoir = area == AreaRule::reservoir,
+            .free_period = model.free_period,
+            .tension = model.tension,
+            .pressure = model.pressure,
+            .force = model.force};
 }
 
 }  // namespace tubule

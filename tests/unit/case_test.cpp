@@ -304,6 +304,73 @@ TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
     });
 }
 
+// What a case gives must be free, and what it asks for must be a motion with a state of rest.
+TEST(CaseRefusal, LoadsOnWhatIsFixed) {
+    const std::string flow = "kind = \"gradient-flow\"";
+    const auto model = [&](const std::string& keys, const std::string& message) {
+        return Edit{flow, keys, message};
+    };
+    expect_refused({
+        model(flow + "\narea = \"fixed\"\ntension = 0.1",
+              "10:11: model.tension must be absent: only valid with area = \"free\"; what a fixed area needs is the "
+              "series tension"),
+        model("kind = \"stokes\"\ntension = 0.1",
+              "9:11: model.tension must be absent: only valid with area = \"reservoir\"; what a fixed area needs is "
+              "the series tension"),
+        model(flow + "\nvolume = \"fixed\"\npressure = 0",
+              "10:12: model.pressure must be absent: only valid with volume = \"free\"; what a fixed volume needs is "
+              "the series pressure"),
+        model("kind = \"fluid\"\npressure = 0",
+              "9:12: model.pressure must be absent: only valid with volume = \"free\"; what a fixed volume needs is "
+              "the series pressure"),
+        model(flow + "\nvolume = \"fixed\"\nforce = 1",
+              "10:9: model.force must be absent: only valid with period = \"free\"; what a fixed period needs is the "
+              "series force"),
+        model(flow + "\narea = \"reservoir\"",
+              "9:8: model.area must be one of \"fixed\", \"free\", not \"reservoir\""),
+        model("kind = \"fluid\"\narea = \"free\"",
+              "9:8: model.area must be one of \"fixed\", \"reservoir\", not \"free\""),
+        model(flow + "\nperiod = \"free\"",
+              "9:10: model.period must not be \"free\" with free volume and area: E + tension A - pressure V - force "
+              "L of a straight tube is linear in L and has no rest state; fix area or volume"),
+        model("kind = \"overdamped\"\nvolume = \"free\"\narea = \"reservoir\"\nperiod = \"free\"",
+              "11:10: model.period must not be \"free\" with free volume and area: E + tension A - pressure V - force "
+              "L of a straight tube is linear in L and has no rest state; fix area or volume"),
+    });
+    const std::string sphere =
+        "tier = \"axisym\"\nenergy.k20 = 1\ntime.end = 1\nshape = {kind = \"sphere\", radius = 1}\n"
+        "[model]\nvolume = \"fixed\"\nperiod = \"free\"\n";
+    EXPECT_EQ(refusal(sphere), "case.toml:7:10: model.period must not be \"free\": only a tube has a period");
+}
+
+TEST(CaseRefusal, RampsThatAreNone) {
+    const std::string flow = "kind = \"gradient-flow\"", numbers = "a number, or {time = [...], value = [...]}";
+    const auto tension = [&](const std::string& value, const std::string& message) {
+        return Edit{flow, flow + "\ntension = " + value, message};
+    };
+    expect_refused({
+        tension("\"high\"", "9:11: model.tension must be " + numbers + ", not the string \"high\""),
+        tension("[0, 1]", "9:11: model.tension must be " + numbers + ", not a list"),
+        tension("inf", "9:11: model.tension must be a finite number, not inf"),
+        tension("{time = [0, 1]}", "9:11: missing key model.tension.value: a list of numbers"),
+        tension("{value = [0, 1]}", "9:11: missing key model.tension.time: a list of increasing numbers"),
+        tension("{time = [0, 2, 1], value = [0, 0.5, 1]}",
+                "9:26: model.tension.time.2 must be larger than the 2 before it, not 1: model.tension.time is a list "
+                "of increasing numbers"),
+        tension("{time = [0, 1, 1], value = [0, 0.5, 1]}",
+                "9:26: model.tension.time.2 must be larger than the 1 before it, not 1: model.tension.time is a list "
+                "of increasing numbers"),
+        tension("{time = [-1, 1], value = [0, 1]}", "9:20: model.tension.time.0 must be a number >= 0, not -1"),
+        tension("{time = [0, 1], value = [0, 1, 2]}",
+                "9:35: model.tension.value must be as many numbers as there are times"),
+        tension("{time = [], value = []}", "9:31: model.tension.value needs at least one time"),
+        tension("{time = [0, 1], value = [0, \"a\"]}",
+                "9:39: model.tension.value.1 must be a finite number, not the string \"a\""),
+        tension("{time = [0], values = [0]}",
+                "9:24: unknown key model.tension.values; did you mean 'value'? Allowed here: time, value"),
+    });
+}
+
 TEST(CaseRefusal, Files) {
     const auto message = [](const std::filesystem::path& path) -> std::string {
         try {
@@ -477,6 +544,18 @@ TEST(Case, AcceptsEveryKeyAtTheEdgeOfItsRange) {
     EXPECT_EQ(c.expect.values[3].time, 1.4);
 }
 
+TEST(Case, HoldsItsLoads) {
+    const auto law = [](const std::vector<std::string>& sets) {
+        return motion_law(parse_case(good, sets, "case.toml").model);
+    };
+    const MotionLaw plain = law({});
+    EXPECT_TRUE(plain.unconstrained() && plain.area_is_free() && plain.without_loads());
+    EXPECT_FALSE(plain.keeps_area || plain.reservoir || plain.free_period);
+    const Case zero = parse_case(good, {"model.tension=0", "model.pressure=0"}, "case.toml");
+    EXPECT_EQ(zero.model.tension, Ramp(0));
+    EXPECT_EQ(zero.model.area, AreaRule::free);  // the default, once it is read
+}
+
 TEST(Case, KnowsTheSeriesOfEveryEnergyTerm) {
     for_each_bending_term([](std::size_t, const auto& term) {
         const std::string series = std::string("energy_") + term.name;
@@ -628,7 +707,7 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
         "tier = \"axisym\"\n"
         "\n[about]\ntitle = \"test\"\n"
         "\n[energy]\nk20 = 1\nk40 = 0\nk42 = 0.06\nH0 = -2\n"
-        "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\n"
+        "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\narea = \"free\"\nperiod = \"fixed\"\ntension = 0\npressure = 0\n"
         "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
         "\n[[shape.mode]]\namplitude = 0.3\nn = 1\nm = 0\nphase = 0\n"
         "\n[accuracy]\nenergy = 1e-06\nr_min = 0.001\n"

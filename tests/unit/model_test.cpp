@@ -37,6 +37,53 @@ TEST(Model, hasTheDocumentedLaw) {
     }
 }
 
+TEST(Model, turnsWhatIsHeldIntoTheLaw) {
+    const MotionLaw held = motion_law({.keeps_volume = {}, .area = AreaRule::fixed});
+    EXPECT_TRUE(held.keeps_area && !held.unconstrained() && !held.area_is_free());
+    const Model fed{.kind = ModelKind::fluid, .keeps_volume = false, .area = AreaRule::reservoir, .tension = 0.3};
+    const MotionLaw law = motion_law(fed);
+    EXPECT_TRUE(law.reservoir && law.inextensible && law.area_is_free() && !law.keeps_volume && !law.keeps_area);
+    EXPECT_EQ(law.tension.at(5), 0.3);
+    EXPECT_FALSE(law.without_loads());
+    const MotionLaw pulled = motion_law({.keeps_volume = true, .free_period = true, .force = 2});
+    EXPECT_TRUE(pulled.free_period && pulled.force.at(0) == 2 && !pulled.without_loads());
+}
+
+TEST(Ramp, isLinearBetweenItsTimesAndConstantOutside) {
+    const Ramp ramp({1, 2, 4}, {0, 3, -1});
+    const double times[] = {0, 1, 1.5, 2, 3, 4, 9}, values[] = {0, 0, 1.5, 3, 1, -1, -1},
+                 slopes[] = {0, 3, 3, -2, -2, 0, 0};  // after a kink
+    for (int i = 0; i < 7; ++i) {
+        EXPECT_EQ(ramp.at(times[i]), values[i]) << times[i];
+        EXPECT_EQ(ramp.slope(times[i]), slopes[i]) << times[i];
+    }
+    EXPECT_EQ(ramp.next_kink(0), 1);
+    EXPECT_EQ(ramp.next_kink(1), 2);
+    EXPECT_EQ(ramp.next_kink(2.5), 4);
+    EXPECT_EQ(ramp.next_kink(4), HUGE_VAL);
+    EXPECT_EQ(ramp.largest(), 3);
+    EXPECT_FALSE(ramp.is_constant() || ramp.is_zero());
+}
+
+TEST(Ramp, mayBeANumber) {
+    const Ramp constant = -2;
+    EXPECT_EQ(constant.at(-1), -2);
+    EXPECT_EQ(constant.at(7), -2);
+    EXPECT_EQ(constant.slope(0), 0);
+    EXPECT_EQ(constant.next_kink(0), HUGE_VAL);
+    EXPECT_EQ(constant.largest(), 2);
+    EXPECT_TRUE(constant.is_constant() && !constant.is_zero() && Ramp().is_zero());
+    EXPECT_EQ(Ramp({3}, {0.5}).at(0), 0.5);
+    EXPECT_EQ(Ramp({0, 1}, {2, 2}).next_kink(0), HUGE_VAL);
+}
+
+TEST(Ramp, refusesTimesThatDoNotAscend) {
+    EXPECT_THROW(Ramp({0, 1}, {1}), std::invalid_argument);
+    EXPECT_THROW(Ramp({}, {}), std::invalid_argument);
+    EXPECT_THROW(Ramp({1, 1}, {0, 1}), std::invalid_argument);
+    EXPECT_THROW(Ramp({2, 1}, {0, 1}), std::invalid_argument);
+}
+
 TEST(Model, isNamedInCaseFilesAndTakesItsKeys) {
     for (const ModelEntry& m : models) {
         const std::string text =
