@@ -11,7 +11,8 @@ namespace {
 
 // Whether the case can be computed as a graph r(z), and nothing else is asked for.
 bool begins_as_graph(const Case& c) {
-    return std::holds_alternative<Tube>(c.shape) && motion_law(c.model).unconstrained() &&
+    const MotionLaw law = motion_law(c.model);
+    return std::holds_alternative<Tube>(c.shape) && law.unconstrained() && !law.loads_change() &&
            c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
 }
 

@@ -36,7 +36,7 @@ CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, const RunClock& cl
 
 const Snapshot& CurveAttempt::observe(double t, const double* y, const double* rate) {
     if (t != observed_at_) {
-        now_ = measure(*setup_.motion, y, rate);
+        now_ = measure(*setup_.motion, t, y, rate);
         observed_at_ = t;
     }
     return now_;
@@ -45,12 +45,12 @@ const Snapshot& CurveAttempt::observe(double t, const double* y, const double* r
 void CurveAttempt::begin() {
     const CurveBegin at = begin_state(setup_);
     make_flow(at.y, at.rate, at.time, at.first_step);
-    const Snapshot s = measure(*setup_.motion, at.shown.data(), at.rate.data());
+    const Snapshot s = measure(*setup_.motion, 0, at.shown.data(), at.rate.data());
     past_.total_start = s.total();
-    past_.total_least = past_.total_start;
-    out_.note(doubt_before(setup_.c, s.o.energy, summary.reference_energy));
+    past_.least = past_.total_start;
+    out_.note(doubt_before(setup_.c, s.free_energy, summary.reference_energy));
     compare(0, s);
-    trace.add(0, s.o.energy, 0);
+    trace.add(0, s.free_energy, 0);
     add_to_trace(at.time);
     write_row(0, s, at.shown.data());
     write_frame(0, s, at.shown.data(), at.rate.data());
@@ -60,14 +60,15 @@ void CurveAttempt::begin() {
 
 void CurveAttempt::resume(const Record& restart) {
     const CurveRestart state = curve_restart(restart);
-    past_.total_start = state.total_start, past_.dissipated = state.dissipated, error = state.error;
+    past_.total_start = state.total_start, past_.dissipated = state.dissipated, past_.work = state.work;
+    error = state.error;
     least_symbol = state.least_symbol;
     summary.reference_energy = state.reference_energy;
     trace = pair_memory(restart).own;
     outputs_.go_on_from(restart.time);
     out_.go_on_from(restart.time);
     make_flow(state.y, state.rate, restart.time, 0);
-    past_.total_least = now_.total();
+    past_.least = now_.total() - past_.work;
     add_to_trace(restart.time);
 }
 
@@ -75,6 +76,11 @@ void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& ra
     FlowSystem system = setup_.system();
     system.dissipation = [this](double t, const double* at, const double* v) {
         return observe(t, at, v).balance.dissipation;
+    };
+    past_.rates = load_rates(setup_.motion->law(), time);
+    system.work = [this](double t, const double* at, const double* v) {
+        const Snapshot& s = observe(t, at, v);
+        return past_.rates.energy(s.o.area, s.o.volume, s.period);
     };
     system.guards = [this](double t, const double* at, const double* v) {
         const Snapshot& s = observe(t, at, v);
@@ -89,9 +95,29 @@ void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& ra
     keep_good();
 }
 
+// From another state, or with loads that change at another rate.
+void CurveAttempt::restart_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time) {
+    past_.dissipated = dissipated(time), past_.work = work(time);
+    past_.counters = counters();
+    make_flow(y, rate, time, 0);
+}
+
+FlowCounters CurveAttempt::counters() const {
+    FlowCounters out = past_.counters;
+    return out += flow_->counters();
+}
+
 void CurveAttempt::add_to_trace(double t) {
-    const Eigen::VectorXd gradient = setup_.motion->forms().gradient({.energy = 1}, setup_.curve(flow_->x()));
-    trace.add(t, now_.o.energy, gradient.dot(setup_.curve(flow_->v())));
+    const MotionLaw& law = setup_.motion->law();
+    const Loads loads = loads_at(law, t);
+    const Eigen::VectorXd gradient = setup_.motion->forms().gradient(
+                              {.energy = 1, .area = loads.tension, .volume = -loads.pressure},
+                              setup_.curve(flow_->x())),
+                          moves = setup_.curve(flow_->v());
+    const double lengthens = law.free_period ? setup_.space->images() * moves[setup_.motion->layout().rise] : 0;
+    trace.add(
+        t, now_.free_energy,
+        gradient.dot(moves) - loads.force * lengthens + past_.rates.energy(now_.o.area, now_.o.volume, now_.period));
 }
 
 // Bound of the change of the energy until the end, from the present dissipation, kinetic energy and acceleration.
@@ -103,7 +129,8 @@ double CurveAttempt::what_may_change(double t) const {
 std::optional<StopReport> CurveAttempt::check(double t) {
     const std::optional<double> stationary = setup_.c.time.stationary;
     if (auto pause = clock_.find_pause(t)) return pause;
-    if (stationary && past_.settling.is_settled(setup_.c, t, now_.balance.dissipation, now_.o.area) &&
+    const bool loads_rest = next_kink(setup_.motion->law(), t) == HUGE_VAL;
+    if (stationary && loads_rest && past_.settling.is_settled(setup_.c, t, now_.balance.dissipation, now_.o.area) &&
         what_may_change(t) < *stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
@@ -111,9 +138,11 @@ std::optional<StopReport> CurveAttempt::check(double t) {
 }
 
 std::optional<StopReport> CurveAttempt::step() {
-    const double end = setup_.c.time.end;
-    const Flow::Outcome outcome = flow_->advance(end);
+    const double end = setup_.c.time.end, kink = next_kink(setup_.motion->law(), flow_->time());
+    Flow::Outcome outcome = flow_->advance(std::min(kink, end));
     const double t = flow_->time();
+    const bool at_kink = outcome == Flow::Outcome::end && t < end;
+    if (at_kink) outcome = Flow::Outcome::step;
     if (auto stall = stall_.after_step(t, flow_->step_size(), end)) return stall;
     if (outcome == Flow::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
@@ -130,6 +159,7 @@ std::optional<StopReport> CurveAttempt::step() {
     if (outcome == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(s, t);
     if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
     keep_good();
+    if (at_kink) restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), t);
     out_.safeguard([this] { return record(); });
     return check(t);
 }
@@ -144,20 +174,19 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
                  unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0,
                  share = std::clamp(start_steps / std::max(trace.size(), 1), least_share, 1.0);
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
-    const std::optional<double> difference = coarser_->trace.difference(t, s.o.energy);
+    const std::optional<double> difference = coarser_->trace.difference(t, s.free_energy);
     error_now_ = std::max(difference ? share * *difference : error_now_, least);
     error = std::max(error, error_now_);
 }
 
-// No law of motion lets the total energy rise: what it rises by is an error. Where that is large, the run goes back to
-// the last good step.
+// No law of motion lets the total energy, less the work of loads that change, rise: what it rises by is an error. Where
+// that is large, the run goes back to the last good step.
 std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
     const bool asked = out_.reported() && !settings_given(setup_.c);
-    const double rise = s.total() - past_.total_least,
+    const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
                  allowed = (asked ? setup_.c.accuracy.energy : hopeless_rise) * summary.reference_energy;
     if (!(rise <= allowed)) {
-        past_.dissipated = dissipated(past_.time);
-        make_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time, 0);
+        restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time);
         return StopReport{
             Stop::resolution_lost, past_.time,
             fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
@@ -165,7 +194,7 @@ std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
             "ask for more accuracy; check that the energy resists bending where H = H0"};
     }
     error = std::max(error, rise);
-    past_.total_least = std::min(past_.total_least, s.total());
+    past_.least = std::min(past_.least, bound);
     return std::nullopt;
 }
 
@@ -201,7 +230,7 @@ void CurveAttempt::go() {
             doubt_after(setup_.c, stop->reason, past_.total_start, now_.total(), summary.reference_energy);
         !doubt.empty())
         summary.warnings.push_back(doubt);
-    summary.counters = flow_->counters();
+    summary.counters = counters();
     out_.end(*stop, flow_->time(), [this] { return record(); });
     describe_effort(summary);
 }
@@ -215,7 +244,7 @@ void CurveAttempt::write_outputs(double until) {
         } else if (out_.reported()) {
             Eigen::VectorXd y(setup_.motion->layout().size), rate(y.size());
             flow_->interpolate(t, y.data(), rate.data());
-            const Snapshot between = measure(*setup_.motion, y.data(), rate.data());
+            const Snapshot between = measure(*setup_.motion, t, y.data(), rate.data());
             write_row(t, between, y.data());
             write_frame(t, between, y.data(), rate.data());
         }
@@ -224,8 +253,8 @@ void CurveAttempt::write_outputs(double until) {
 
 void CurveAttempt::write_row(double t, const Snapshot& s, const double* y) {
     if (!out_.wants_row(t)) return;
-    out_.row(t, setup_.series.values(
-                    {t, s, y, *setup_.motion, *flow_, defect(t, s), error_now_, summary.elements, out_.seconds()}));
+    out_.row(t, setup_.series.values({t, s, y, *setup_.motion, *flow_, defect(t, s), work(t), error_now_,
+                                      summary.elements, out_.seconds()}));
 }
 
 void CurveAttempt::write_frame(double t, const Snapshot& s, const double* y, const double* rate) {
@@ -242,7 +271,8 @@ Record CurveAttempt::record(double t, const Snapshot& s, const double* y, const 
                              dissipated(t),
                              error,
                              summary.reference_energy,
-                             least_symbol};
+                             least_symbol,
+                             work(t)};
     Record out = curve_record(t, *setup_.motion, state, s.o.energy);
     add_to_record(out, trace, coarser_);
     return out;

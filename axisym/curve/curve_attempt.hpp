@@ -34,21 +34,24 @@ public:
 
 private:
     struct Past {
-        double total_start = 0, dissipated = 0;  // before this flow began
-        double total_least = 0;                  // of all steps
-        Eigen::VectorXd y, rate;                 // of the last good step
+        double total_start = 0, dissipated = 0, work = 0;  // before this flow began
+        double least = 0;                                  // over all steps, of what never rises: total less work
+        FlowCounters counters;
+        Loads rates;              // of change, of the loads of this flow
+        Eigen::VectorXd y, rate;  // of the last good step
         double time = 0;
         Settling settling;
     };
 
     const Snapshot& observe(double t, const double* y, const double* rate);
     void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
+    void restart_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time);
     std::optional<StopReport> check_start();
     std::optional<StopReport> step();
     std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);
     void compare(double t, const Snapshot& s);
-    double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t); }
+    double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }
     void keep_good();
     double what_may_change(double t) const;
     void add_to_trace(double t);
@@ -59,6 +62,8 @@ private:
     Record record(double t, const Snapshot& s, const double* y, const double* rate) const;
     Record record() const { return record(flow_->time(), now_, flow_->x(), flow_->v()); }
     double dissipated(double t) const { return past_.dissipated + flow_->dissipated(t); }
+    double work(double t) const { return past_.work + flow_->work(t); }
+    FlowCounters counters() const;
 
     CurveSetup setup_;
     const RunClock& clock_;

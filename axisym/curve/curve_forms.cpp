@@ -17,7 +17,7 @@ constexpr int wide = ProfileSpace::max_width;
 // A curve at the quadrature points of one group, from the coefficients of one element.
 struct Local {
     Pack r{0.0}, r1{0.0}, r2{0.0}, z1, z2{0.0};
-    Local(const CurveSpace& space, int e, int g, const double* x) : z1(space.rise()) {
+    Local(const CurveSpace& space, int e, int g, const double* x) : z1(space.rise(x)) {
         const auto& b = space.splines().basis(e, g);
         const double* z = x + space.r().size();
         for (int a = 0; a < space.splines().width(); ++a) {
@@ -75,6 +75,13 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
         for (int b = 0; b < 2 * w; ++b)
             for (int a = 0; a < 2 * w; ++a)
                 if (dof(e, a) >= 0 && dof(e, b) >= 0) entries.emplace_back(dof(e, a), dof(e, b), 0.0);
+    if (space.free_period()) {
+        const int rise = space.shape_size();
+        for (int i = 0; i <= rise; ++i) {
+            entries.emplace_back(i, rise, 0.0);
+            entries.emplace_back(rise, i, 0.0);
+        }
+    }
     pattern_.resize(space.size(), space.size());
     pattern_.setFromTriplets(entries.begin(), entries.end());
     for (int e = 0; e < n; ++e)
@@ -93,7 +100,7 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
 template <int P>
 [[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const double* x, double* out) const {
     const ProfileSpace& splines = space_.splines();
-    Pack smallest{std::numeric_limits<double>::infinity()};
+    Pack smallest{std::numeric_limits<double>::infinity()}, rise{0.0};
     for (int e = 0; e < splines.elements(); ++e) {
         Pack sums[2][2] = {{Pack(0.0), Pack(0.0)}, {Pack(0.0), Pack(0.0)}};  // [field][half of the splines]
         for (int g = 0; g < splines.groups(); ++g) {
@@ -104,6 +111,7 @@ template <int P>
             const Pack weight = images_ * load(basis.weight);
             alignas(32) double c[5][lanes];
             for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
+            rise += weight * density.d[first_variable[1]];
             for (int q = 0; q < lanes; ++q)
                 for (int field = 0; field < 2; ++field)
                     for (int d = first_derivative[field]; d < 3; ++d) {
@@ -121,6 +129,7 @@ template <int P>
             for (int a = 0; a <= P; ++a) to[f.dofs(e)[a]] += f.signs(e)[a] * local[a];
         }
     }
+    if (space_.free_period()) out[space_.shape_size()] += stdx::reduce(rise);
     return stdx::hmin(smallest) > 0;
 }
 
@@ -174,7 +183,51 @@ bool CurveForms::add_gradient(const Weights& weights, const double* x, double* o
 }
 
 void CurveForms::add_hessian(const Weights& weights, const double* x, double* values) const {
-    return for_degree(space_.splines().degree(), [&](auto P) { return hessian_kernel<P()>(weights, x, values); });
+    for_degree(space_.splines().degree(), [&](auto P) { hessian_kernel<P()>(weights, x, values); });
+    if (!space_.free_period()) return;
+    const int rise = space_.shape_size();
+    double* column = values + pattern_.outerIndexPtr()[rise];  // all rows, in order
+    add_rise_hessian(weights, x, [&](int i, double value) {
+        column[i] += value;
+        if (i != rise) values[pattern_.outerIndexPtr()[i + 1] - 1] += value;  // the last row of each column
+    });
+}
+
+// The second derivatives with one in the rise, by the number of the other coefficient.
+template <class Add>
+void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const Add& add) const {
+    const ProfileSpace& splines = space_.splines();
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const auto density = functional_density<2>(bending_, weights, Local(space_, e, g, x));
+            const Pack weight = images_ * load(basis.weight);
+            const int z1 = first_variable[1];
+            add(space_.shape_size(), stdx::reduce(weight * density.dd[packed<5>(z1, z1)]));
+            for (int field = 0; field < 2; ++field) {
+                const Field& f = field == 0 ? space_.r() : space_.z();
+                for (int d = first_derivative[field]; d < 3; ++d) {
+                    const Pack c =
+                        weight * density.dd[packed<5>(z1, first_variable[field] + d - first_derivative[field])];
+                    for (int a = 0; a < splines.width(); ++a)
+                        add(f.dofs(e)[a] + (field == 0 ? 0 : space_.r().size()),
+                            f.signs(e)[a] * stdx::reduce(c * load(basis.by_point[d][a])));
+                }
+            }
+        }
+}
+
+double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    Pack sum{0.0};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(space_, e, g, x.data());
+            const auto density = functional_density<1>(bending_, weights, at);
+            sum += load(splines.basis(e, g).weight) *
+                   (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
+        }
+    return images_ * stdx::reduce(sum);
 }
 
 Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::VectorXd& x) const {

@@ -1,5 +1,5 @@
-// Functionals of a profile curve and their derivatives in the coefficients of (r, z): bending energy, area, volume, and
-// the gauge that keeps the parametrisation even.
+// Functionals of a profile curve and their derivatives in the coefficients of (r, z) and in a free rise: bending
+// energy, area, volume, and the gauge that keeps the parametrisation even.
 #pragma once
 
 #include <Eigen/Core>
@@ -55,6 +55,8 @@ public:
     // As above, added to the values of a matrix with pattern().
     void add_hessian(const Weights& weights, const double* x, double* values) const;
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    // The derivative along the displacement z e_z, which stretches a curve along the axis: theory.md (3.19).
+    double stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const;
     // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
@@ -71,6 +73,8 @@ private:
     bool gradient_kernel(const Weights& weights, const double* x, double* out) const;
     template <int P>
     void hessian_kernel(const Weights& weights, const double* x, double* values) const;
+    template <class Add>
+    void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
     std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const;
 
     const CurveSpace& space_;

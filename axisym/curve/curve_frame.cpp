@@ -24,7 +24,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_pair", s.settings.pair), f.number("restart_role", s.settings.is_coarser);
     f.number("restart_total_start", s.total_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
-    f.number("restart_least_symbol", s.least_symbol);
+    f.number("restart_least_symbol", s.least_symbol), f.number("restart_work", s.work);
 }
 
 // One point of the profile, with curvatures and flow.
@@ -46,7 +46,8 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     const bool flows = motion.law().inextensible;
     const double* v = flows ? state.y.data() : state.rate.data();
     const double u = space.r().evaluate(v + (flows ? at.u_r : at.r), s)[0];
-    const double w = space.z().evaluate(v + (flows ? at.u_z : at.z), s)[0];
+    double w = space.z().evaluate(v + (flows ? at.u_z : at.z), s)[0];
+    if (!flows && at.stretch >= 0) w -= state.y[at.stretch] * space.z().evaluate(state.y.data() + at.z, s)[0];
     Sample out{c.r, c.z, p.H, p.K, u * t_z - w * t_r, u * t_r + w * t_z, 0, 0};
     if (at.swirl >= 0) out.u_theta = space.r().evaluate(state.y.data() + at.swirl, s)[0];
     if (at.p >= 0) out.p = motion.pressures().evaluate(state.y.data() + at.p, s)[0];
@@ -92,7 +93,7 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
 
     Record out;
     out.time = time, out.kind = RecordKind::curve;
-    out.numbers = {{"energy", energy}, {"length", space.length()}};
+    out.numbers = {{"energy", energy}, {"length", space.length(state.y.data())}};
     const auto add = [&](const char* name, double Sample::*member) {
         std::vector<double> values;
         for (const Sample& s : samples) values.push_back(s.*member);

@@ -15,11 +15,13 @@ struct CurveRestart {
     Eigen::VectorXd y, rate;
     CurveSettings settings;
     double total_start = 0, dissipated = 0, error = 0, reference_energy = 0, least_symbol = 0;
+    double work = 0;  // of loads that have changed
 };
 
-// Numbers energy, length (of a period, or 0); sampled from pole to pole or over a period, in order along the profile:
-// r, z, H, K, u_n (normal velocity), and of a flow u_t (along the profile, in the order of the points), p (pressure),
-// u_theta (if it swirls); the restart state under names that begin with restart_.
+// Numbers energy, length (of a period, or 0), velocities without the part (L_t/L) z e_z of a period L that is free;
+// sampled from pole to pole or over a period, in order along the profile: r, z, H, K, u_n (normal velocity), and of a
+// flow u_t (along the profile, in the order of the points), p (pressure), u_theta (if it swirls); the restart state
+// under names that begin with restart_.
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy);
 
 // Throws as RecordReader.

@@ -27,7 +27,7 @@ ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x) {
     const auto at = [&](double s) { return space.evaluate(x, s); };
     const CurvePoint south = at(0), north = at(1), middle = at(space.images() == 2 ? 1 : 0.5);
     ShapeMeasures m;
-    m.height = space.closed() ? space.images() * (north.z - south.z) : space.length();
+    m.height = space.closed() ? space.images() * (north.z - south.z) : space.length(x.data());
     m.r_middle = middle.r;
     if (space.closed()) m.pole_curvature = -south.z2 / (south.r1 * south.r1);
     const int n = 4 * space.splines().elements();
@@ -65,7 +65,7 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
     const bool half_cell = space.topology() == Topology::half_cell,
                half_tube = space.topology() == Topology::half_tube && space.rise() > 0;
     for (int i = half_tube ? 1 : 0; i + 1 < n && (half_cell || half_tube); ++i)
-        if (half_cell ? p[i][1] > 0 : p[i][1] < 0 || p[i][1] > space.rise()) return std::array{s[i], s[i]};
+        if (half_cell ? p[i][1] > 0 : p[i][1] < 0 || p[i][1] > space.rise(x.data())) return std::array{s[i], s[i]};
     const auto side = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     };

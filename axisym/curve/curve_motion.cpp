@@ -9,6 +9,12 @@
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
+
+// Those that the law has at every point: unknowns, and the tension of a reservoir.
+struct PointNumbers {
+    double drift = 0, shift = 0, supply = 0, stretch = 0, tension = 0;
+};
+
 namespace {
 
 namespace stdx = std::experimental;
@@ -23,8 +29,8 @@ constexpr std::array<int, n_slots> slot_field{curve_r,    curve_r,    curve_z, c
                                               velocity_z, velocity_z, swirl,   swirl,   pressure};
 constexpr std::array<int, n_slots> slot_derivative{0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0};
 
-// The result: factors of test functions and their derivatives, and two integrals.
-enum Row { kr, kz, mr0, mr1, mz0, mz1, sw0, sw1, continuity, drift_sum, shift_sum, n_rows };
+// The result: factors of test functions and their derivatives, and integrals.
+enum Row { kr, kz, mr0, mr1, mz0, mz1, sw0, sw1, continuity, drift_sum, shift_sum, stretch_sum, supply_sum, n_rows };
 constexpr int n_test_rows = drift_sum;
 constexpr std::array<int, n_test_rows> row_field{curve_r,    curve_z, velocity_r, velocity_r, velocity_z,
                                                  velocity_z, swirl,   swirl,      pressure};
@@ -39,21 +45,23 @@ struct PointFields {
 
 // The law per unit of s, except the energy, the gauge and the volume.
 template <class S>
-std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, double drift, double shift) {
+std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, const PointNumbers& n) {
+    const double drift = n.drift, shift = n.shift;
     const S &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
     const S g2 = r_s * r_s + z_s * z_s, ig2 = inverse(g2), ig = inverse_sqrt(g2);
     std::array<S, n_rows> out;
     for (S& x : out) x = S(0.0);
+    const S z_t = f.z_t - n.stretch * f.v[z0];  // less the motion of the stretching
     if (!law.inextensible) {
-        const S rate = (2 * pi) * (r * (f.r_t * z_s - f.z_t * r_s));  // X_t.nu dS/g
+        const S rate = (2 * pi) * (r * (f.r_t * z_s - z_t * r_s));  // X_t.nu dS/g
         out[kr] = rate * z_s * ig + shift * (2 * pi) * (r * r_s);
         out[kz] = shift * (2 * pi) * (r * z_s) - rate * r_s * ig;
-        out[shift_sum] = (2 * pi) * (r * (f.r_t * r_s + f.z_t * z_s));
+        out[shift_sum] = (2 * pi) * (r * (f.r_t * r_s + z_t * z_s));
         return out;
     }
     const S &u = f.v[ur0], &v = f.v[uz0], &w = f.v[w0], &p = f.v[p0];
     const S inverse_r = inverse(r), dS = (2 * pi) * (r * (g2 * ig));
-    const S dr = f.r_t - u, dz = f.z_t - v;
+    const S dr = f.r_t - u, dz = z_t - v;
     const S across = (2 * pi) * (r * ((dr * z_s - dz * r_s) * ig));  // (X_t - u).nu dS/g
     const S along = (2 * pi) * (r * (dr * r_s + dz * z_s));          // (X_t - u).t dS
     if (law.lagrangian) {
@@ -66,7 +74,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, do
     out[shift_sum] = along;
     out[drift_sum] = dS * v;
 
-    const S stretch_s = (r_s * f.v[ur1] + z_s * f.v[uz1]) * ig2, stretch_theta = u * inverse_r;
+    const S stretch_s = (r_s * f.v[ur1] + z_s * (f.v[uz1] + n.stretch * z_s)) * ig2, stretch_theta = u * inverse_r;
     const S divergence = stretch_s + stretch_theta;
     S force_r = law.friction * u - p * inverse_r + (2 * law.viscosity) * (stretch_theta * inverse_r);
     S force_z = law.friction * v + drift;
@@ -87,7 +95,9 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, do
     out[mz0] = dS * force_z;
     out[mr1] = dS * tension * r_s;
     out[mz1] = dS * tension * z_s;
-    out[continuity] = -(dS * divergence);
+    out[continuity] = -(dS * (divergence - n.supply));
+    out[stretch_sum] = out[mz1] * z_s;
+    out[supply_sum] = dS * (p + n.tension);
     return out;
 }
 
@@ -115,7 +125,7 @@ struct CurveMotion::Local {
                 rates[part] += signs[a] * rate[offset + dofs[a]] * load(b.by_point[0][a]);
             }
         }
-        fields.v[z1] += m.space().rise();
+        fields.v[z1] += m.space().rise(y);
         fields.r_t = rates[curve_r], fields.z_t = rates[curve_z];
         fields.ur_t = rates[velocity_r], fields.uz_t = rates[velocity_z], fields.w_t = rates[swirl];
     }
@@ -158,10 +168,14 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     };
     at_.r = add(true, space.r().size());
     at_.z = add(true, space.z().size());
+    at_.rise = add(space.free_period(), 1);
     at_.u_r = add(law.inextensible, space.r().size());
     at_.u_z = add(law.inextensible, space.z().size());
     at_.swirl = add(law.inextensible && law.swirls, swirl_.size());
     at_.p = add(law.inextensible, pressure_.size());
+    at_.tension = add(law.keeps_area, 1);
+    at_.supply = add(law.reservoir, 1);
+    at_.stretch = add(space.free_period(), 1);
     at_.lambda = add(law.keeps_volume, 1);
     at_.area = add(law.inextensible && law.holds_area, 1);
     at_.volume = add(law.inextensible && law.keeps_volume && law.holds_volume, 1);
@@ -169,6 +183,9 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.drift = add(law.inextensible && !held, 1);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
+    for (const int number :
+         {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume, at_.drift, at_.shift})
+        if (number >= 0) numbers_.push_back(number);
     parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},  {&space.r(), at_.u_r},
               {&space.z(), at_.u_z}, {&swirl_, at_.swirl}, {&pressure_, at_.p}};
     set_pattern();
@@ -193,13 +210,11 @@ void CurveMotion::set_pattern() {
             for (const int row : dofs)
                 if (row >= 0 && column >= 0) entries.emplace_back(row, column, 0.0);
     }
-    for (const int number : {at_.lambda, at_.area, at_.volume, at_.drift, at_.shift}) {
-        if (number < 0) continue;
+    for (const int number : numbers_)
         for (int i = 0; i < at_.size; ++i) {
             entries.emplace_back(number, i, 0.0);
             entries.emplace_back(i, number, 0.0);
         }
-    }
     pattern_.resize(at_.size, at_.size);
     pattern_.setFromTriplets(entries.begin(), entries.end());
     const auto slot_of = [&](int row, int column) {
@@ -215,11 +230,11 @@ void CurveMotion::set_pattern() {
     const Eigen::SparseMatrix<double>& of_forms = forms_.pattern();
     for (int column = 0; column < of_forms.cols(); ++column)
         for (Eigen::SparseMatrix<double>::InnerIterator it(of_forms, column); it; ++it) {
-            curve_slots_.push_back(slot_of(at_.r + it.row(), column));
-            momentum_slots_.push_back(law_.inextensible ? slot_of(at_.u_r + it.row(), column) : 0);
+            const bool of_rise = it.row() == at_.rise;  // that derivative has no row of its own
+            curve_slots_.push_back(of_rise ? -1 : slot_of(at_.r + it.row(), column));
+            momentum_slots_.push_back(law_.inextensible && !of_rise ? slot_of(at_.u_r + it.row(), column) : -1);
         }
-    for (const int number : {at_.lambda, at_.area, at_.volume, at_.drift, at_.shift}) {
-        if (number < 0) continue;
+    for (const int number : numbers_) {
         std::vector<int>& row = number_rows_[number];
         for (int i = 0; i < at_.size; ++i) row.push_back(slot_of(number, i));
     }
@@ -232,12 +247,39 @@ Eigen::VectorXd CurveMotion::differential() const {
     return out;
 }
 
-bool CurveMotion::residual(const double* y, const double* rate, double* F) const {
+PointNumbers CurveMotion::point_numbers(double t, const double* y) const {
+    const auto number = [&](int at) { return at < 0 ? 0.0 : y[at]; };
+    return {number(at_.drift), number(at_.shift), number(at_.supply), number(at_.stretch), law_.tension.at(t)};
+}
+
+// Of what pushes the membrane.
+Weights CurveMotion::force_weights(double t, const double* y) const {
+    const Loads loads = loads_at(law_, t);
+    const double tension = at_.tension < 0 ? loads.tension : y[at_.tension];
+    return {.energy = 1,
+            .area = law_.inextensible ? 0 : tension,
+            .volume = at_.lambda < 0 ? -loads.pressure : y[at_.lambda]};
+}
+
+// Of what moves the curve beside the flow.
+Weights CurveMotion::drift_weights(const double* y) const {
+    return {.area = at_.area < 0 ? 0 : y[at_.area], .volume = at_.volume < 0 ? 0 : y[at_.volume], .gauge = gauge_};
+}
+
+// The displacement z e_z, as coefficients of a curve.
+Eigen::VectorXd CurveMotion::stretched(const double* y) const {
+    Eigen::VectorXd out = Eigen::Map<const Eigen::VectorXd>(y, space().size());
+    out.head(space().r().size()).setZero();
+    return out;
+}
+
+bool CurveMotion::residual(double t, const double* y, const double* rate, double* F) const {
     std::fill_n(F, at_.size, 0.0);
     const ProfileSpace& splines = space().splines();
-    const double images = space().images(), drift = at_.drift < 0 ? 0 : y[at_.drift],
-                 shift = at_.shift < 0 ? 0 : y[at_.shift];
-    Pack smallest{std::numeric_limits<double>::infinity()}, area{0.0}, volume{0.0}, sums[2] = {Pack(0.0), Pack(0.0)};
+    const double images = space().images();
+    const PointNumbers numbers = point_numbers(t, y);
+    Pack smallest{std::numeric_limits<double>::infinity()}, area{0.0}, volume{0.0}, sums[n_rows];
+    for (Pack& sum : sums) sum = Pack(0.0);
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
@@ -247,7 +289,7 @@ bool CurveMotion::residual(const double* y, const double* rate, double* F) const
             smallest = stdx::min(smallest, f.v[r0]);
             area += weight * (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
             volume += weight * pi * f.v[r0] * f.v[r0] * f.v[z1];
-            const std::array<Pack, n_rows> rows = point_law(f, law_, drift, shift);
+            const std::array<Pack, n_rows> rows = point_law(f, law_, numbers);
             for (int row = 0; row < n_test_rows; ++row) {
                 const int part = row_field[row], offset = parts_[part].offset;
                 if (offset < 0) continue;
@@ -261,25 +303,38 @@ bool CurveMotion::residual(const double* y, const double* rate, double* F) const
                     F[offset + field.dofs(e)[a]] += field.signs(e)[a] * sum;
                 }
             }
-            sums[0] += weight * rows[drift_sum];
-            sums[1] += weight * rows[shift_sum];
+            for (int row = n_test_rows; row < n_rows; ++row) sums[row] += weight * rows[row];
         }
-    if (at_.drift >= 0) F[at_.drift] = stdx::reduce(sums[0]);
-    if (at_.shift >= 0) F[at_.shift] = stdx::reduce(sums[1]);
+    for (int row = n_test_rows; row < n_rows; ++row)
+        if (const int at = number_of(row); at >= 0) F[at] = stdx::reduce(sums[row]);
     if (!(stdx::hmin(smallest) > 0)) return false;
 
-    const double lambda = at_.lambda < 0 ? 0 : y[at_.lambda];
-    forms_.add_gradient({.energy = 1, .volume = lambda}, y, law_.inextensible ? F + at_.u_r : F);
-    forms_.add_gradient(
-        {.area = at_.area < 0 ? 0 : y[at_.area], .volume = at_.volume < 0 ? 0 : y[at_.volume], .gauge = gauge_}, y, F);
-    if (at_.area >= 0) F[at_.area] = stdx::reduce(area) - area0_;
-    if (at_.volume >= 0) F[at_.volume] = stdx::reduce(volume) - volume0_;
-    if (at_.lambda >= 0 && !law_.inextensible) F[at_.lambda] = stdx::reduce(volume) - volume0_;
-    if (at_.lambda >= 0 && law_.inextensible) {
-        const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
-        F[at_.lambda] = slope.dot(Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, slope.size()));
-    }
+    const int n = space().shape_size();
+    const Eigen::VectorXd force = gradient_at(force_weights(t, y), y), drift = gradient_at(drift_weights(y), y);
+    Eigen::Map<Eigen::VectorXd>(law_.inextensible ? F + at_.u_r : F, n) += force.head(n);
+    Eigen::Map<Eigen::VectorXd>(F, n) += drift.head(n);
+    const double A = stdx::reduce(area) - area0_, V = stdx::reduce(volume) - volume0_;
+    if (at_.area >= 0) F[at_.area] = A;
+    if (at_.tension >= 0) F[at_.tension] = A;
+    if (at_.volume >= 0) F[at_.volume] = V;
+    if (at_.lambda >= 0 && !law_.inextensible) F[at_.lambda] = V;
+    if (at_.lambda >= 0 && law_.inextensible) F[at_.lambda] = gradient_at({.volume = 1}, y).dot(velocity(y));
+    if (at_.stretch < 0) return true;
+    F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
+    F[at_.stretch] += force.dot(stretched(y)) - law_.force.at(t) * space().length(y);
     return true;
+}
+
+// The whole velocity, as the rates of a curve.
+Eigen::VectorXd CurveMotion::velocity(const double* y) const {
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(space().size());
+    if (at_.stretch >= 0) out = y[at_.stretch] * stretched(y);
+    out.head(space().shape_size()) += Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, space().shape_size());
+    return out;
+}
+
+int CurveMotion::number_of(int row) const {
+    return row == drift_sum ? at_.drift : row == shift_sum ? at_.shift : row == stretch_sum ? at_.stretch : at_.supply;
 }
 
 Eigen::VectorXd CurveMotion::gradient_at(const Weights& weights, const double* y) const {
@@ -288,12 +343,20 @@ Eigen::VectorXd CurveMotion::gradient_at(const Weights& weights, const double* y
     return out;
 }
 
-void CurveMotion::jacobian(const double* y, const double* rate, double cj, double* values) const {
-    using J = Jet<Pack, n_slots, 1>;
+void CurveMotion::jacobian(double t, const double* y, const double* rate, double cj, double* values) const {
     std::fill_n(values, pattern_.nonZeros(), 0.0);
+    add_law(t, y, rate, cj, values);
+    add_forms(t, y, values);
+    add_numbers(y, values);
+    if (at_.stretch >= 0) add_stretch(t, y, cj, values);
+}
+
+// What point_law() has.
+void CurveMotion::add_law(double t, const double* y, const double* rate, double cj, double* values) const {
+    using J = Jet<Pack, n_slots, 1>;
     const ProfileSpace& splines = space().splines();
-    const double images = space().images(), drift = at_.drift < 0 ? 0 : y[at_.drift],
-                 shift = at_.shift < 0 ? 0 : y[at_.shift];
+    const double images = space().images();
+    const PointNumbers numbers = point_numbers(t, y);
     Eigen::MatrixXd local(local_size_, local_size_);
     std::array<int, n_fields> first{};  // of each part in the local matrix
     for (int part = 0, next = 0; part < n_fields; ++part) {
@@ -305,7 +368,7 @@ void CurveMotion::jacobian(const double* y, const double* rate, double cj, doubl
         for (int g = 0; g < splines.groups(); ++g) {
             const Pack weight = images * load(splines.basis(e, g).weight);
             const Local at(*this, e, g, y, rate);
-            const std::array<J, n_rows> rows = point_law(at.jets<J>(cj), law_, drift, shift);
+            const std::array<J, n_rows> rows = point_law(at.jets<J>(cj), law_, numbers);
             for (int row = 0; row < n_test_rows; ++row) {
                 const int test = row_field[row];
                 if (parts_[test].offset < 0) continue;
@@ -326,21 +389,55 @@ void CurveMotion::jacobian(const double* y, const double* rate, double cj, doubl
                         }
                 }
             }
+            for (int row = n_test_rows; row < n_rows; ++row)
+                if (const int number = number_of(row); number >= 0)
+                    add_row(number, e, g, weight, rows[row].d.data(), values);
             const auto& f = at.fields;
-            if (at_.drift >= 0) {
-                const Pack dS = (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
-                add_row(at_.drift, e, g, weight, rows[drift_sum].d.data(), values);
-                add_column(at_.drift, velocity_z, e, g, weight * dS, values);
-            }
+            const Pack dS = (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
+            if (at_.drift >= 0) add_column(at_.drift, velocity_z, e, g, weight * dS, values);
+            if (at_.supply >= 0) add_column(at_.supply, pressure, e, g, weight * dS, values);
             if (at_.shift >= 0) {
-                add_row(at_.shift, e, g, weight, rows[shift_sum].d.data(), values);
                 add_column(at_.shift, curve_r, e, g, weight * (2 * pi) * f.v[r0] * f.v[r1], values);
                 add_column(at_.shift, curve_z, e, g, weight * (2 * pi) * f.v[r0] * f.v[z1], values);
             }
+            if (at_.stretch >= 0) add_free_period(e, g, numbers, at, cj, values);
         }
         scatter(e, local, values);
     }
-    add_forms(y, values);
+}
+
+// The derivatives of the law in the rise and in its rate of stretching.
+void CurveMotion::add_free_period(int e, int g, const PointNumbers& numbers, const Local& at, double cj,
+                                  double* values) const {
+    using J = Jet<Pack, n_slots, 1>;
+    const Pack weight = space().images() * load(space().splines().basis(e, g).weight);
+    const std::array<J, n_rows> rows = point_law(at.jets<J>(cj), law_, numbers);
+    PointNumbers longer = numbers;  // the law is affine in the stretching
+    longer.stretch += 1;
+    const std::array<Pack, n_rows> after = point_law(at.fields, law_, longer);
+    std::array<Pack, n_rows> by_rise, by_stretch;
+    for (int row = 0; row < n_rows; ++row) {
+        by_rise[row] = weight * rows[row].d[z1];
+        by_stretch[row] = weight * (after[row] - rows[row].v);
+    }
+    add_test_column(at_.rise, e, g, by_rise, values);
+    add_test_column(at_.stretch, e, g, by_stretch, values);
+}
+
+// The derivatives of all rows of the law in a number.
+template <class Rows>
+void CurveMotion::add_test_column(int number, int e, int g, const Rows& rows, double* values) const {
+    double* column = values + pattern_.outerIndexPtr()[number];
+    for (int row = 0; row < n_test_rows; ++row) {
+        const auto& [field, offset] = parts_[row_field[row]];
+        if (offset < 0) continue;
+        const auto& basis = field->splines().basis(e, g);
+        for (int a = 0; a < width(row_field[row]); ++a)
+            column[offset + field->dofs(e)[a]] +=
+                field->signs(e)[a] * stdx::reduce(rows[row] * load(basis.by_point[row_derivative[row]][a]));
+    }
+    for (int row = n_test_rows; row < n_rows; ++row)
+        if (const int at = number_of(row); at >= 0) column[at] += stdx::reduce(rows[row]);
 }
 
 // d(sum of a row of numbers)/dy, from its derivatives in the slots.
@@ -385,28 +482,28 @@ void CurveMotion::scatter(int e, const Eigen::MatrixXd& local, double* values) c
         for (int a = 0; a < local_size_; ++a) values[slot[b * local_size_ + a]] += signs[a] * signs[b] * local(a, b);
 }
 
-// Contributions of the energy, the gauge and the numbers lambda, area, volume.
-void CurveMotion::add_forms(const double* y, double* values) const {
-    const auto number = [&](int at) { return at < 0 ? 0.0 : y[at]; };
-    const Weights force{.energy = 1, .volume = number(at_.lambda)};
-    const Weights along{.area = number(at_.area), .volume = number(at_.volume), .gauge = gauge_};
+// Contributions of the energy and the gauge.
+void CurveMotion::add_forms(double t, const double* y, double* values) const {
     std::vector<double> entries(forms_.pattern().nonZeros());
     const auto add = [&](const Weights& weights, const std::vector<int>& slots) {
         std::fill(entries.begin(), entries.end(), 0.0);
         forms_.add_hessian(weights, y, entries.data());
-        for (std::size_t i = 0; i < entries.size(); ++i) values[slots[i]] += entries[i];
+        for (std::size_t i = 0; i < entries.size(); ++i)
+            if (slots[i] >= 0) values[slots[i]] += entries[i];
     };
-    add(force, law_.inextensible ? momentum_slots_ : curve_slots_);
-    add(along, curve_slots_);
+    add(force_weights(t, y), law_.inextensible ? momentum_slots_ : curve_slots_);
+    add(drift_weights(y), curve_slots_);
+}
 
-    const int n = space().size();
+// Contributions of the multipliers of area and volume.
+void CurveMotion::add_numbers(const double* y, double* values) const {
+    const int n = space().shape_size(), all = space().size();
     const auto add_border = [&](int at, int rows, int columns, const Eigen::VectorXd& slope) {
-        for (int i = 0; i < n; ++i) {
-            values[number_rows_.at(at)[columns + i]] += slope[i];
-            values[pattern_.outerIndexPtr()[at] + rows + i] += slope[i];
-        }
+        for (int i = 0; i < n; ++i) values[pattern_.outerIndexPtr()[at] + rows + i] += slope[i];
+        for (int i = 0; i < (columns == 0 ? all : n); ++i) values[number_rows_.at(at)[columns + i]] += slope[i];
     };
     if (at_.area >= 0) add_border(at_.area, 0, 0, gradient_at({.area = 1}, y));
+    if (at_.tension >= 0) add_border(at_.tension, 0, 0, gradient_at({.area = 1}, y));
     if (at_.lambda < 0) return;
     const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
     if (!law_.inextensible) return add_border(at_.lambda, 0, 0, slope);
@@ -414,14 +511,38 @@ void CurveMotion::add_forms(const double* y, double* values) const {
     add_border(at_.lambda, at_.u_r, at_.u_r, slope);
     Eigen::SparseMatrix<double> second = forms_.pattern();
     forms_.add_hessian({.volume = 1}, y, second.valuePtr());
-    const Eigen::VectorXd by_curve = second * Eigen::Map<const Eigen::VectorXd>(y + at_.u_r, n);
-    for (int i = 0; i < n; ++i) values[number_rows_.at(at_.lambda)[i]] += by_curve[i];
+    Eigen::VectorXd by_curve = second * velocity(y);
+    if (at_.stretch >= 0) {
+        by_curve.tail(all - space().r().size()) += y[at_.stretch] * slope.tail(all - space().r().size());
+        values[number_rows_.at(at_.lambda)[at_.stretch]] += slope.dot(stretched(y));
+    }
+    for (int i = 0; i < all; ++i) values[number_rows_.at(at_.lambda)[i]] += by_curve[i];
 }
 
-CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) const {
+// Contributions of a free period.
+void CurveMotion::add_stretch(double t, const double* y, double cj, double* values) const {
+    const int all = space().size(), after_r = all - space().r().size();
+    const std::vector<int>& kinematic = number_rows_.at(at_.rise);
+    values[kinematic[at_.rise]] += cj - y[at_.stretch];
+    values[kinematic[at_.stretch]] -= y[at_.rise];
+
+    const Eigen::VectorXd along = stretched(y), x = Eigen::Map<const Eigen::VectorXd>(y, all);
+    const Weights weights = force_weights(t, y);
+    Eigen::VectorXd by_curve = forms_.hessian(weights, x) * along;
+    by_curve.tail(after_r) += gradient_at(weights, y).tail(after_r);
+    by_curve[at_.rise] -= law_.force.at(t) * space().images();
+    const std::vector<int>& row = number_rows_.at(at_.stretch);
+    for (int i = 0; i < all; ++i) values[row[i]] += by_curve[i];
+    if (at_.tension >= 0) values[row[at_.tension]] += gradient_at({.area = 1}, y).dot(along);
+    if (at_.lambda >= 0) values[row[at_.lambda]] += gradient_at({.volume = 1}, y).dot(along);
+}
+
+CurveMotion::Balance CurveMotion::balance(double t, const double* y, const double* rate) const {
     const ProfileSpace& splines = space().splines();
     const double images = space().images();
+    const PointNumbers numbers = point_numbers(t, y);
     Balance out;
+    Pack pressure_sum{0.0}, area{0.0}, pull{0.0};
     Pack kinetic{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0}, acceleration{0.0};
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
@@ -431,21 +552,24 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
             const Pack g2 = r_s * r_s + z_s * z_s, ig = 1.0 / sqrt(g2);
             const Pack dS = images * load(splines.basis(e, g).weight) * (2 * pi) * r * g2 * ig;
             if (!law_.inextensible) {
-                const Pack normal = (f.r_t * z_s - f.z_t * r_s) * ig;
+                const Pack normal = (f.r_t * z_s - (f.z_t - numbers.stretch * f.v[z0]) * r_s) * ig;
                 dissipation += dS * normal * normal;
                 speed = stdx::max(speed, normal * normal);
                 continue;
             }
             const Pack &u = f.v[ur0], &v = f.v[uz0], &w = f.v[w0];
             const Pack square = u * u + v * v + w * w;
-            const Pack ss = (r_s * f.v[ur1] + z_s * f.v[uz1]) * ig * ig, tt = u / r;
+            const Pack ss = (r_s * f.v[ur1] + z_s * (f.v[uz1] + numbers.stretch * z_s)) * ig * ig, tt = u / r;
             const Pack shear = 0.5 * (f.v[w1] - w * r_s / r) * ig;
             kinetic += (0.5 * law_.inertia) * dS * square;
             dissipation += dS * (law_.friction * square + 2 * law_.viscosity * (ss * ss + tt * tt + 2 * shear * shear));
             acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
             momentum += dS * v;
             angular += dS * r * w;
-            divergence += dS * (ss + tt) * (ss + tt);
+            const Pack div = ss + tt - numbers.supply;
+            divergence += dS * div * div;
+            area += dS, pressure_sum += dS * f.v[p0];
+            pull += dS * (2 * law_.viscosity * ss - f.v[p0]) * z_s * z_s * ig * ig;
             speed = stdx::max(speed, square);
         }
     out.kinetic = stdx::reduce(kinetic), out.dissipation = stdx::reduce(dissipation);
@@ -453,6 +577,23 @@ CurveMotion::Balance CurveMotion::balance(const double* y, const double* rate) c
     out.angular_z = stdx::reduce(angular);
     out.acceleration = stdx::reduce(acceleration);
     out.divergence = std::sqrt(stdx::reduce(divergence)), out.speed = std::sqrt(stdx::hmax(speed));
+    const double tension = law_.inextensible ? -stdx::reduce(pressure_sum) / stdx::reduce(area) : 0;
+    out.loads = loads_of(t, y, tension, stdx::reduce(pull));
+    return out;
+}
+
+// Given, or of the state: tension and pull (the part of the axial force that the velocity and p exert, times the
+// period) of a membrane that is inextensible.
+Loads CurveMotion::loads_of(double t, const double* y, double tension, double pull) const {
+    const Weights weights = force_weights(t, y);
+    Loads out = loads_at(law_, t);
+    if (!law_.area_is_free()) out.tension = law_.inextensible ? tension : weights.area;
+    out.pressure = -weights.volume;
+    const double length = space().length(y);
+    if (at_.stretch < 0 && length > 0) {
+        const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space().size());
+        out.force = (pull + forms_.stretch_slope(weights, x)) / length;
+    }
     return out;
 }
 
@@ -495,9 +636,9 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
         s.rate.setZero();
         double last = std::numeric_limits<double>::infinity();
         for (int iteration = 0;; ++iteration) {
-            if (!residual(s.y.data(), s.rate.data(), F.data()))
+            if (!residual(0, s.y.data(), s.rate.data(), F.data()))
                 throw SolveError("the profile leaves the half plane r > 0 at the start of the motion");
-            jacobian(s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
+            jacobian(0, s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
             const Equilibrated scale(J);
             lu.factor(J);
             const Eigen::VectorXd change =

@@ -1,5 +1,5 @@
 // Laws of motion of a profile curve as one differential-algebraic system F(y, y') = 0:
-// theory.md (4.10), (4.11), (4.12), (4.13).
+// theory.md (4.10), (4.11), (4.12), (4.13), (4.14).
 #pragma once
 
 #include <Eigen/Core>
@@ -11,6 +11,8 @@
 #include "common/model/model.hpp"
 
 namespace tubule::axisym {
+
+struct PointNumbers;
 
 // A law of motion in the form that curves need. With inextensibility there is a velocity u; else X_t.nu = b - lambda.
 struct CurveLaw : MotionLaw {
@@ -24,10 +26,15 @@ struct CurveLaw : MotionLaw {
     bool swirls = false;      // u has a component around the axis
 };
 
-// Offsets of the unknowns y: the curve X = (r, z) as CurveSpace has it; the velocity u = (u_r, u_z) likewise;
-// the swirl u_theta; the pressure p; multipliers. -1 for those that the law does not have.
+// Offsets of the unknowns y: the curve X = (r, z) as CurveSpace has it; the periodic part of the velocity u = (u_r,
+// u_z) likewise; the swirl u_theta; the pressure p; multipliers. -1 for those that the law does not have.
+// Many fields: one for each unknown of any law.
 struct MotionLayout {
     int r = 0, z = 0, u_r = -1, u_z = -1, swirl = -1, p = -1;
+    int rise = -1;               // of a free period, the last coefficient of the curve
+    int tension = -1;            // of an extensible membrane: multiplier of A(X) = A0, the force tension H nu
+    int supply = -1;             // of a reservoir: the number that div u is everywhere
+    int stretch = -1;            // of a free period L: L_t/L, the velocity has the part (L_t/L) z e_z
     int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0
     int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
@@ -38,10 +45,11 @@ struct MotionLayout {
 // In weak form, for all test displacements phi, velocities v, and pressures q (dS = 2 pi r g ds):
 //   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve moves with u, its parameter stays even (gauge J)
 //   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
-//   (q, div u) = 0,  dV[u] = 0
+//   (q, div u - supply) = 0,  dV[u] = 0
 // with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
-// has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + lambda dV[phi] + c dJ[phi] = 0.
-// Many fields: besides the problem, the places of all its terms in the matrix, found once.
+// has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
+// dJ[phi] = 0. A pressure that is given stands for -lambda. A free period adds (L_t/L) z e_z to u, and the test
+// function z e_z. Many fields: besides the problem, the places of all its terms in the matrix, found once.
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
@@ -56,10 +64,10 @@ public:
     const MotionLayout& layout() const { return at_; }
     const Field& pressures() const { return pressure_; }
 
-    // F(y, rate). False where r <= 0 at a quadrature point: try a smaller step.
-    bool residual(const double* y, const double* rate, double* F) const;
+    // F(t, y, rate). False where r <= 0 at a quadrature point: try a smaller step.
+    bool residual(double t, const double* y, const double* rate, double* F) const;
     // dF/dy + cj dF/drate, into the values of a matrix with pattern().
-    void jacobian(const double* y, const double* rate, double cj, double* values) const;
+    void jacobian(double t, const double* y, const double* rate, double cj, double* values) const;
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
     // 1 for unknowns whose rate matters, 0 for the others.
     Eigen::VectorXd differential() const;
@@ -70,12 +78,13 @@ public:
         double momentum_z = 0, angular_z = 0;
         double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
         double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
-        double divergence = 0;    // sqrt(INT (div u)^2 dS), of which only the part in the pressures is zero
+        double divergence = 0;    // sqrt(INT (div u - supply)^2 dS), of which only the part in the pressures is zero
+        Loads loads;              // given or measured; no force where there is no period
     };
-    Balance balance(const double* y, const double* rate) const;
+    Balance balance(double t, const double* y, const double* rate) const;
 
-    // Consistent unknowns and rates from the curve and velocities of y0, whose other entries are a guess: two implicit
-    // Euler steps of length h. Throws SolveError if Newton's method fails.
+    // Consistent unknowns and rates at t = 0 from the curve and velocities of y0, whose other entries are a guess: two
+    // implicit Euler steps of length h. Throws SolveError if Newton's method fails.
     struct Start {
         Eigen::VectorXd y, rate;
         double time = 0;  // that the steps have taken
@@ -85,12 +94,25 @@ public:
 private:
     struct Local;
     void set_pattern();
-    void add_forms(const double* y, double* values) const;
+    Weights force_weights(double t, const double* y) const;
+    Weights drift_weights(const double* y) const;
+    Eigen::VectorXd stretched(const double* y) const;
+    void add_law(double t, const double* y, const double* rate, double cj, double* values) const;
+    void add_forms(double t, const double* y, double* values) const;
+    void add_numbers(const double* y, double* values) const;
+    void add_stretch(double t, const double* y, double cj, double* values) const;
+    PointNumbers point_numbers(double t, const double* y) const;
+    Eigen::VectorXd velocity(const double* y) const;
+    int number_of(int row) const;
+    Loads loads_of(double t, const double* y, double tension, double pull) const;
     void scatter(int element, const Eigen::MatrixXd& local, double* values) const;
     template <class Packs>
     void add_row(int number, int e, int g, const Packs& weight, const Packs* in_slots, double* values) const;
     template <class Packs>
     void add_column(int number, int part, int e, int g, const Packs& factor, double* values) const;
+    void add_free_period(int e, int g, const PointNumbers& numbers, const Local& at, double cj, double* values) const;
+    template <class Rows>
+    void add_test_column(int number, int e, int g, const Rows& rows, double* values) const;
     Eigen::VectorXd gradient_at(const Weights& weights, const double* y) const;
 
     // A field of unknowns: where it stands, and which of the pointwise slots it fills.
@@ -110,6 +132,7 @@ private:
     Eigen::SparseMatrix<double> pattern_;
     std::vector<int> slots_;  // of the local matrix of each element, column by column
     int local_size_ = 0;
+    std::vector<int> numbers_;                       // the multipliers and the rise, which have dense rows and columns
     std::map<int, std::vector<int>> number_rows_;    // of each number, its row
     std::vector<int> momentum_slots_, curve_slots_;  // of each entry of forms_.pattern() in the rows of u, of X
 };

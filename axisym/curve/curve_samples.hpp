@@ -27,9 +27,10 @@ auto sample_profile(const CurveSpace& space, At&& at, Reflect&& reflect) {
             samples.push_back(at(breaks[e] + (breaks[e + 1] - breaks[e]) * i / per_element));
     samples.push_back(at(1.0));
     if (space.images() == 1) return samples;
+    const double plane = samples.back().z;
     for (std::size_t i = samples.size() - 1; i-- > 0;) {
         auto image = samples[i];
-        image.z = 2 * space.rise() - image.z;
+        image.z = 2 * plane - image.z;
         reflect(image);
         samples.push_back(image);
     }

@@ -35,6 +35,9 @@ SeriesTable<CurveRow> curve_series(const Case& c) {
                {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
     table.add_family("energy_<kl>", energy_term_numbers(),
                      [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
+    const MotionLaw law = motion_law(c.model);
+    table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
+    if (law.loads_change()) table.add({{"work", [](const CurveRow& r) { return r.work; }}});
     table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},
                {"identity_defect", [](const CurveRow& r) { return r.identity_defect; }},
                {"area", [](const CurveRow& r) { return r.now.o.area; }},
@@ -44,12 +47,17 @@ SeriesTable<CurveRow> curve_series(const Case& c) {
     table.add_family("mode_<n>", waves, [modes](const CurveRow& r, std::size_t wave) {
         return mode_amplitude(r.motion.space(), r.y, modes[wave]);
     });
-    if (motion_law(c.model).inextensible)
+    if (law.inextensible)
         table.add({{"kinetic_energy", [](const CurveRow& r) { return r.now.balance.kinetic; }},
                    {"speed", [](const CurveRow& r) { return r.now.balance.speed; }},
                    {"momentum_z", [](const CurveRow& r) { return r.now.balance.momentum_z; }},
                    {"angular_momentum_z", [](const CurveRow& r) { return r.now.balance.angular_z; }},
                    {"lambda", lambda}});
+    table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
+               {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
+    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape))
+        table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
+    if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.period; }}});
     table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
                {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},
                {"wall_seconds", [](const CurveRow& r) { return r.wall_seconds; }}});

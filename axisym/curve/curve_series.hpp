@@ -15,7 +15,7 @@ struct CurveRow {
     const double* y;
     const CurveMotion& motion;
     const Flow& flow;
-    double identity_defect, energy_error;
+    double identity_defect, work, energy_error;
     int elements;
     double wall_seconds;
 };

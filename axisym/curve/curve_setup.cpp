@@ -31,6 +31,14 @@ double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
     return 1 - sum * sum / (o.area * o.energy);
 }
 
+// E_ref, theory.md (11.1).
+double reference_energy_of(const CurveForms& forms, const MotionLaw& law, const Eigen::VectorXd& x) {
+    const CurveObservation o = forms.observe(x);
+    const double length = forms.space().length(x.data());
+    return std::max(std::abs(o.energy + loads_at(law, 0).energy(o.area, o.volume, length)),
+                    forms.reference_energy(x) + load_scale(law, o.area, o.volume, length));
+}
+
 // Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
 double gauge_of(const Case& c, double energy, double area) {
     const MotionLaw law = motion_law(c.model);
@@ -81,14 +89,17 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     const ArcLength arc(start.meridian);
     const int degree = c.discretisation.order;
     space = std::make_unique<CurveSpace>(start.meridian.topology, first_breaks(arc, settings, c), degree,
-                                         c.discretisation.smoothness.value_or(degree - 1), start.meridian.length);
+                                         c.discretisation.smoothness.value_or(degree - 1), start.meridian.length,
+                                         motion_law(c.model).free_period);
     const CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
-    reference_energy = forms.reference_energy(x);
     CurveLaw law = law_of(c);
+    reference_energy = reference_energy_of(forms, law, x);
     const double variation = variation_of_H(*space, x);
-    law.holds_area = variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
-    if (law.inextensible && variation <= same_everywhere) law.keeps_volume = false;
+    law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
+    // Where area and volume are the same condition, one multiplier has no value.
+    const bool keeps_both = law.keeps_volume && !law.area_is_free() && !law.free_period;
+    if (keeps_both && variation <= same_everywhere) law.keeps_volume = false;
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, reference_energy, start.area), start.area,
                                            start.volume);
 }
@@ -97,9 +108,11 @@ FlowSystem CurveSetup::system() const {
     const CurveMotion& motion = *this->motion;
     const MotionLayout& at = motion.layout();
     FlowSystem system;
-    system.residual = [&motion](const double* y, const double* v, double* F) { return motion.residual(y, v, F); };
-    system.jacobian = [&motion](const double* y, const double* v, double cj, double* J) {
-        motion.jacobian(y, v, cj, J);
+    system.residual = [&motion](double t, const double* y, const double* v, double* F) {
+        return motion.residual(t, y, v, F);
+    };
+    system.jacobian = [&motion](double t, const double* y, const double* v, double cj, double* J) {
+        motion.jacobian(t, y, v, cj, J);
     };
     system.pattern = &motion.pattern();
     system.differential = motion.differential();

@@ -33,11 +33,13 @@ Neck narrowest(const CurveSpace& space, const double* y) {
 
 }  // namespace
 
-Snapshot measure(const CurveMotion& motion, const double* y, const double* rate) {
+Snapshot measure(const CurveMotion& motion, double t, const double* y, const double* rate) {
     const CurveSpace& space = motion.space();
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
-    Snapshot out{motion.forms().observe(x), motion.balance(y, rate), narrowest(space, y)};
+    Snapshot out{motion.forms().observe(x), motion.balance(t, y, rate), narrowest(space, y)};
     out.o.r_max = measures(space, x).r_max;
+    out.period = space.length(y);
+    out.free_energy = out.o.energy + loads_at(motion.law(), t).energy(out.o.area, out.o.volume, out.period);
     return out;
 }
 
@@ -50,11 +52,11 @@ double mode_amplitude(const CurveSpace& space, const double* y, int n) {
             for (int q = 0; q < ProfileSpace::lanes; ++q) {
                 const auto& basis = splines.basis(e, g);
                 const CurvePoint p = space.evaluate(x, basis.z[q]);
-                const double angle = 2 * pi * n * p.z / space.length(), part = basis.weight[q] * p.r * p.z1;
+                const double angle = 2 * pi * n * p.z / space.length(y), part = basis.weight[q] * p.r * p.z1;
                 re += part * std::cos(angle), im += part * std::sin(angle);
             }
     const bool whole = space.images() == 1;
-    return 2 / space.length() * (whole ? std::hypot(re, im) : 2 * std::abs(re));
+    return 2 / space.length(y) * (whole ? std::hypot(re, im) : 2 * std::abs(re));
 }
 
 }  // namespace tubule::axisym

@@ -9,13 +9,15 @@ namespace tubule::axisym {
 struct Snapshot {
     CurveObservation o;
     CurveMotion::Balance balance;
-    Neck neck;  // the narrowest; of infinite radius where there is none
+    Neck neck;               // the narrowest; of infinite radius where there is none
+    double free_energy = 0;  // F, theory.md (3.16)
+    double period = 0;       // of a tube
 
-    double total() const { return o.energy + balance.kinetic; }
+    double total() const { return free_energy + balance.kinetic; }
 };
 
 // Of the unknowns and their rates.
-Snapshot measure(const CurveMotion& motion, const double* y, const double* rate);
+Snapshot measure(const CurveMotion& motion, double t, const double* y, const double* rate);
 
 // Amplitude of the wave of number n in r(z), also where that has several values.
 double mode_amplitude(const CurveSpace& space, const double* y, int n);

@@ -56,7 +56,7 @@ namespace {
 Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::VectorXd& x) {
     Meridian m;
     m.topology = space->topology();
-    m.length = space->length();
+    m.length = space->length(x.data());
     if (space->splines().smoothness() < 3)
         m.seams.assign(space->splines().breaks().begin() + 1, space->splines().breaks().end() - 1);
     m.at = [space, x](double t) {
@@ -95,7 +95,8 @@ Eigen::VectorXd interpolate(const Field& field, Parity parity, const std::vector
 Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x) {
     const ProfileSpace& s = space.splines();
     return spline_meridian(
-        std::make_shared<CurveSpace>(space.topology(), s.breaks(), s.degree(), s.smoothness(), space.length()), x);
+        std::make_shared<CurveSpace>(space.topology(), s.breaks(), s.degree(), s.smoothness(), space.length(x.data())),
+        x.head(space.shape_size()));
 }
 
 Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology topology, double length) {

@@ -42,6 +42,9 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
 
 void StationarySystem::set_problem(const StationaryProblem& problem) {
     const Constraints& c = problem.constraints;
+    if ((c.area && problem.loads.tension != 0) || (c.volume && problem.loads.pressure != 0) ||
+        (c.reduced_volume && (problem.loads.tension != 0 || problem.loads.pressure != 0)))
+        throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
     if (c.reduced_volume && (c.area || c.volume))
         throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
     const auto positive = [](const std::optional<double>& value, const char* what) {
@@ -82,8 +85,8 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
         F[n] = 2 * u[n] * o.area + 3 * u[n + 1] * o.volume;  // no change with size
         F[n + 1] = o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5);
     } else {
-        F[n] = c.area ? o.area - *c.area : u[n];
-        F[n + 1] = c.volume ? o.volume - *c.volume : u[n + 1];
+        F[n] = c.area ? o.area - *c.area : u[n] - problem_.loads.tension;
+        F[n + 1] = c.volume ? o.volume - *c.volume : u[n + 1] + problem_.loads.pressure;
     }
     F[n + 2] = space_->topology() == Topology::cell ? place_.dot(x) : u[n + 2];
     return F;
@@ -134,7 +137,7 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const Constraints& c = problem_.constraints;
     const CurveObservation o = forms_.observe(u.head(space_->size()));
-    double value = o.energy + gauge_ * o.gauge;
+    double value = o.energy + problem_.loads.energy(o.area, o.volume, 0) + gauge_ * o.gauge;
     if (c.area) value += u[sigma()] * (o.area - *c.area);
     if (c.volume) value += u[lambda()] * (o.volume - *c.volume);
     if (c.reduced_volume) value += u[lambda()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
@@ -443,6 +446,18 @@ std::string why_none(const Constraints& goal, const CurveObservation& first, con
     return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
+double free_energy(const StationaryProblem& problem, const CurveObservation& o) {
+    return o.energy + problem.loads.energy(o.area, o.volume, 0);
+}
+
+// E_ref, theory.md (11.1).
+double reference_energy_of(const StationaryProblem& problem, const CurveForms& forms, const Eigen::VectorXd& x) {
+    const CurveObservation o = forms.observe(x);
+    const Loads& loads = problem.loads;
+    return std::max(std::abs(free_energy(problem, o)),
+                    forms.reference_energy(x) + std::abs(loads.tension) * o.area + std::abs(loads.pressure * o.volume));
+}
+
 // Newton on meshes that follow the shape found on the one before, until their energies agree.
 Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveSpace> space, Eigen::VectorXd u,
                   double gauge, const EquilibriumSettings& settings) {
@@ -459,8 +474,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         StationarySystem system(space, problem, gauge);
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
-        out.reference_energy = system.forms().reference_energy(out.x);
         if (round == 0) first = last = system.forms().observe(out.x);
+        out.reference_energy = reference_energy_of(problem, system.forms(), out.x);
         found = settle(system, u, !found, settings, out);
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);
@@ -469,8 +484,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
         out.observed = system.forms().observe(x, &defect);
         if (!found) compare.restart();
-        const double error =
-            found ? compare(out.observed.energy, elements, settings.degree) : std::numeric_limits<double>::infinity();
+        const double error = found ? compare(free_energy(problem, out.observed), elements, settings.degree)
+                                   : std::numeric_limits<double>::infinity();
         // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
@@ -520,6 +535,7 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& s
     Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + 3), x = fit(*space, start);
     scale_to(forms, problem.constraints, x);
     u.head(space->size()) = x;
+    u[space->size()] = problem.loads.tension, u[space->size() + 1] = -problem.loads.pressure;
     return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }
 

@@ -1,4 +1,5 @@
-// Stationary shapes of the bending energy, free or at given area and volume: E + sigma A + lambda V stationary.
+// Stationary shapes of the bending energy, at given area and volume or at a given tension and pressure of what is free:
+// E + sigma A + lambda V stationary.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,6 +10,7 @@
 
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
+#include "common/model/model.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
 
@@ -25,6 +27,7 @@ struct Constraints {
 struct StationaryProblem {
     Bending bending;
     Constraints constraints;
+    Loads loads{};  // the tension of a free area, the pressure of a free volume; not with a reduced volume
 };
 
 // Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.

@@ -45,6 +45,10 @@ SetParameter setter(int parameter) {
             return [](StationaryProblem& p, double value) { p.constraints.area = value; };
         case vary_volume:
             return [](StationaryProblem& p, double value) { p.constraints.volume = value; };
+        case vary_tension:
+            return [](StationaryProblem& p, double value) { p.loads.tension = value; };
+        case vary_pressure:
+            return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
         default:
             return [](StationaryProblem& p, double value) {
                 if (p.constraints.area)
@@ -65,6 +69,10 @@ double start_of(int parameter, const StationaryProblem& p) {
             return *c.area;
         case vary_volume:
             return *c.volume;
+        case vary_tension:
+            return p.loads.tension;
+        case vary_pressure:
+            return p.loads.pressure;
         default:
             return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
     }
@@ -81,11 +89,14 @@ Task task_of(const Case& c) {
     }
     const auto [area, volume] = area_and_volume(task.start);
     task.problem.bending = c.energy;
+    task.problem.loads = loads_at(motion_law(c.model), 0);
+    const Held is_held = held_of(c);
     Constraints& held = task.problem.constraints;
-    if (e.held == Held::area_and_volume || e.held == Held::area) held.area = e.area.value_or(area);
-    if (e.held == Held::area_and_volume || e.held == Held::volume) held.volume = e.volume.value_or(volume);
-    if (e.held == Held::area_and_volume && e.reduced_volume) held.volume = sphere_volume(*held.area, *e.reduced_volume);
-    if (e.held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    if (is_held == Held::area_and_volume || is_held == Held::area) held.area = e.area.value_or(area);
+    if (is_held == Held::area_and_volume || is_held == Held::volume) held.volume = e.volume.value_or(volume);
+    if (is_held == Held::area_and_volume && e.reduced_volume)
+        held.volume = sphere_volume(*held.area, *e.reduced_volume);
+    if (is_held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
     task.settings.accuracy = c.accuracy.energy;
     task.settings.degree = c.discretisation.order;
     task.settings.descend = e.descend;
@@ -131,6 +142,7 @@ int elements_of(const Equilibrium& e) {
 struct ShapeRow {
     int number;
     const BranchPoint& point;
+    const Loads& loads;
     const CurveObservation& o;
     const ShapeMeasures& measures;
     const std::vector<ModeRates>& modes;
@@ -146,11 +158,12 @@ SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", energy_term_numbers(),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    table.add({{"area", [](const ShapeRow& r) { return r.o.area; }},
+    table.add({{"free_energy", [](const ShapeRow& r) { return r.o.energy + r.loads.energy(r.o.area, r.o.volume, 0); }},
+               {"area", [](const ShapeRow& r) { return r.o.area; }},
                {"volume", [](const ShapeRow& r) { return r.o.volume; }},
                {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
-               {"sigma", [](const ShapeRow& r) { return r.point.shape.sigma; }},
-               {"lambda", [](const ShapeRow& r) { return r.point.shape.lambda; }},
+               {"tension", [](const ShapeRow& r) { return r.point.shape.sigma; }},
+               {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }},
                {"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
                {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
                {"height", [](const ShapeRow& r) { return r.measures.height; }},
@@ -185,7 +198,7 @@ public:
         if (task_.set) task_.set(problem, point.parameter);
         std::vector<ModeRates> modes;
         if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, motion_law(c_.model));
-        observer_.row(row(point, modes));
+        observer_.row(row(point, problem.loads, modes));
         observer_.frame([&] { return frame(point, modes); });
         observer_.progress(point.parameter, e.observed.energy, 0);
         worst_ = std::max(worst_, e.estimated_error);
@@ -198,11 +211,11 @@ public:
     const Equilibrium& last() const { return last_; }
 
 private:
-    std::vector<double> row(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
+    std::vector<double> row(const BranchPoint& point, const Loads& loads, const std::vector<ModeRates>& modes) const {
         const Equilibrium& e = point.shape;
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
         const double moved = hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)));
-        return series_.values({count_, point, e.observed, measures(*e.space, e.x), modes, moved, seconds});
+        return series_.values({count_, point, loads, e.observed, measures(*e.space, e.x), modes, moved, seconds});
     }
 
     Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
@@ -211,8 +224,10 @@ private:
             *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
-        out.numbers = {
-            {"energy", e.observed.energy}, {"length", e.space->length()}, {"sigma", e.sigma}, {"lambda", e.lambda}};
+        out.numbers = {{"energy", e.observed.energy},
+                       {"length", e.space->length()},
+                       {"tension", e.sigma},
+                       {"pressure", -e.lambda}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
         const auto add = [&](const char* name, double Sample::*member) {
             Array a{name, {samples.size()}, {}};

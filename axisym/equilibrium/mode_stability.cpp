@@ -365,8 +365,9 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
     Matrix fixed(forms.mean.size(), 0);
     if (m == 0 && mirror(parity) >= 0) {
         const Constraints& c = problem_.constraints;
-        if (law.inextensible || c.area) append(fixed, forms.area.normalized());
-        if (law.inextensible || c.volume) append(fixed, forms.volume.normalized());
+        const bool flows = law.inextensible;
+        if ((flows && !law.reservoir) || c.area) append(fixed, forms.area.normalized());
+        if ((flows && law.keeps_volume) || c.volume) append(fixed, forms.volume.normalized());
         if (!law.inextensible && c.reduced_volume) {
             // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
             const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;

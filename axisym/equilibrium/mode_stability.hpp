@@ -1,8 +1,8 @@
 // Stability of a stationary shape against normal displacements w(s) cos(m theta): growth rates by the second variation
 // of E + sigma A + lambda V and the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2, theory.md (3.14), one
 // eigenproblem for each m. Inertia is neglected. Of a law without inextensibility u is w nu alone, and the constraints
-// of the problem hold (for m = 0; for others they hold by themselves). With it the volume is fixed, too, and the
-// tangential velocity the one of least dissipation.
+// of the problem hold (for m = 0; for others they hold by themselves). With it what the law keeps is fixed, too, and
+// the tangential velocity the one of least dissipation; with a reservoir its divergence is the same everywhere.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,8 +15,9 @@ namespace tubule::axisym {
 namespace {
 
 // The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
-Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> sigma, const Meridian& shape,
+Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& settings, const Meridian& shape,
                      int elements, double& unbalanced) {
+    const std::optional<double> sigma = settings.sigma;
     constexpr int degree = 5;
     Equilibrium e;
     const std::vector<double> breaks = shape.seams.empty()
@@ -36,10 +37,10 @@ Equilibrium balanced(const Bending& bending, Held kept, std::optional<double> si
     const Eigen::MatrixXd mass = forms.mass(e.x);
     const Eigen::LLT<Eigen::MatrixXd> factors(mass);
     const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
-    const Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = sigma.value_or(0)}, e.x));
+    e.sigma = sigma.value_or(0), e.lambda = volume ? 0 : -settings.pressure;
+    const Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = e.sigma, .volume = e.lambda}, e.x));
     Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
     for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
-    e.sigma = sigma.value_or(0);
     if (!held.empty()) {
         // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's
         // error.
@@ -75,38 +76,37 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-void refuse_what_has_none(const MotionLaw& law, int first) {
+void refuse_what_has_none(const MotionLaw& law) {
     if (law.inertia != 0)
         throw std::invalid_argument(
             "spectra neglect inertia: use model stokes instead of fluid; its growing modes are the same");
-    if (first == 0 && law.inextensible && !law.keeps_volume)
-        throw std::invalid_argument("spectra of inextensible models need a fixed volume");
 }
 
 }  // namespace
 
 Held held_by(const MotionLaw& law) {
-    if (law.inextensible) return law.keeps_volume ? Held::area_and_volume : Held::area;
+    if (!law.area_is_free()) return law.keeps_volume ? Held::area_and_volume : Held::area;
     return law.keeps_volume ? Held::volume : Held::nothing;
 }
 
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings) {
-    refuse_what_has_none(law, settings.first);
+    refuse_what_has_none(law);
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
         check_pause();
-        const Equilibrium e = balanced(bending, held, settings.sigma, shape, elements, out.unbalanced);
+        const Equilibrium e = balanced(bending, held, settings, shape, elements, out.unbalanced);
         Constraints& c = problem.constraints;
         if (held == Held::area || held == Held::area_and_volume) c.area = e.observed.area;
         if (held == Held::volume || held == Held::area_and_volume) c.volume = e.observed.volume;
         if (held == Held::reduced_volume) c.reduced_volume = reduced_volume(e.observed.area, e.observed.volume);
         const bool last = elements + elements / 2 > settings.max_elements;
-        if (settings.first == 0 && held != Held::nothing && !out.at_rest()) {
+        if (settings.first == 0 && (held != Held::nothing || law.inextensible) && !out.at_rest()) {
             if (!last) continue;  // perhaps a finer mesh shows it at rest
             throw std::invalid_argument(
-                "the shape is not at rest: a moving shape has a spectrum only in gradient flow with free volume");
+                "the shape is not at rest: a moving shape has a spectrum only in gradient flow with free area and "
+                "volume");
         }
         const ModeStability stability(problem, e);
         std::vector<ModeRates> modes;

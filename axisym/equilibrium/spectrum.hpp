@@ -15,7 +15,8 @@ struct SpectrumSettings {
     int count = 3;            // rates of each m
     double accuracy = 1e-6;   // of each rate, relative to the larger of it and the slowest rate there is
     int max_elements = 200;
-    std::optional<double> sigma;  // the tension, where the shape leaves it open (a straight tube, a sphere)
+    std::optional<double> sigma;  // the tension: of a free area; or where the shape leaves it open (a tube, a sphere)
+    double pressure = 0;          // of a free volume
 };
 
 struct Spectrum {
@@ -29,14 +30,15 @@ struct Spectrum {
     bool at_rest() const { return unbalanced < 1e-3; }
 };
 
-// The quantities that a law conserves: the volume if it keeps it, the area of an inextensible membrane.
+// The quantities that a law conserves: the volume if it keeps it, the area of an inextensible membrane without a
+// reservoir, or of an extensible one that keeps it.
 Held held_by(const MotionLaw& law);
 
 // For a whole tube or cell. For a shape that is not at rest in gradient flow, the rates are those of the flow
 // linearised about its motion at this instant. Otherwise the multipliers are those that balance the force best, as
 // if the shape were held by them.
-// For m = 0 the constraints act: there are no rates for an inextensible membrane with free volume, nor for a moving
-// shape except in gradient flow with nothing held (std::invalid_argument). For m >= 1 there are always rates;
+// For m = 0 the constraints act: there are no rates for a moving shape except in gradient flow with nothing held
+// (std::invalid_argument). For m >= 1 there are always rates;
 // those of inextensible laws neglect the effect of the motion itself on waves, so they are an estimate. A law with
 // inertia is rejected (std::invalid_argument): the second variation has none. SolveError if an eigenproblem fails.
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,

@@ -70,8 +70,10 @@ void GraphAttempt::use_stage(std::unique_ptr<GraphStage> stage) {
 FlowSystem GraphAttempt::system() {
     const Forms& forms = stage_->forms;
     FlowSystem system;
-    system.residual = [&forms](const double* at, const double* rate, double* F) { return forms.residual(at, rate, F); };
-    system.jacobian = [&forms](const double* at, const double* rate, double cj, double* values) {
+    system.residual = [&forms](double, const double* at, const double* rate, double* out) {
+        return forms.residual(at, rate, out);
+    };
+    system.jacobian = [&forms](double, const double* at, const double* rate, double cj, double* values) {
         forms.jacobian(at, rate, cj, values);
     };
     system.pattern = &forms.pattern();
@@ -123,7 +125,7 @@ void GraphAttempt::begin() {
         transport.space().project(start) - transport.space().prolong(stage_->space, x);
     make_flow(x, stage_->forms.rate(x), 0, 0);
     error_.carry_on(*stage_, now_.o);  // so far that of the first mesh
-    past_.energy_start = now_.o.energy;
+    past_.energy_start = now_.o.free_energy;
     out_.note(doubt_before(case_, past_.energy_start, summary.reference_energy));
     write(0, now_.o, flow_->x(), flow_->v());
 }
@@ -160,11 +162,11 @@ bool GraphAttempt::must_give_up(const Observation& o) {
 // Gradient flow does not let the energy rise: what it rises by is an error. Where that is more than the error known and
 // more than the error asked for, the run goes back to the last good state.
 std::optional<StopReport> GraphAttempt::find_rise(const Observation& o) {
-    const double rise = o.energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
+    const double rise = o.free_energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
     if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.carry_on(*stage_, o);
     if (rise <= std::max(asked, stated_over_computed * error_.now())) {
         error_.largest = std::max(error_.largest, rise / stated_over_computed);
-        good_.least_energy = std::min(good_.least_energy, o.energy);
+        good_.least_energy = std::min(good_.least_energy, o.free_energy);
         return std::nullopt;
     }
     error_.latest = {rise, 0};
@@ -332,7 +334,7 @@ void GraphAttempt::end_with(const StopReport& stop) {
     summary.stop = stop;
     summary.energy = now_.o.energy;
     if (const std::string doubt =
-            doubt_after(case_, stop.reason, past_.energy_start, summary.energy, summary.reference_energy);
+            doubt_after(case_, stop.reason, past_.energy_start, now_.o.free_energy, summary.reference_energy);
         !doubt.empty())
         summary.warnings.push_back(doubt);
     summary.estimated_error = stated_over_computed * error_.largest / summary.reference_energy;
@@ -363,8 +365,9 @@ void GraphAttempt::write(double t, const Observation& o, const double* x, const 
 void GraphAttempt::write_row(double t, const Observation& o, const double* x) {
     if (!out_.wants_row(t)) return;
     const long iterations = flow_->counters().newton_iterations + past_.counters.newton_iterations;
-    out_.row(t, series_.values({t, o, x, *stage_, *flow_, iterations, o.energy - past_.energy_start + dissipated(t),
-                                stated_over_computed * error_.now(), summary.elements, out_.seconds()}));
+    out_.row(t,
+             series_.values({t, o, x, *stage_, *flow_, iterations, o.free_energy - past_.energy_start + dissipated(t),
+                             stated_over_computed * error_.now(), summary.elements, out_.seconds()}));
 }
 
 Record GraphAttempt::record(double t, const Observation& o, const double* x, const double* v) const {

@@ -12,7 +12,7 @@ std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x)
         alone.k[i] = forms.bending().k[i];
         const Forms single(forms.space(), alone);
         checks.push_back(
-            {term.key, check_derivatives([&](const Eigen::VectorXd& y) { return single.energy(y); },
+            {term.key, check_derivatives([&](const Eigen::VectorXd& y) { return single.free_energy(y); },
                                          [&](const Eigen::VectorXd& y) { return single.gradient(y); },
                                          [&](const Eigen::VectorXd& y, const Eigen::VectorXd& w) -> Eigen::VectorXd {
                                              return single.hessian(y) * w;

@@ -17,7 +17,7 @@ bool GraphError::due(const Observation& o) {
 
 void GraphError::carry_on(GraphStage& stage, const Observation& o) {
     if (steps_since_ > 0) stage.transport.advance();
-    latest = stage.transport.energy_error(o.energy);
+    latest = stage.transport.energy_error(o.free_energy);
     begin(o);
     largest = std::max(largest, now());
 }

@@ -19,7 +19,7 @@ ErrorTransport::ErrorTransport(const Forms& coarse)
     : coarse_(coarse),
       fine_space_(coarse.space().cell(), halved(coarse.space().breaks()), coarse.space().degree(),
                   coarse.space().smoothness()),
-      fine_(fine_space_, coarse.bending()),
+      fine_(fine_space_, coarse.bending(), coarse.loads()),
       prolongation_(fine_space_.prolongation(coarse.space())),
       matrix_(fine_.pattern()) {
     total = spatial = residual_ = defect_ = Eigen::VectorXd::Zero(fine_space_.size());
@@ -75,7 +75,7 @@ void ErrorTransport::advance() {
 }
 
 ErrorTransport::EnergyError ErrorTransport::energy_error(double energy) const {
-    return {fine_.energy(state_ + total) - energy, fine_.energy(state_ + spatial) - energy};
+    return {fine_.free_energy(state_ + total) - energy, fine_.free_energy(state_ + spatial) - energy};
 }
 
 }  // namespace tubule::axisym

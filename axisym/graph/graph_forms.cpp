@@ -38,20 +38,22 @@ Pack gather(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
     return value;
 }
 
-// The energy per unit of z, with derivatives with respect to (r, r', r'').
+// The free energy per unit of z, with derivatives with respect to (r, r', r'').
 template <int Order>
-Jet<Pack, 3, Order> energy_density(const Bending& bending, const Pack& r, const Pack& r1, const Pack& r2,
-                                   ProfilePoint<Jet<Pack, 3, Order>>& p) {
+Jet<Pack, 3, Order> energy_density(const Bending& bending, const Loads& loads, const Pack& r, const Pack& r1,
+                                   const Pack& r2, ProfilePoint<Jet<Pack, 3, Order>>& p) {
     using J = Jet<Pack, 3, Order>;
-    p = graph_point(J::variable(r, 0), J::variable(r1, 1), J::variable(r2, 2));
+    const J radius = J::variable(r, 0);
+    p = graph_point(radius, J::variable(r1, 1), J::variable(r2, 2));
     const auto f = density(bending, p.H.v, p.K.v);
-    return p.area * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+    return p.area * (chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK) + loads.tension) -
+           (pi * loads.pressure) * (radius * radius);
 }
 
 }  // namespace
 
-Forms::Forms(const ProfileSpace& space, const Bending& bending)
-    : space_(space), bending_(bending), images_(space.cell().images()) {
+Forms::Forms(const ProfileSpace& space, const Bending& bending, const Loads& loads)
+    : space_(space), bending_(bending), loads_(loads), images_(space.cell().images()) {
     const int w = space.width(), degree = space.degree();
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
     std::vector<Eigen::Triplet<double>> entries;
@@ -73,7 +75,7 @@ Forms::Forms(const ProfileSpace& space, const Bending& bending)
 }
 
 template <int P>
-[[gnu::flatten]] bool Forms::residual_kernel(const double* x, const double* v, double* F) const {
+[[gnu::flatten]] bool Forms::residual_kernel(const double* x, const double* v, double* out) const {
     Pack smallest{std::numeric_limits<double>::infinity()};
     for (int e = 0; e < space_.elements(); ++e) {
         const int* dofs = space_.dofs(e);
@@ -83,7 +85,7 @@ template <int P>
             const Local<P> at(basis, dofs, x);
             smallest = stdx::min(smallest, at.r);
             ProfilePoint<Jet<Pack, 3, 1>> p;
-            const auto energy = energy_density<1>(bending_, at.r, at.r1, at.r2, p);
+            const auto energy = energy_density<1>(bending_, loads_, at.r, at.r1, at.r2, p);
             const Pack weight = load(basis.weight);
             const Pack drag = (2 * pi) * at.r * p.inverse_speed.v * gather<P>(basis, dofs, v);
             // Through memory: a broadcast load is cheaper than taking a lane out of a register.
@@ -102,14 +104,14 @@ template <int P>
         alignas(32) double local[wide];
         store(low, local);
         store(high, local + lanes);
-        for (int a = 0; a <= P; ++a) F[dofs[a]] += images_ * local[a];
+        for (int a = 0; a <= P; ++a) out[dofs[a]] += images_ * local[a];
     }
     return stdx::hmin(smallest) > 0;
 }
 
 template <int P>
-[[gnu::flatten]] void Forms::jacobian_kernel(const Bending& bending, const double* x, const double* v, double cj,
-                                             double* values) const {
+[[gnu::flatten]] void Forms::jacobian_kernel(const Bending& bending, const Loads& loads, const double* x,
+                                             const double* v, double cj, double* values) const {
     const int w = P + 1;
     for (int e = 0; e < space_.elements(); ++e) {
         const int* dofs = space_.dofs(e);
@@ -119,7 +121,7 @@ template <int P>
             const auto& basis = space_.basis(e, g);
             const Local<P> at(basis, dofs, x);
             ProfilePoint<Jet<Pack, 3, 2>> p;
-            const auto energy = energy_density<2>(bending, at.r, at.r1, at.r2, p);
+            const auto energy = energy_density<2>(bending, loads, at.r, at.r1, at.r2, p);
             const Pack weight = load(basis.weight), rate = gather<P>(basis, dofs, v);
             // Drag 2 pi (r/g) v and its derivatives in r, r', v.
             const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
@@ -161,23 +163,39 @@ template <int P>
     }
 }
 
-bool Forms::residual(const double* x, const double* v, double* F) const {
-    std::fill_n(F, space_.size(), 0.0);
-    return for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, F); });
+bool Forms::residual(const double* x, const double* v, double* out) const {
+    std::fill_n(out, space_.size(), 0.0);
+    return for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, out); });
 }
 
-void Forms::jacobian_of(const Bending& bending, const double* x, const double* v, double cj, double* values) const {
+void Forms::jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
+                        double* values) const {
     std::fill_n(values, pattern_.nonZeros(), 0.0);
-    return for_degree(space_.degree(), [&](auto P) { return jacobian_kernel<P()>(bending, x, v, cj, values); });
+    return for_degree(space_.degree(), [&](auto P) { return jacobian_kernel<P()>(bending, loads, x, v, cj, values); });
 }
 
 void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
-    jacobian_of(bending_, x, v, cj, values);
+    jacobian_of(bending_, loads_, x, v, cj, values);
 }
 
-double Forms::energy(const Eigen::VectorXd& x) const {
+double Forms::free_energy(const Eigen::VectorXd& x) const {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
-    return observe(x.data(), rest.data()).energy;
+    return observe(x.data(), rest.data()).free_energy;
+}
+
+double Forms::axial_force(const Eigen::VectorXd& x) const {
+    return for_degree(space_.degree(), [&](auto P) {
+        Pack sum{0.0};
+        for (int e = 0; e < space_.elements(); ++e)
+            for (int g = 0; g < space_.groups(); ++g) {
+                const auto& basis = space_.basis(e, g);
+                const Local<P()> at(basis, space_.dofs(e), x.data());
+                ProfilePoint<Jet<Pack, 3, 1>> p;
+                const auto f = energy_density<1>(bending_, loads_, at.r, at.r1, at.r2, p);
+                sum += load(basis.weight) * (f.v - at.r1 * f.d[1] - 2 * at.r2 * f.d[2]);
+            }
+        return images_ * stdx::reduce(sum) / space_.cell().period();
+    });
 }
 
 Eigen::VectorXd Forms::gradient(const Eigen::VectorXd& x) const {
@@ -197,7 +215,7 @@ Eigen::SparseMatrix<double> Forms::hessian(const Eigen::VectorXd& x) const {
 Eigen::SparseMatrix<double> Forms::mass(const Eigen::VectorXd& x) const {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
     Eigen::SparseMatrix<double> out = pattern_;
-    jacobian_of(Bending{}, x.data(), rest.data(), 1, out.valuePtr());
+    jacobian_of(Bending{}, Loads{}, x.data(), rest.data(), 1, out.valuePtr());
     return out;
 }
 
@@ -249,6 +267,7 @@ template <int P>
     o.volume = images_ * stdx::reduce(volume);
     o.dissipation = images_ * stdx::reduce(dissipation);
     for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = images_ * stdx::reduce(terms[i]);
+    o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
     return o;
 }
 
@@ -292,7 +311,10 @@ double Forms::reference_energy(const Eigen::VectorXd& x) const {
                         std::abs(bending_.k[i]) * term.magnitude(p.H, p.K, bending_.H0) * p.area * basis.weight[q];
                 });
             }
-    return std::max(std::abs(energy(x)), images_ * magnitude);
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+    const Observation o = observe(x.data(), rest.data());
+    return std::max(std::abs(o.free_energy),
+                    images_ * magnitude + std::abs(loads_.tension) * o.area + std::abs(loads_.pressure) * o.volume);
 }
 
 std::array<Eigen::VectorXd, 2> Forms::mode(int n) const {

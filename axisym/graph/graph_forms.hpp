@@ -1,5 +1,5 @@
-// The discrete energy of a profile and its gradient flow: value, gradient and Hessian come from
-// one object, together with the mass matrix of the dissipation.
+// The discrete free energy F = E + tension A - pressure V of a profile and its gradient flow: value, gradient and
+// Hessian come from one object, together with the mass matrix of the dissipation.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,14 +9,15 @@
 
 #include "axisym/splines/profile_space.hpp"
 #include "common/energy/bending.hpp"
+#include "common/model/model.hpp"
 
 namespace tubule::axisym {
 
 // Diagnostics of a state, integrated or extremised over the whole period.
 struct Observation {
-    double energy = 0;
+    double energy = 0, free_energy = 0;
     std::array<double, n_bending_terms> energy_term{};
-    double dissipation = 0;  // INT b^2 dS of the rate handed in: -dE/dt along the flow
+    double dissipation = 0;  // INT b^2 dS of the rate handed in: -dF/dt along the flow
     double area = 0, volume = 0;
     double r_min = 0, z_min = 0;  // smallest radius at quadrature points, and where
     double r_max = 0, z_max = 0;
@@ -27,21 +28,24 @@ struct Observation {
 
 class Forms {
 public:
-    Forms(const ProfileSpace& space, const Bending& bending);
+    // The loads are the same at all times; a force means nothing to a graph, whose period is fixed.
+    Forms(const ProfileSpace& space, const Bending& bending, const Loads& loads = {});
 
     const ProfileSpace& space() const { return space_; }
     const Bending& bending() const { return bending_; }
+    const Loads& loads() const { return loads_; }
 
-    double energy(const Eigen::VectorXd& x) const;
+    // F, and its derivatives.
+    double free_energy(const Eigen::VectorXd& x) const;
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;
     Eigen::SparseMatrix<double> hessian(const Eigen::VectorXd& x) const;
     // INT 2 pi (r/g) phi_i phi_j dz: theory.md (4.4)
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
-    // F = M(x) v + grad E(x), the gradient flow being F(x, x_t) = 0. Arrays of space().size() numbers.
-    // False, with F unusable, if the radius is not positive at a quadrature point.
-    bool residual(const double* x, const double* v, double* F) const;
-    // dF/dx + cj dF/dv, into the values of a matrix with pattern().
+    // M(x) v + grad F(x), which vanishes for the rate v of the gradient flow. Arrays of space().size() numbers.
+    // False, with `out` unusable, if the radius is not positive at a quadrature point.
+    bool residual(const double* x, const double* v, double* out) const;
+    // Its derivative in x + cj that in v, into the values of a matrix with pattern().
     void jacobian(const double* x, const double* v, double cj, double* values) const;
     // Compressed columns shared by hessian, mass and jacobian.
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
@@ -53,6 +57,8 @@ public:
     // variation of the best approximation error, from the jumps of the highest derivative
     // (docs/decisions.md), over the whole period.
     Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
+    // The axial force that keeps the period, theory.md (3.19): dF/dL while the profile is stretched along z.
+    double axial_force(const Eigen::VectorXd& x) const;
     // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
     // Functionals of the coefficients that give the cosine and sine amplitudes of the mode with n waves
@@ -61,15 +67,18 @@ public:
 
 private:
     template <int P>
-    bool residual_kernel(const double* x, const double* v, double* F) const;
+    bool residual_kernel(const double* x, const double* v, double* out) const;
     template <int P>
-    void jacobian_kernel(const Bending& bending, const double* x, const double* v, double cj, double* values) const;
+    void jacobian_kernel(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
+                         double* values) const;
     template <int P>
     Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
-    void jacobian_of(const Bending& bending, const double* x, const double* v, double cj, double* values) const;
+    void jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
+                     double* values) const;
 
     const ProfileSpace& space_;
     Bending bending_;
+    Loads loads_;
     double images_;  // cells in the whole period
     Eigen::SparseMatrix<double> pattern_;
     std::vector<double> defect_scale_;  // of each element, see observe()

@@ -15,7 +15,8 @@ SeriesTable<GraphRow> graph_series(const Case& c) {
                {"energy", [](const GraphRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", energy_term_numbers(),
                      [](const GraphRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    table.add({{"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},
+    table.add({{"free_energy", [](const GraphRow& r) { return r.o.free_energy; }},
+               {"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},
                {"identity_defect", [](const GraphRow& r) { return r.identity_defect; }},
                {"area", [](const GraphRow& r) { return r.o.area; }},
                {"volume", [](const GraphRow& r) { return r.o.volume; }},
@@ -26,7 +27,13 @@ SeriesTable<GraphRow> graph_series(const Case& c) {
         const auto& f = r.stage.modes[wave];
         return std::hypot(f[0].dot(x), f[1].dot(x));
     });
-    table.add({{"energy_error", [](const GraphRow& r) { return r.energy_error; }},
+    table.add({{"tension", [](const GraphRow& r) { return r.stage.forms.loads().tension; }},
+               {"pressure", [](const GraphRow& r) { return r.stage.forms.loads().pressure; }},
+               {"force",
+                [](const GraphRow& r) {
+                    return r.stage.forms.axial_force(Eigen::Map<const Eigen::VectorXd>(r.x, r.stage.space.size()));
+                }},
+               {"energy_error", [](const GraphRow& r) { return r.energy_error; }},
                {"elements", [](const GraphRow& r) { return static_cast<double>(r.elements); }},
                {"wall_seconds", [](const GraphRow& r) { return r.wall_seconds; }}});
     return table;

@@ -21,6 +21,10 @@ ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Case& 
 
 }  // namespace
 
+Loads graph_loads(const Case& c) {
+    return loads_at(motion_law(c.model), 0);
+}
+
 std::vector<int> tracked_graph_modes(const Case& c) {
     std::set<int> waves;
     for (const TubeMode& mode : std::get<Tube>(c.shape).modes)
@@ -29,7 +33,7 @@ std::vector<int> tracked_graph_modes(const Case& c) {
 }
 
 GraphStage::GraphStage(const Cell& cell, std::vector<double> breaks, const Case& c)
-    : space(space_of(cell, std::move(breaks), c)), forms(space, c.energy), transport(forms) {
+    : space(space_of(cell, std::move(breaks), c)), forms(space, c.energy, graph_loads(c)), transport(forms) {
     for (int n : tracked_graph_modes(c)) modes.push_back(forms.mode(n));
 }
 
@@ -57,7 +61,7 @@ FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& c
     FirstMesh out{uniform_breaks(cell, first)};
     for (int pass = 0;; ++pass) {
         const ProfileSpace space = space_of(cell, out.breaks, c);
-        const Forms forms(space, c.energy);
+        const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(start);
         out.reference_energy = forms.reference_energy(x);
         const double allowed = settings.defect * out.reference_energy;

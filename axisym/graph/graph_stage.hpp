@@ -12,6 +12,9 @@ namespace tubule::axisym {
 
 constexpr int most_graph_elements = 4000;  // of one cell
 
+// Tension and pressure, the same at all times: what changes is computed as a curve.
+Loads graph_loads(const Case& c);
+
 // Numbers n > 0 of the modes of the start, each once.
 std::vector<int> tracked_graph_modes(const Case& c);
 

@@ -57,10 +57,10 @@ double* data(N_Vector n) {
 }
 
 template <class Impl>
-int residual(double, N_Vector x, N_Vector v, N_Vector F, void* user) {
+int residual(double t, N_Vector x, N_Vector v, N_Vector F, void* user) {
     auto* self = static_cast<Impl*>(user);
-    if (self->pause.look()) return -1;                                // give up
-    return self->system.residual(data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
+    if (self->pause.look()) return -1;                                   // give up
+    return self->system.residual(t, data(x), data(v), data(F)) ? 0 : 1;  // 1: try a smaller step
 }
 
 void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
@@ -69,11 +69,11 @@ void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
 }
 
 template <class Impl>
-int jacobian(double, double cj, N_Vector x, N_Vector v, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector,
+int jacobian(double t, double cj, N_Vector x, N_Vector v, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector,
              N_Vector) {
     const FlowSystem& system = static_cast<Impl*>(user)->system;
     set_pattern(*system.pattern, J);  // IDA zeroes the whole matrix before each call
-    system.jacobian(data(x), data(v), cj, SUNSparseMatrix_Data(J));
+    system.jacobian(t, data(x), data(v), cj, SUNSparseMatrix_Data(J));
     return 0;
 }
 
@@ -84,6 +84,7 @@ int dissipation(double t, N_Vector x, N_Vector v, N_Vector rate, void* user) {
     // output.
     N_VScale(1, v, self->v);
     data(rate)[0] = self->system.dissipation(t, data(x), data(v));
+    data(rate)[1] = self->system.work ? self->system.work(t, data(x), data(v)) : 0;
     return 0;
 }
 
@@ -171,7 +172,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     }
     require(IDARootInit(s.ida, static_cast<int>(s.system.n_guards), guard_values<Impl>), "the guards");
     require(IDASetNoInactiveRootWarn(s.ida), "the guards");
-    s.dissipated = N_VNew_Serial(1, s.context);
+    s.dissipated = N_VNew_Serial(2, s.context);  // and the work
     N_VConst(0, s.dissipated);
     require(IDAQuadInit(s.ida, dissipation<Impl>, s.dissipated), "the dissipation integral");
 }
@@ -224,6 +225,11 @@ Eigen::VectorXd Flow::acceleration() const {
 double Flow::dissipated(double t) const {
     require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
     return data(impl_->dissipated)[0];
+}
+
+double Flow::work(double t) const {
+    require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
+    return data(impl_->dissipated)[1];
 }
 
 double Flow::step_size() const {

@@ -1,4 +1,4 @@
-// A profile's motion F(x, x_t) = 0 in time: the one place that sees IDA (its variant IDAS, which also integrates the
+// A profile's motion F(t, x, x_t) = 0 in time: the one place that sees IDA (its variant IDAS, which also integrates the
 // dissipation).
 #pragma once
 
@@ -33,15 +33,16 @@ using Guards = std::vector<double>;
 
 // What moves, and what is watched. All but `residual` and `jacobian` see accepted states, by time, unknowns and rates.
 struct FlowSystem {
-    // F(x, v); false where x is inadmissible: try a smaller step.
-    std::function<bool(const double* x, const double* v, double* F)> residual;
+    // F(t, x, v); false where x is inadmissible: try a smaller step.
+    std::function<bool(double t, const double* x, const double* v, double* F)> residual;
     // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
-    std::function<void(const double* x, const double* v, double cj, double* values)> jacobian;
+    std::function<void(double t, const double* x, const double* v, double cj, double* values)> jacobian;
     const Eigen::SparseMatrix<double>* pattern = nullptr;
     bool banded = false;           // the unknowns stand in an order that is good for elimination
     Eigen::VectorXd scale;         // of each unknown; empty: 1
     Eigen::VectorXd differential;  // 0 for unknowns without a rate, whose local errors do not count; empty: 1
     std::function<double(double t, const double* x, const double* v)> dissipation;
+    std::function<double(double t, const double* x, const double* v)> work;  // its rate; empty: none is done
     std::function<Guards(double t, const double* x, const double* v)> guards;
     std::size_t n_guards = 0;  // how many these are
 };
@@ -66,6 +67,7 @@ public:
     // Second derivative of the coefficients in time at the end of the last step; 0 if that was of order 1.
     Eigen::VectorXd acceleration() const;
     double dissipated(double t) const;  // INT dissipation dt from t0 to a time within the last step
+    double work(double t) const;        // INT work dt likewise
     double step_size() const;           // of the last step
     int order() const;
     int tripped() const;          // index of the guard that ended the step

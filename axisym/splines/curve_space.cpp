@@ -89,15 +89,18 @@ Eigen::VectorXd Field::solve_mass(const Eigen::VectorXd& load) const {
     return lu.solve(load);
 }
 
-CurveSpace::CurveSpace(Topology topology, std::vector<double> breaks, int degree, int smoothness, double length)
+CurveSpace::CurveSpace(Topology topology, std::vector<double> breaks, int degree, int smoothness, double length,
+                       bool free_period)
     : topology_(topology),
       length_(length),
+      free_period_(free_period),
       splines_({0, 1, topology != Topology::tube, 1}, std::move(breaks), degree, smoothness),
       r_(splines_, r_parity()),
       z_(splines_, z_parity()) {
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
     if (splines_.breaks().front() != 0 || splines_.breaks().back() != 1)
         throw std::invalid_argument("breaks must run from 0 to 1");
+    if (free_period && !(length > 0)) throw std::invalid_argument("only the period of a tube can be free");
     if (!(length >= 0) || (closed() && length != 0))
         throw std::invalid_argument("the length must be positive for a tube, 0 for a torus or a closed cell");
 }
@@ -113,12 +116,13 @@ Parity CurveSpace::z_parity() const {
 CurvePoint CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {
     const auto [r, r1, r2] = r_.evaluate(x.data(), s);
     const auto [z, z1, z2] = z_.evaluate(x.data() + r_.size(), s);
-    return {r, r1, r2, z + rise() * s, z1 + rise(), z2};
+    return {r, r1, r2, z + rise(x.data()) * s, z1 + rise(x.data()), z2};
 }
 
 Eigen::VectorXd CurveSpace::prolong(const CurveSpace& other, const Eigen::VectorXd& x) const {
-    if (other.topology_ != topology_ || other.length_ != length_)
-        throw std::invalid_argument("curves of different topology or period cannot be prolonged to each other");
+    if (other.topology_ != topology_ || other.length_ != length_ || free_period_ || other.free_period_)
+        throw std::invalid_argument(
+            "curves of different topology, different or free period cannot be prolonged to each other");
     return project([&](double s) {
         const CurvePoint p = other.evaluate(x, s);
         return std::array{p.r, p.z};

@@ -67,25 +67,32 @@ struct CurvePoint {
 };
 
 // Curves run such that the outward normal is (z', -r')/|X'|: upwards on the outside. A vector of size() numbers holds
-// the coefficients of r, followed by those of z less rise() s.
+// the coefficients of r, followed by those of z less rise s, and by the rise itself where the period is free.
 class CurveSpace {
 public:
-    // Breaks ascend from 0 to 1; degree 3, 5 or 7; 1 <= smoothness < degree; `length` is the period of a tube, and
-    // is 0 for cells. Throws std::invalid_argument.
-    CurveSpace(Topology topology, std::vector<double> breaks, int degree, int smoothness, double length = 0);
+    // Breaks ascend from 0 to 1; degree 3, 5 or 7; 1 <= smoothness < degree; `length` is the period of a tube, at the
+    // start if the period is free, and is 0 for cells. Throws std::invalid_argument.
+    CurveSpace(Topology topology, std::vector<double> breaks, int degree, int smoothness, double length = 0,
+               bool free_period = false);
     CurveSpace(const CurveSpace&) = delete;  // its fields refer to its splines
     CurveSpace& operator=(const CurveSpace&) = delete;
 
     Topology topology() const { return topology_; }
     bool closed() const { return topology_ == Topology::cell || topology_ == Topology::half_cell; }
+    // The period, and by how much the curve rises from s = 0 to s = 1: at the start, and of a curve x.
     double length() const { return length_; }
     double rise() const { return topology_ == Topology::half_tube ? length_ / 2 : length_; }
+    double rise(const double* x) const { return free_period_ ? x[shape_size()] : rise(); }
+    double length(const double* x) const { return free_period_ ? images() * rise(x) : length_; }
+    bool free_period() const { return free_period_; }
     // Copies of the curve in the whole cell or period.
     int images() const { return topology_ == Topology::half_cell || topology_ == Topology::half_tube ? 2 : 1; }
     const ProfileSpace& splines() const { return splines_; }
     const Field& r() const { return r_; }
     const Field& z() const { return z_; }
-    int size() const { return r_.size() + z_.size(); }
+    // Of a curve: the coefficients of r and z alone; with a rise that is free, which stands last.
+    int shape_size() const { return r_.size() + z_.size(); }
+    int size() const { return shape_size() + (free_period_ ? 1 : 0); }
 
     // Parities of other fields: scalars (pressure, curvatures, normal velocity), and vectors in the meridian plane
     // component by component; a swirl u_theta is like r.
@@ -99,7 +106,8 @@ public:
     Eigen::VectorXd project(F&& f) const {
         Eigen::VectorXd x(size());
         x.head(r_.size()) = r_.project([&](double s) { return f(s)[0]; });
-        x.tail(z_.size()) = z_.project([&](double s) { return f(s)[1] - rise() * s; });
+        x.segment(r_.size(), z_.size()) = z_.project([&](double s) { return f(s)[1] - rise() * s; });
+        if (free_period_) x[shape_size()] = rise();
         return x;
     }
     // The curve x of another space of this topology; the same curve if those knots are all here too.
@@ -108,6 +116,7 @@ public:
 private:
     Topology topology_;
     double length_;
+    bool free_period_;
     ProfileSpace splines_;
     Field r_, z_;
 };

@@ -132,6 +132,11 @@ struct Case {
     bool moves() const { return time.end > 0; }
 };
 
+// What the equilibrium of a case holds fixed.
+inline Held held_of(const Case& c) {
+    return c.equilibrium->held.value_or(default_held(c.model));
+}
+
 // Of curved triangles: fourth order follows motion better, third is enough to look at a shape (docs/decisions.md).
 inline int element_order(const Case& c) {
     return c.surface.order.value_or(c.moves() ? 4 : 3);

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <initializer_list>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/energy/bending.hpp"
+#include "common/model/model.hpp"
 
 namespace tubule {
 
@@ -19,7 +19,7 @@ enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
 
 // What a branch is followed in: the moduli by the index of their term, then these.
 inline constexpr int vary_H0 = static_cast<int>(n_bending_terms), vary_area = vary_H0 + 1, vary_volume = vary_H0 + 2,
-                     vary_reduced_volume = vary_H0 + 3;
+                     vary_reduced_volume = vary_H0 + 3, vary_tension = vary_H0 + 4, vary_pressure = vary_H0 + 5;
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -35,16 +35,46 @@ inline std::string wrong_branch(double from, double to, double step) {
 }
 
 struct EquilibriumChoices {
-    Held held = Held::area_and_volume;
+    std::optional<Held> held;                            // by default what [model] leaves: see held_of()
     std::optional<double> area, volume, reduced_volume;  // where absent: those of the start
     bool descend = true;                                 // to a minimum; if not, to a stationary shape near the start
     std::optional<int> modes;  // stability against e^{i m theta}, m = 0 ... modes, by the dissipation of [model]
     BranchChoices branch;
 };
 
-// The keys of [equilibrium]; see common/case/keys.hpp.
+constexpr bool holds_area(Held held) {
+    return held == Held::area || held == Held::area_and_volume;
+}
+constexpr bool holds_volume(Held held) {
+    return held == Held::volume || held == Held::area_and_volume;
+}
+
+// Area and volume, unless the model leaves them free, or gives a tension or a pressure.
+inline Held default_held(const Model& model) {
+    const bool area = model.area.value_or(AreaRule::fixed) == AreaRule::fixed && model.tension.is_zero(),
+               volume = model.keeps_volume.value_or(true) && model.pressure.is_zero();
+    return area && volume ? Held::area_and_volume : area ? Held::area : volume ? Held::volume : Held::nothing;
+}
+
+// What [equilibrium] holds against what [model] says: "" or the complaint about `held`.
+inline std::string held_against(const Model& model, Held held) {
+    const auto clash = [](const char* what, const char* key) { return std::string("must ") + what + ": see " + key; };
+    const bool area = holds_area(held), volume = holds_volume(held), reduced = held == Held::reduced_volume;
+    const bool wants_area = model.area == AreaRule::fixed, frees_area = model.area && !wants_area,
+               loads_area = !model.tension.is_zero(), wants_volume = model.keeps_volume == true,
+               frees_volume = model.keeps_volume == false, loads_volume = !model.pressure.is_zero();
+    if (wants_area && !area) return clash("hold the area", "model.area");
+    if (wants_volume && !volume) return clash("hold the volume", "model.volume");
+    if (frees_area && area) return clash("leave the area free", "model.area");
+    if (frees_volume && volume) return clash("leave the volume free", "model.volume");
+    if (loads_area && (area || reduced)) return clash("leave the area free", "model.tension");
+    if (loads_volume && (volume || reduced)) return clash("leave the volume free", "model.pressure");
+    return {};
+}
+
+// The keys of [equilibrium], for a case with this model; see common/case/keys.hpp.
 template <class Keys>
-void keys(Keys& k, EquilibriumChoices& e) {
+void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
     k.choice("held", e.held,
              {{"area-and-volume", Held::area_and_volume},
               {"area", Held::area},
@@ -56,15 +86,11 @@ void keys(Keys& k, EquilibriumChoices& e) {
     k.number("reduced_volume", e.reduced_volume, {.above = 0, .to = 1});
     k.flag("descend", e.descend);
     k.integer("modes", e.modes, {.from = 0, .to = 100});
-    const auto held_in = [&](std::initializer_list<Held> which) {
-        for (const Held held : which)
-            if (e.held == held) return true;
-        return false;
-    };
+    const Held held = e.held.value_or(default_held(model));
+    k.check("held", [&] { return held_against(model, held); });
     const char* not_held = "is not held fixed: see equilibrium.held";
-    const bool area = held_in({Held::area, Held::area_and_volume}),
-               volume = held_in({Held::volume, Held::area_and_volume}),
-               reduced = held_in({Held::reduced_volume, Held::area_and_volume});
+    const bool area = holds_area(held), volume = holds_volume(held),
+               reduced = held == Held::reduced_volume || held == Held::area_and_volume;
     k.check("area", [&] { return e.area && !area ? not_held : ""; });
     k.check("volume", [&] { return e.volume && !volume ? not_held : ""; });
     k.check("reduced_volume", [&] {
@@ -79,7 +105,9 @@ void keys(Keys& k, EquilibriumChoices& e) {
         parameters.insert(parameters.end(), {{"energy.H0", vary_H0},
                                              {"equilibrium.area", vary_area},
                                              {"equilibrium.volume", vary_volume},
-                                             {"equilibrium.reduced_volume", vary_reduced_volume}});
+                                             {"equilibrium.reduced_volume", vary_reduced_volume},
+                                             {"model.tension", vary_tension},
+                                             {"model.pressure", vary_pressure}});
         k.choice("vary", e.branch.parameter, parameters);
         k.number("to", e.branch.to);
         k.number("step", e.branch.step, {.above = 0});
@@ -87,11 +115,17 @@ void keys(Keys& k, EquilibriumChoices& e) {
             const BranchChoices& b = e.branch;
             if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
-            const bool held = *b.parameter == vary_area             ? area
-                              : *b.parameter == vary_volume         ? volume && !e.reduced_volume
-                              : *b.parameter == vary_reduced_volume ? reduced && !e.volume
-                                                                    : true;
-            return held ? "" : "varies a quantity that is not held fixed: see equilibrium.held";
+            if (*b.parameter == vary_tension || *b.parameter == vary_pressure) {
+                const bool fixed = *b.parameter == vary_tension ? area : volume;
+                return fixed || held == Held::reduced_volume
+                           ? "varies a load on what is held fixed: see equilibrium.held"
+                           : "";
+            }
+            const bool is_held = *b.parameter == vary_area             ? area
+                                 : *b.parameter == vary_volume         ? volume && !e.reduced_volume
+                                 : *b.parameter == vary_reduced_volume ? reduced && !e.volume
+                                                                       : true;
+            return is_held ? "" : "varies a quantity that is not held fixed: see equilibrium.held";
         });
     });
 }

@@ -93,12 +93,12 @@ void ensemble_keys(Keys& k, Model& model) {
          fmt::format("area = \"{}\"; what a fixed area needs is the series tension", rules.back().first));
     load("pressure", model.pressure, !model.keeps_volume.value_or(inextensible),
          "volume = \"free\"; what a fixed volume needs is the series pressure");
-    load("force", model.force, model.free_period,
-         "period = \"free\"; what a fixed period needs is the series force");
+    load("force", model.force, model.free_period, "period = \"free\"; what a fixed period needs is the series force");
     k.check("period", [&]() -> std::string {
         const MotionLaw law = motion_law(model);
         if (!law.free_period || law.keeps_volume || !law.area_is_free()) return {};
-        return "must not be \"free\" with free volume and area: E + tension A - pressure V - force L of a straight tube "
+        return "must not be \"free\" with free volume and area: E + tension A - pressure V - force L of a straight "
+               "tube "
                "is linear in L and has no rest state; fix area or volume";
     });
 }
@@ -324,10 +324,12 @@ inline std::optional<double> branch_begin(const Case& c) {
 // Of equilibria of tier axisym.
 template <class Keys>
 void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
-    k.check("model.volume",
-            [&] { return c.model.keeps_volume ? "must be absent: equilibrium.held says what is held fixed" : ""; });
-    k.check("model.area",
-            [&] { return c.model.area ? "must be absent: equilibrium.held says what is held fixed" : ""; });
+    k.check("model.period",
+            [&] { return law.free_period ? "must not be \"free\": equilibria are computed at a fixed period" : ""; });
+    for (const auto& [key, load] : {std::pair{"model.tension", &law.tension}, {"model.pressure", &law.pressure}})
+        k.check(key, [&] {
+            return load->is_constant() ? "" : "must be a number: nothing moves in a case with [equilibrium]";
+        });
     k.check("model.kind", [&] {
         return c.equilibrium->modes && law.inertia != 0
                    ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
@@ -359,15 +361,14 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
 template <class Keys>
 void check_ensemble(Keys& k, const Case& c, const MotionLaw& law) {
     k.check("model.period", [&] {
-        return law.free_period && !is_tube(c.shape) ? "must not be \"free\": only a tube has a period" : "";
+        const bool period = is_tube(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
+        return law.free_period && !period ? "must not be \"free\": only a tube has a period" : "";
     });
+    if (c.tier == Tier::axisym) return;
     const auto refuse = [&](const char* key, bool chosen) {
         k.check(key, [&]() -> std::string {
             if (!chosen) return {};
-            return fmt::format("is not computed in {} yet", c.equilibrium               ? "cases with [equilibrium]"
-                                                            : c.tier == Tier::axisym    ? "tier \"axisym\""
-                                                            : c.tier == Tier::surface3d ? "tier \"surface3d\""
-                                                                                        : "tier \"auto\"");
+            return fmt::format("is not computed in tier \"{}\" yet", c.tier == Tier::surface3d ? "surface3d" : "auto");
         });
     };
     refuse("model.area", law.reservoir || law.keeps_area);
@@ -413,8 +414,9 @@ void check_together(Keys& k, const Case& c) {
     k.check(key, [&] { return complaint; });
     k.check("discretisation.parametrisation", [&]() -> std::string {
         const auto chosen = c.discretisation.parametrisation;
-        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained()))
-            return "must not be \"graph\": only the gradient flow of a tube with free volume is computed as a graph";
+        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained() || law.loads_change()))
+            return "must not be \"graph\": only the gradient flow of a tube with free volume and area, under tension "
+                   "and pressure that do not change, is computed as a graph";
         if (chosen == Parametrisation::material && !law.inextensible)
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
@@ -448,7 +450,7 @@ void automatic_keys(Keys& k, Case& c) {
 template <class Keys>
 void motion_keys(Keys& k, Case& c) {
     k.table("model", [&](auto& k) { keys(k, c.model); });
-    k.optional_table("equilibrium", c.equilibrium, [](auto& k, EquilibriumChoices& e) { keys(k, e); });
+    k.optional_table("equilibrium", c.equilibrium, [&](auto& k, EquilibriumChoices& e) { keys(k, e, c.model); });
     if (c.equilibrium)
         k.absent("velocity", "must be absent: nothing moves in a case with [equilibrium]");
     else

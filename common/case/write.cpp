@@ -57,9 +57,9 @@ public:
         if (!values.empty()) line(key, toml_list(values));
     }
     void ramp(const std::string& key, const Ramp& ramp) {
-        line(key, ramp.times().empty() ? toml_number(ramp.values().front())
-                                       : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()),
-                                                     toml_list(ramp.values())));
+        line(key, ramp.times().empty()
+                      ? toml_number(ramp.values().front())
+                      : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()), toml_list(ramp.values())));
     }
 
     void absent(const std::string&, const std::string&) {}

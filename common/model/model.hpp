@@ -1,7 +1,9 @@
 // The models of motion: the table of those that a case can name, and the law of motion of each.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -60,6 +62,16 @@ inline std::string quoted_names(bool ModelEntry::*has) {
     return text;
 }
 
+// Tension, pressure (inside minus outside) and axial force at one time; or their rates of change.
+struct Loads {
+    double tension = 0, pressure = 0, force = 0;
+
+    // F - E of theory.md (3.16); of rates of change, the rate at which they do work, (3.20).
+    double energy(double area, double volume, double length) const {
+        return tension * area - pressure * volume - force * length;
+    }
+};
+
 // The dimensionless law of motion of a membrane, theory.md (3.1), u its velocity and b the bending force:
 //   inertia (d_t u + grad_w u) = 2 viscosity div D(u) - friction u - grad p - p H nu + b nu + pressure nu
 // with lambda = -pressure where the volume is kept. An extensible membrane moves along its normal alone, without p:
@@ -79,9 +91,25 @@ struct MotionLaw {
     // The L2 gradient flow of F: nothing is kept.
     bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
     bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
-    // Whether F is E alone at all times.
+    // Whether F is E alone at all times; whether F - E depends on time.
     bool without_loads() const { return tension.is_zero() && pressure.is_zero() && force.is_zero(); }
+    bool loads_change() const { return !tension.is_constant() || !pressure.is_constant() || !force.is_constant(); }
 };
+
+inline Loads loads_at(const MotionLaw& law, double t) {
+    return {law.tension.at(t), law.pressure.at(t), law.force.at(t)};
+}
+// Rates of change; at a kink those after it.
+inline Loads load_rates(const MotionLaw& law, double t) {
+    return {law.tension.slope(t), law.pressure.slope(t), law.force.slope(t)};
+}
+inline double next_kink(const MotionLaw& law, double t) {
+    return std::min({law.tension.next_kink(t), law.pressure.next_kink(t), law.force.next_kink(t)});
+}
+// The scale of F - E over all times, a part of E_ref: theory.md (11.1).
+inline double load_scale(const MotionLaw& law, double area, double volume, double length) {
+    return law.tension.largest() * area + law.pressure.largest() * std::abs(volume) + law.force.largest() * length;
+}
 
 inline AreaRule area_rule(const Model& model) {
     return model.area.value_or(model_entry(model.kind).inextensible ? AreaRule::fixed : AreaRule::free);

@@ -65,7 +65,6 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"turn", "radian", "largest angle between normals of neighbouring nodes", SeriesUse::diagnostic},
     {"parameter", "that of the key", "value of the key that varies along a branch"},
     {"special", "1", "1 at a fold, 2 at a bifurcation, else 0"},
-    {"sigma", "energy/length^2", "multiplier of the area"},
     {"negative_directions", "1", "number of directions in which the energy falls"},
     {"growth_<m>", "1/time", "growth rate of waves with m = <m> around the axis"},
     {"meridian_length", "length", "length of the profile"},

@@ -91,8 +91,57 @@ double radius_rate(const UniformSphere& sphere) {
     return -2 / R * (f.f + f.H / R - f.K / (R * R));
 }
 
-double tension_of_free_volume(const Bending& energy, double radius) {
-    return radius * radius_rate(UniformTube{energy, radius, 0});
+double pressure_at_rest(const UniformTube& tube) {
+    return tube.tension / tube.radius - radius_rate(tube);
+}
+
+double pressure_at_rest(const UniformSphere& sphere) {
+    return 2 * sphere.tension / sphere.radius - radius_rate(sphere);
+}
+
+double axial_force(const UniformTube& tube, double pressure) {
+    const double R = tube.radius;
+    return 2 * pi * R * (on(tube).f + tube.tension) - pi * R * R * pressure;
+}
+
+std::optional<double> tension_of(const MotionLaw& law, const Bending& energy, double radius) {
+    const Loads loads = loads_at(law, 0);
+    if (law.area_is_free()) return loads.tension;
+    if (!law.keeps_volume) return tension_of_free_volume(energy, radius, loads.pressure);
+    if (!law.free_period) return std::nullopt;
+    const auto f = on(UniformTube{energy, radius});
+    return (loads.force / pi + f.H) / radius - f.f;  // theory.md (3.22)
+}
+
+double radius_rate_of(const MotionLaw& law, const UniformTube& tube) {
+    if (law.keeps_volume || !law.area_is_free()) return 0;
+    const double drive = loads_at(law, 0).pressure - pressure_at_rest(tube);
+    return drive / (law.friction + 2 * law.viscosity / (tube.radius * tube.radius));
+}
+
+std::optional<double> radius_at_rest(const MotionLaw& law, const UniformTube& tube) {
+    constexpr double ratio = 1.02, farthest = 1e3;
+    const auto rate = [&](double R) {
+        UniformTube at = tube;
+        at.radius = R;
+        return radius_rate_of(law, at);
+    };
+    const double first = rate(tube.radius);
+    if (first == 0) return tube.radius;
+    double before = tube.radius, after = before;
+    do {
+        before = after, after *= first > 0 ? ratio : 1 / ratio;
+        if (after > farthest * tube.radius || farthest * after < tube.radius) return std::nullopt;
+    } while (rate(after) * first > 0);
+    for (int i = 0; i < 60; ++i) {
+        const double middle = (before + after) / 2;
+        (rate(middle) * first > 0 ? before : after) = middle;
+    }
+    return (before + after) / 2;
+}
+
+double tension_of_free_volume(const Bending& energy, double radius, double pressure) {
+    return radius * (radius_rate(UniformTube{energy, radius, 0}) + pressure);
 }
 
 double reduced_tension(const UniformTube& tube) {

@@ -29,8 +29,23 @@ struct UniformSphere {
 double radius_rate(const UniformTube& tube);
 double radius_rate(const UniformSphere& sphere);
 
-// The tension at which a tube is at rest without a difference of pressure: that of models that leave the volume free.
-double tension_of_free_volume(const Bending& energy, double radius);
+// The tension at which a tube is at rest under a pressure: that of laws that keep the area and leave the volume free.
+double tension_of_free_volume(const Bending& energy, double radius, double pressure = 0);
+// The pressure at which the tube and the sphere are at rest: theory.md (3.21), (3.23).
+double pressure_at_rest(const UniformTube& tube);
+double pressure_at_rest(const UniformSphere& sphere);
+// The axial force on the tube under a pressure: theory.md (3.21).
+double axial_force(const UniformTube& tube, double pressure);
+
+// The tension that a straight tube has in the ensemble of a law, with the loads of t = 0: given, or that of its
+// balance, theory.md 5. Empty where area, volume and period are kept: there its waves determine it.
+std::optional<double> tension_of(const MotionLaw& law, const Bending& energy, double radius);
+// How fast the radius of a straight tube changes at t = 0 by its law: 0 where something keeps it. A reservoir with free
+// volume: without inertia; infinite where nothing resists.
+double radius_rate_of(const MotionLaw& law, const UniformTube& tube);
+// Where its radius goes, with the tension of the tube and the pressure of t = 0: to the nearest stable radius in that
+// direction. Empty where there is none from 1e-3 to 1e3 times the radius.
+std::optional<double> radius_at_rest(const MotionLaw& law, const UniformTube& tube);
 
 // Sigma of theory.md (5.20): (f + f_H/R + sigma0) R^2/f_HH. Not finite where f_HH = 0.
 double reduced_tension(const UniformTube& tube);

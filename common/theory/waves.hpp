@@ -21,18 +21,19 @@ struct WaveState {
 };
 
 // The waves at each of `times` (ascending, from 0), to about 1e-10 of the largest amplitude.
-//   Gradient flow: the radius drifts, theory.md (5.3), unless the law keeps the volume; amplitudes are multiplied by
-//     exp INT s dt. The tension is that of the tube, constant.
-//   Inextensible membranes: the radius stays. Volume fixed: the tension keeps SUM Z a^2 constant, theory.md
-//     (5.14), and is returned; the tube's own tension is ignored. Volume free: tension_of_free_volume, constant.
+//   Area free, or fed from a reservoir: the tension is that of the tube, constant. Else that of tension_of, constant;
+//   or
+//     it keeps SUM Z a^2 constant, theory.md (5.14), and is returned; the tube's own tension is ignored.
+//   The radius stays. In gradient flow that keeps neither area nor volume it drifts under the tension and the pressure
+//     of t = 0, theory.md (5.3); amplitudes are multiplied by exp INT s dt.
 //   With inertia and m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
 // The equations neglect squares of amplitudes. Throws std::invalid_argument for invalid waves (n = m = 0,
 // repeated, all without amplitude, infinitely fast), SolveError if the radius vanishes or the integrator fails.
 std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& law, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times);
 
-// The tension that the constraints ask for at the start, theory.md (5.17), (5.19), of an inextensible membrane of fixed
-// volume.
+// The tension that the constraints ask for at the start, theory.md (5.17), (5.19), where area, volume and period are
+// kept.
 double tension_of_waves(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves);
 
 // A time-dependent case that starts as a tube: that tube made straight, and its waves. The tension is that of the
@@ -45,7 +46,8 @@ struct TubeStart {
 std::optional<TubeStart> tube_start(const Case& c);  // empty for other cases
 
 // The mean rate of a wave between two times by linear theory of the case: log(a(to)/a(from))/(to - from). Empty if
-// unknown: at fixed volume all waves are coupled, and the case does not contain this one.
+// unknown: where area and volume couple all waves, and the case does not contain this one; where loads change in time,
+// or the radius of a tube that a reservoir feeds.
 std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to);
 
 }  // namespace tubule::theory

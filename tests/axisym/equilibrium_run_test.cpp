@@ -99,8 +99,8 @@ TEST(EquilibriumCase, refusals) {
            "14:1: equilibrium.branch needs to and step: the end of the branch and the distance between shapes");
     expect("energy.k42", "energy.k43",
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
-           "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", not "
-           "\"energy.k43\"; did you mean 'energy.k40'?");
+           "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", "
+           "\"model.tension\", \"model.pressure\", not \"energy.k43\"; did you mean 'energy.k40'?");
     const std::string varies = "14:1: equilibrium.branch varies a quantity that is not held fixed: see " + held;
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.volume\"", varies);
@@ -112,8 +112,22 @@ TEST(EquilibriumCase, refusals) {
            "11:7: time.end must be absent: nothing moves in a case with [equilibrium]");
     expect("kind = \"capsule\"\nradius = 0.5\nlength = 2.0", "kind = \"torus\"\nradius = 2.0\ntube_radius = 1.0",
            "7:8: shape.kind must not be \"torus\": equilibria are closed cells, or tubes with mirror symmetry");
-    expect("[accuracy]", "[model]\nvolume = \"fixed\"\n[accuracy]",
-           "11:10: model.volume must be absent: equilibrium.held says what is held fixed");
+    const auto clash = [&](const std::string& model, const std::string& is_held, const std::string& complaint) {
+        const std::string text = with("modes = 1\n", "held = \"" + is_held + "\"\n");
+        EXPECT_EQ(refusal(text.substr(0, text.find("[equilibrium.branch]")) + "[model]\n" + model + "\n"),
+                  "case.toml:13:8: equilibrium.held must " + complaint);
+    };
+    clash("volume = \"fixed\"", "area", "hold the volume: see model.volume");
+    clash("area = \"fixed\"", "volume", "hold the area: see model.area");
+    clash("volume = \"free\"", "volume", "leave the volume free: see model.volume");
+    clash("area = \"free\"", "area", "leave the area free: see model.area");
+    clash("tension = 0.1", "area-and-volume", "leave the area free: see model.tension");
+    clash("pressure = 0.1", "reduced-volume", "leave the volume free: see model.pressure");
+    expect("[accuracy]", "[model]\ntension = {time = [0, 1], value = [0, 1]}\n[accuracy]",
+           "11:11: model.tension must be a number: nothing moves in a case with [equilibrium]");
+    expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
+           "held = \"area\"\n[equilibrium.branch]\nvary = \"model.tension\"",
+           "14:1: equilibrium.branch varies a load on what is held fixed: see " + held);
     expect("[accuracy]", "[model]\nkind = \"fluid\"\n[accuracy]",
            "11:8: model.kind must not be \"fluid\" with equilibrium.modes: growth rates neglect inertia");
     expect("to = 0.0", "to = 0.12",
@@ -174,10 +188,41 @@ TEST(EquilibriumCase, whatIsHeld) {
     EXPECT_NEAR(given.at("area", 0), 9.42477796076938, 1e-10);  // that of the start: 2 pi r l + 4 pi r^2
     const Outcome size = outcome(single, {"equilibrium.held=reduced-volume"});
     EXPECT_NEAR(size.at("reduced_volume", 0), 0.7698003589195009, 1e-10);  // of the start
-    EXPECT_NEAR(2 * size.at("sigma", 0) * size.at("area", 0) + 3 * size.at("lambda", 0) * size.at("volume", 0), 0,
+    EXPECT_NEAR(2 * size.at("tension", 0) * size.at("area", 0) - 3 * size.at("pressure", 0) * size.at("volume", 0), 0,
                 1e-7);
-    EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("lambda", 0), 0);
-    EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("sigma", 0), 0, 0);
+    EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("pressure", 0), 0);
+    EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("tension", 0), 0, 0);
+}
+
+// theory.md (3.21), (3.23): the radius at rest under a tension and a pressure, also where a motion would leave it.
+TEST(EquilibriumCase, restsUnderTensionAndPressure) {
+    const std::string sphere = R"(tier = "axisym"
+[energy]
+k20 = 0.5
+k40 = 0.03
+k42 = 0.1
+H0 = -0.7
+[model]
+tension = 0.4
+[shape]
+kind = "sphere"
+radius = 1.05
+[accuracy]
+energy = 1e-9
+[equilibrium]
+descend = false
+)";
+    const double h = -2 + 0.7, f = 0.5 * h * h + 0.03 * std::pow(h, 4) + 0.1, f_H = h + 0.12 * std::pow(h, 3),
+                 P = 2 * (f + 0.4) + 2 * f_H - 0.4;
+    const Outcome o = outcome(sphere, {"model.pressure=" + fmt::format("{:.17g}", P)});
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_NEAR(o.at("r_max", 0), 1, 1e-7);
+    EXPECT_NEAR(o.at("tension", 0), 0.4, 1e-14);
+    EXPECT_NEAR(o.at("pressure", 0), P, 1e-14);
+    EXPECT_NEAR(o.at("free_energy", 0), 4 * pi * (f + 0.4) - P * 4 * pi / 3, 1e-7);
+    // A fixed volume measures it; what the model says is what is held.
+    const Outcome kept = outcome(sphere, {"model.volume=fixed", "shape.radius=1"});
+    EXPECT_NEAR(kept.at("pressure", 0), P, 1e-7);
 }
 
 TEST(EquilibriumCase, tubesMirrorThemselves) {

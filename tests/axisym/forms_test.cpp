@@ -30,7 +30,7 @@ TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {
         for (const Cell& cell : {whole, half})
             for (const Bending& material : {bending(0.2, -2, 0.03, 0.06), bending(1, 0.7, 0.2, -0.4)}) {
                 const ProfileSpace space(cell, uniform_breaks(cell, 7), degree, degree - 1);
-                const Forms forms(space, material);
+                const Forms forms(space, material, {.tension = 0.7, .pressure = -1.3});
                 const Vector x = rough(space.size());
                 const auto checks = check_terms(forms, x);
                 ASSERT_EQ(checks.size(), 3u);
@@ -39,7 +39,7 @@ TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {
                     EXPECT_FALSE(std::isnan(check.gradient.slope)) << key;
                 }
                 const auto all = check_derivatives(
-                    [&](const Vector& y) { return forms.energy(y); },
+                    [&](const Vector& y) { return forms.free_energy(y); },
                     [&](const Vector& y) { return forms.gradient(y); },
                     [&](const Vector& y, const Vector& w) -> Vector { return forms.hessian(y) * w; }, x);
                 EXPECT_TRUE(all.pass()) << all.text();

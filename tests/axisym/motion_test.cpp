@@ -9,6 +9,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
+#include "common/solve/derivative_check.hpp"
 #include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
@@ -32,6 +33,26 @@ CurveLaw curve_law(const MotionLaw& law, bool lagrangian, bool swirls) {
 const CurveLaw swirling = curve_law(fluid, false, true), lagrangian = curve_law(fluid, true, true);
 const std::vector<CurveLaw> laws{gradient_flow, gradient_flow_volume, overdamped, stokes, fluid, swirling, lagrangian};
 
+// What is kept and what acts on the rest, of extensible and inextensible laws; free periods of tubes alone.
+std::vector<CurveLaw> ensembles(bool tube) {
+    MotionLaw loaded = gradient_flow, held = gradient_flow_volume, fed = stokes, swelling = fluid;
+    loaded.tension = 0.3, loaded.pressure = 0.2;
+    held.keeps_area = true;
+    fed.reservoir = true, fed.tension = 0.3;
+    swelling.reservoir = true, swelling.keeps_volume = false, swelling.tension = 0.3, swelling.pressure = 0.2;
+    std::vector<CurveLaw> out{loaded, held, fed, swelling};
+    for (const CurveLaw& law : {CurveLaw(fed), CurveLaw(swelling)})
+        out.push_back(law), out.back().holds_area = false, out.back().lagrangian = true;
+    if (!tube) return out;
+    for (MotionLaw pulled : {gradient_flow_volume, held, overdamped, fluid, fed}) {
+        pulled.free_period = true, pulled.force = 0.7;
+        out.push_back(pulled);
+    }
+    out.push_back(curve_law(out.back(), true, false));
+    out.push_back(curve_law(fluid, false, true)), out.back().free_period = true, out.back().force = 0.7;
+    return out;
+}
+
 Vector some_curve(const CurveSpace& space) {
     const Meridian whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
                            : space.length() > 0 ? meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}})
@@ -41,29 +62,62 @@ Vector some_curve(const CurveSpace& space) {
 
 TEST(CurveMotion, jacobianIsTheDerivative) {
     for (const Topology topology : {Topology::cell, Topology::half_cell, Topology::tube, Topology::half_tube})
-        for (const CurveLaw& law : laws) {
+        for (const bool plain : {true, false}) {
             const bool tube = topology == Topology::tube || topology == Topology::half_tube;
-            const CurveSpace space(topology, equal_breaks(6), 5, 4, tube ? 3 : 0);
-            const CurveMotion motion(space, stiff, law, 0.3, 5, 2);
-            const int n = motion.layout().size;
-            Vector y = random_vector(n, 0.3);
-            y.head(space.size()) = some_curve(space) + random_vector(space.size(), 0.01, 2);
-            const Vector rate = random_vector(n, 0.3, 3), v = random_vector(n, 1, 4);
-            const double cj = 1.7;
-            Eigen::SparseMatrix<double> J = motion.pattern();
-            motion.jacobian(y.data(), rate.data(), cj, J.valuePtr());
-            const auto F = [&](double h) {
-                const Vector at = y + h * v, of = rate + cj * h * v;
-                Vector out(n);
-                EXPECT_TRUE(motion.residual(at.data(), of.data(), out.data()));
-                return out;
-            };
-            // Central differences with one extrapolation: their own error is of order h^4.
-            const double h = 1e-3;
-            const Vector slope = (8 * (F(h / 2) - F(-h / 2)) - (F(h) - F(-h))) / (6 * h), expected = J * v;
-            EXPECT_LE((slope - expected).lpNorm<Eigen::Infinity>(), 1e-7 * expected.lpNorm<Eigen::Infinity>())
-                << static_cast<int>(topology) << " " << law.inextensible << law.inertia << law.swirls;
+            for (const CurveLaw& law : plain ? laws : ensembles(tube)) {
+                const CurveSpace space(topology, equal_breaks(6), 5, 4, tube ? 3 : 0, law.free_period);
+                const CurveMotion motion(space, stiff, law, 0.3, 5, 2);
+                const int n = motion.layout().size;
+                Vector y = random_vector(n, 0.3);
+                y.head(space.size()) = some_curve(space) + random_vector(space.size(), 0.01, 2);
+                const Vector rate = random_vector(n, 0.3, 3), v = random_vector(n, 1, 4);
+                const double cj = 1.7;
+                Eigen::SparseMatrix<double> J = motion.pattern();
+                motion.jacobian(0, y.data(), rate.data(), cj, J.valuePtr());
+                const auto F = [&](double h) {
+                    const Vector at = y + h * v, of = rate + cj * h * v;
+                    Vector out(n);
+                    EXPECT_TRUE(motion.residual(0, at.data(), of.data(), out.data()));
+                    return out;
+                };
+                // Central differences with one extrapolation: their own error is of order h^4.
+                const double h = 1e-3;
+                const Vector slope = (8 * (F(h / 2) - F(-h / 2)) - (F(h) - F(-h))) / (6 * h), expected = J * v;
+                EXPECT_LE((slope - expected).lpNorm<Eigen::Infinity>(), 1e-7 * expected.lpNorm<Eigen::Infinity>())
+                    << static_cast<int>(topology) << " " << law.inextensible << law.inertia << law.swirls
+                    << law.keeps_area << law.reservoir << law.free_period;
+            }
         }
+}
+
+// The derivative along z e_z is that of the functional on curves that are stretched along the axis.
+TEST(CurveForms, stretchSlopeIsTheDerivative) {
+    for (const Topology topology : {Topology::tube, Topology::half_tube, Topology::cell}) {
+        const bool tube = topology != Topology::cell;
+        const CurveSpace space(topology, equal_breaks(6), 5, 4, tube ? 3 : 0, tube);
+        const CurveForms forms(space, stiff);
+        const Weights weights{.energy = 1, .area = 0.3, .volume = -0.2};
+        const Vector x = some_curve(space) + random_vector(space.size(), 0.01, 2);
+        const auto F = [&](double h) {
+            Vector at = x;
+            at.tail(space.size() - space.r().size()) *= 1 + h;
+            return forms.value(weights, at);
+        };
+        const double h = 1e-3, slope = (8 * (F(h / 2) - F(-h / 2)) - (F(h) - F(-h))) / (6 * h);
+        EXPECT_NEAR(forms.stretch_slope(weights, x), slope, 1e-9 * std::abs(F(0))) << static_cast<int>(topology);
+    }
+}
+
+// Gradient and Hessian in the rise, too.
+TEST(CurveForms, haveTheDerivativesOfAFreePeriod) {
+    const CurveSpace space(Topology::half_tube, equal_breaks(6), 5, 4, 3, true);
+    const CurveForms forms(space, stiff);
+    const Weights weights{.energy = 1, .area = 0.3, .volume = -0.2, .gauge = 0.1};
+    const auto check = check_derivatives(
+        [&](const Vector& x) { return forms.value(weights, x); },
+        [&](const Vector& x) { return forms.gradient(weights, x); },
+        [&](const Vector& x, const Vector& w) -> Vector { return forms.hessian(weights, x) * w; }, some_curve(space));
+    EXPECT_TRUE(check.pass());
 }
 
 // The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |D(u)|^2 dS.
@@ -74,9 +128,9 @@ double inf_sup(const CurveSpace& space, const Vector& x) {
     Vector y = Vector::Zero(at.size);
     y.head(space.size()) = x;
     Eigen::SparseMatrix<double> J = motion.pattern();
-    motion.jacobian(y.data(), Vector(Vector::Zero(at.size)).data(), 0, J.valuePtr());
+    motion.jacobian(0, y.data(), Vector(Vector::Zero(at.size)).data(), 0, J.valuePtr());
     const Eigen::MatrixXd all = J;
-    const int n = space.size(), m = motion.pressures().size();
+    const int n = space.shape_size(), m = motion.pressures().size();
     const Eigen::MatrixXd norm = all.block(at.u_r, at.u_r, n, n), B = all.block(at.p, at.u_r, m, n);
     const Field& field = motion.pressures();
     Eigen::MatrixXd mass = Eigen::MatrixXd::Zero(m, m);

@@ -106,9 +106,42 @@ TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
     EXPECT_EQ(found(law_of(ModelKind::gradient_flow), wavy), 3u);
     EXPECT_THROW(found(law_of(ModelKind::overdamped), wavy), std::invalid_argument);
     EXPECT_THROW(found(law_of(ModelKind::fluid), straight), std::invalid_argument);
-    MotionLaw free = law_of(ModelKind::overdamped);
-    free.keeps_volume = false;
-    EXPECT_THROW(found(free, straight), std::invalid_argument);
+    MotionLaw fed = law_of(ModelKind::overdamped);
+    fed.reservoir = true, fed.keeps_volume = false;
+    EXPECT_THROW(found(fed, wavy), std::invalid_argument);
+}
+
+// theory.md (5.8) to (5.10) at the tension of a reservoir or of a gradient flow, below and above the threshold of
+// pearling; with free volume also a change of the radius, whose rate is the slope of theory.md (3.21).
+TEST(Dispersion, atATensionThatIsGiven) {
+    const Bending energy = bending(0.5, -0.7, 0.03, 0.1);
+    const double length = 9;
+    for (const double tension : {0.1, 2.5})
+        for (const bool keeps_volume : {true, false})
+            for (const ModelKind kind : {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes}) {
+                MotionLaw law = law_of(kind, 2, 0.3);
+                const UniformTube tube{energy, 1, tension};
+                law.reservoir = law.inextensible, law.keeps_volume = keeps_volume, law.tension = tension;
+                if (!keeps_volume) law.pressure = theory::pressure_at_rest(tube);
+                SpectrumSettings settings;
+                settings.sigma = tension, settings.pressure = law.pressure.at(0), settings.accuracy = 1e-9;
+                settings.count = 1;
+                const Spectrum found = spectrum(energy, law, held_by(law), meridian(Tube{1, length, {}}), settings);
+                for (int m = 0; m <= 2; ++m) {
+                    double fastest = -1e300;
+                    for (int n = m == 2 ? 0 : 1; n < 12; ++n)
+                        fastest = std::max(fastest, growth(tube, law, 2 * pi * n / length, m).rate());
+                    if (m == 0 && !keeps_volume) {
+                        const double h = 1e-5;
+                        fastest = std::max(fastest, (theory::radius_rate_of(law, {energy, 1 + h, tension}) -
+                                                     theory::radius_rate_of(law, {energy, 1 - h, tension})) /
+                                                        (2 * h));
+                    }
+                    EXPECT_NEAR(found.modes[m].rates[0], fastest, 1e-8 * std::max(1.0, std::abs(fastest)))
+                        << name({.kind = kind, .keeps_volume = {}}) << ", m " << m << ", tension " << tension
+                        << keeps_volume;
+                }
+            }
 }
 
 TEST(Dispersion, wavesAroundTheAxisAlone) {

@@ -24,7 +24,7 @@ class Equilibrium(ProgramTest):
         case = self.write("cell.toml", CASE)
         out, _ = self.tubule("equilibrium", case)
         header, row = out.splitlines()[-2:]
-        self.assertEqual(header.split(), ["energy", "sigma", "lambda", "height", "r_max", "neg", "growth", "of", "m"])
+        self.assertEqual(header.split(), ["energy", "tension", "pressure", "height", "r_max", "neg", "growth", "of", "m"])
         self.assertAlmostEqual(float(row.split()[0]), ENERGIES[0], delta=1e-6)
         result = self.folder / "cell.hdf"
         self.assertEqual(about(result)["stop"], "finished")

@@ -132,11 +132,11 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
 
 TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
-        "energy, energy_20, energy_40, energy_42, dissipation, identity_defect, area, volume, volume_drift, "
+        "energy, energy_20, energy_40, energy_42, free_energy, work, dissipation, identity_defect, area, volume, volume_drift, "
         "reduced_volume, r_min, "
         "r_max, mode_<n>, kinetic_energy, speed, momentum_x, momentum_y, momentum_z, angular_momentum_x, "
-        "angular_momentum_y, angular_momentum_z, lambda, stretching, correction_energy, integral_H2, integral_K, "
-        "gauss_bonnet_defect, quality, turn, parameter, special, sigma, negative_directions, growth_<m>, "
+        "angular_momentum_y, angular_momentum_z, lambda, tension, pressure, force, stretching, correction_energy, integral_H2, integral_K, "
+        "gauss_bonnet_defect, quality, turn, parameter, special, negative_directions, growth_<m>, "
         "meridian_length, height, r_middle, pole_curvature, distance_to_start, energy_error, elements, tier";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
     expect_refused({
@@ -307,9 +307,7 @@ TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
 // What a case gives must be free, and what it asks for must be a motion with a state of rest.
 TEST(CaseRefusal, LoadsOnWhatIsFixed) {
     const std::string flow = "kind = \"gradient-flow\"";
-    const auto model = [&](const std::string& keys, const std::string& message) {
-        return Edit{flow, keys, message};
-    };
+    const auto model = [&](const std::string& keys, const std::string& message) { return Edit{flow, keys, message}; };
     expect_refused({
         model(flow + "\narea = \"fixed\"\ntension = 0.1",
               "10:11: model.tension must be absent: only valid with area = \"free\"; what a fixed area needs is the "
@@ -326,8 +324,7 @@ TEST(CaseRefusal, LoadsOnWhatIsFixed) {
         model(flow + "\nvolume = \"fixed\"\nforce = 1",
               "10:9: model.force must be absent: only valid with period = \"free\"; what a fixed period needs is the "
               "series force"),
-        model(flow + "\narea = \"reservoir\"",
-              "9:8: model.area must be one of \"fixed\", \"free\", not \"reservoir\""),
+        model(flow + "\narea = \"reservoir\"", "9:8: model.area must be one of \"fixed\", \"free\", not \"reservoir\""),
         model("kind = \"fluid\"\narea = \"free\"",
               "9:8: model.area must be one of \"fixed\", \"reservoir\", not \"free\""),
         model(flow + "\nperiod = \"free\"",
@@ -707,7 +704,8 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
         "tier = \"axisym\"\n"
         "\n[about]\ntitle = \"test\"\n"
         "\n[energy]\nk20 = 1\nk40 = 0\nk42 = 0.06\nH0 = -2\n"
-        "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\narea = \"free\"\nperiod = \"fixed\"\ntension = 0\npressure = 0\n"
+        "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\narea = \"free\"\nperiod = \"fixed\"\ntension = "
+        "0\npressure = 0\n"
         "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
         "\n[[shape.mode]]\namplitude = 0.3\nn = 1\nm = 0\nphase = 0\n"
         "\n[accuracy]\nenergy = 1e-06\nr_min = 0.001\n"

@@ -25,14 +25,14 @@ Text table_of(const Result& result) {
     const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
     const bool branch = has("parameter"), modes = has("growth_0");
     if (branch) add(out, "{:>14}  ", "parameter");
-    add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "sigma", "lambda", "height", "r_max", "neg");
+    add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "tension", "pressure", "height", "r_max", "neg");
     if (modes) add(out, "  {:>10} of m", "growth");
     add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
         if (branch) add(out, "{:>14.9g}  ", value("parameter", i));
-        add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("sigma", i),
-            value("lambda", i), value("height", i), value("r_max", i), value("negative_directions", i));
+        add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("tension", i),
+            value("pressure", i), value("height", i), value("r_max", i), value("negative_directions", i));
         if (modes) {
             int fastest = 0;
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)

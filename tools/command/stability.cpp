@@ -34,6 +34,9 @@ std::string words(const Model& model) {
     std::string text = name(model);
     if (model_entry(model.kind).viscous) text += fmt::format(", Re = {:g}, gamma = {:g}", model.Re, model.gamma);
     if (model.keeps_volume) text += *model.keeps_volume ? ", volume fixed" : ", volume free";
+    if (model.area && model.area != area_rule({.kind = model.kind, .keeps_volume = {}}))
+        text += model.area == AreaRule::fixed ? ", area fixed" : ", membrane from a reservoir";
+    if (model.free_period) text += ", period free";
     return text;
 }
 
@@ -84,6 +87,16 @@ StabilitySubject subject_of(const StabilityOptions& options) {
     return subject;
 }
 
+// Another model with what it has by default; where both are inextensible, with what the case holds and its loads.
+Model with_kind(const Model& own, ModelKind kind) {
+    if (model_entry(kind).inextensible && model_entry(own.kind).inextensible) {
+        Model model = own;
+        model.kind = kind;
+        return model;
+    }
+    return {.kind = kind, .Re = own.Re, .gamma = own.gamma, .keeps_volume = {}};
+}
+
 std::vector<Model> models_of(const StabilityOptions& options, const Model& own) {
     const bool all = options.model == "all";
     std::vector<Model> models;
@@ -92,7 +105,7 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
         if (!all && (options.model.empty() ? other.kind != own.kind : options.model != other.name)) continue;
         Model model = own;
         model.kind = other.kind;
-        if (other.kind != own.kind) model.keeps_volume.reset();
+        if (other.kind != own.kind) model = with_kind(own, other.kind);
         if (options.Re) model.Re = *options.Re;
         if (options.gamma) model.gamma = *options.gamma;
         viscous = viscous || other.viscous;
@@ -138,7 +151,8 @@ std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
     out.length = profile.length;
     for (int i = 0; i < 400; ++i)
         if (std::abs(profile.at(i / 400.0)[0] - out.tube.radius) > 1e-3 * out.tube.radius) return std::nullopt;
-    if (const auto sigma = find_number(frame, "sigma")) out.tension = *sigma, out.tension_source = "sigma of the frame";
+    if (const auto tension = find_number(frame, "tension"))
+        out.tension = *tension, out.tension_source = "tension of the frame";
     if (const auto pressure = mean_of(frame, "p"))
         out.tension = -*pressure, out.tension_source = "minus the mean pressure of the frame";
     return out;
@@ -236,7 +250,8 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
         ->check(refuse_infinite)
         ->check(CLI::NonNegativeNumber);
-    command->add_option("--tension", o->tension, "sigma (default: from model, case and shape)")->check(refuse_infinite);
+    command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)")
+        ->check(refuse_infinite);
     command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();

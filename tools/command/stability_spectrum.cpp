@@ -21,7 +21,7 @@ struct Found {
 
 // What the case says is held, where it looked for an equilibrium.
 Held held_in(const Case& c, const MotionLaw& law) {
-    return c.equilibrium && !law.inextensible ? c.equilibrium->held : axisym::held_by(law);
+    return c.equilibrium && !law.inextensible ? held_of(c) : axisym::held_by(law);
 }
 
 std::string words_of(const std::vector<Found>& found) {
@@ -29,7 +29,8 @@ std::string words_of(const std::vector<Found>& found) {
     for (const auto& [model, spectrum] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words(model));
         if (spectrum.at_rest())
-            out += fmt::format("  at rest with sigma = {:.8g}, lambda = {:.8g}\n", spectrum.sigma, spectrum.lambda);
+            out +=
+                fmt::format("  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda + 0.0);
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
@@ -70,10 +71,10 @@ std::string json_of(const std::vector<Found>& found) {
             modes += fmt::format("{}\n  {{\"m\": {}, \"rates\": {}, \"shape\": {}}}", modes.empty() ? "" : ",", mode.m,
                                  json(mode.rates), json(mode.shape));
         models += fmt::format(
-            "{}\n{{\"model\": {}, \"at_rest\": {}, \"sigma\": {}, \"lambda\": {}, \"estimated_error\": {}, "
+            "{}\n{{\"model\": {}, \"at_rest\": {}, \"tension\": {}, \"pressure\": {}, \"estimated_error\": {}, "
             "\"elements\": {}, \"modes\": [{}]}}",
             models.empty() ? "" : ",", json(name(model)), spectrum.at_rest() ? "true" : "false", json(spectrum.sigma),
-            json(spectrum.lambda), json(spectrum.estimated_error), spectrum.elements, modes);
+            json(-spectrum.lambda + 0.0), json(spectrum.estimated_error), spectrum.elements, modes);
     }
     return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
 }
@@ -85,12 +86,17 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
     const Meridian shape = subject.frame ? axisym::frame_meridian(*subject.frame) : axisym::start_meridian(subject.c);
     axisym::SpectrumSettings settings;
     settings.last = options.modes, settings.count = options.rates;
-    settings.sigma = options.tension;
     std::vector<Found> found;
     std::string refused;
+    const double time = subject.frame && !subject.c.equilibrium ? subject.frame->time : 0;  // of loads that change
     for (const Model& model : models) try {
             const MotionLaw law = motion_law(model);
-            found.push_back({model, axisym::spectrum(subject.c.energy, law, held_in(subject.c, law), shape, settings)});
+            const Held held = held_in(subject.c, law);
+            settings.sigma = options.tension;
+            if (!holds_area(held) && held != Held::reduced_volume && !settings.sigma)
+                settings.sigma = law.tension.at(time);
+            settings.pressure = law.pressure.at(time);
+            found.push_back({model, axisym::spectrum(subject.c.energy, law, held, shape, settings)});
         } catch (const std::invalid_argument& error) {
             if (models.size() == 1) throw;
             refused += fmt::format("\n{}: none: {}\n", name(model), error.what());

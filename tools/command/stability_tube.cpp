@@ -126,13 +126,19 @@ std::vector<theory::Wave> case_waves(const TubeSubject& subject) {
 }
 
 void set_tension(const TubeSubject& subject, ModelReport& report) {
-    const bool inextensible = report.law.inextensible;
-    if (inextensible && !report.law.keeps_volume) {
-        if (subject.tension_source == "as asked")
+    const bool inextensible = report.law.inextensible, asked = subject.tension_source == "as asked";
+    const std::optional<double> own = theory::tension_of(report.law, subject.tube.energy, subject.tube.radius);
+    if (own && !report.law.area_is_free()) {
+        if (asked)
             throw std::invalid_argument(
-                "--tension must be absent: with the volume free, the tube's balance determines it");
-        report.tube.tension = theory::tension_of_free_volume(subject.tube.energy, subject.tube.radius);
-        report.tension_source = "of a tube whose volume is free";
+                report.law.keeps_volume
+                    ? "--tension must be absent: with the period free, the axial force determines it"
+                    : "--tension must be absent: with the volume free, the tube's balance determines it");
+        report.tube.tension = *own;
+        report.tension_source = report.law.keeps_volume ? "by the axial force" : "of a tube whose volume is free";
+    } else if (own && !subject.tension && (report.law.reservoir || !report.law.tension.is_zero())) {
+        report.tube.tension = *own;
+        report.tension_source = report.law.loads_change() ? "of the case, at t = 0" : "of the case";
     } else if (subject.tension && (inextensible || subject.tension_source != "minus the mean pressure of the frame")) {
         report.tube.tension = *subject.tension, report.tension_source = subject.tension_source;
     } else if (inextensible && !subject.waves.empty()) {
@@ -159,8 +165,7 @@ double rounded(double value, double scale) {
 }
 double radius_rate_of(const ModelReport& report) {
     const auto& [energy, R, tension] = report.tube;
-    if (!report.law.unconstrained()) return 0;
-    return rounded(theory::radius_rate(report.tube) - tension / R,
+    return rounded(theory::radius_rate_of(report.law, report.tube),
                    std::abs(density(energy, -1 / R, 0.0).HH) / (R * R * R));
 }
 // The k42 above which no wave of m = 0 grows: 2 k42 is its part of f_KK.
@@ -176,7 +181,7 @@ std::optional<double> least_k42_of(const UniformTube& tube) {
 
 // By which factors the waves of the table have grown when the case ends, of an extensible membrane.
 void add_factors(const TubeSubject& subject, ModelReport& report) {
-    if (report.law.inextensible || !(subject.end > 0)) return;
+    if (report.law.inextensible || report.law.loads_change() || !(subject.end > 0)) return;
     std::vector<theory::Wave> waves;
     for (const WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) waves.push_back({*row.n, row.m, 1, 0});
@@ -456,19 +461,19 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
     Text out;
     std::string list;
     if (options.csv) add(out, "model,l,rate,frequency\n");
-    if (!options.csv)
-        add(out, "sphere of radius {:.8g}; {}; tension {:.8g}; for any m <= l\n", sphere.radius, moduli(sphere.energy),
-            sphere.tension);
+    if (!options.csv) add(out, "sphere of radius {:.8g}; {}; for any m <= l\n", sphere.radius, moduli(sphere.energy));
     for (const Model& model : models) {
         const MotionLaw law = motion_law(model);
         const bool swings = law.inertia != 0, moves = law.unconstrained();
-        if (!options.csv) add(out, "\n{}\n", words(model));
+        theory::UniformSphere loaded = sphere;
+        if (!options.tension && law.area_is_free()) loaded.tension = law.tension.at(0);
+        const double radius_rate = law.pressure.at(0) - theory::pressure_at_rest(loaded);
+        if (!options.csv) add(out, "\n{}\n  tension {:.8g}\n", words(model), loaded.tension);
         if (!options.csv && moves)
-            add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n",
-                radius_rate(sphere));
+            add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n", radius_rate);
         if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
-            const theory::Growth found = growth(sphere, law, l);
+            const theory::Growth found = growth(loaded, law, l);
             const double s = found.rate();
             if (options.csv) {
                 add(out, "{},{},{:.17g},{:.17g}\n", name(model), l, s, found.frequency());

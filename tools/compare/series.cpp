@@ -171,12 +171,24 @@ double Trace::error(double t) const {
     return std::max(left_out_[i], left_out_[i + 1]) / halved;
 }
 
+namespace {
+
+// F does unless loads change, theory.md (3.20); E where it is F.
+bool falls_by_dissipation(const Result& result, const std::string& series) {
+    if (series == "free_energy") return !has(result, "work");
+    if (series != "energy") return false;
+    return !has(result, "free_energy") || result.series.at("free_energy") == result.series.at("energy");
+}
+
+}  // namespace
+
 Trace trace_of(const Result& result, const std::string& series) {
     const std::vector<double>& times = result.series.at("time");
     const bool moves_only_downhill =
         has(result, "dissipation") &&
         (!has(result, "kinetic_energy") || largest_magnitude(result.series.at("kinetic_energy")) == 0);
-    if (series != "energy" || !moves_only_downhill) return {times, result.series.at(series), nullptr};
+    if (!falls_by_dissipation(result, series) || !moves_only_downhill)
+        return {times, result.series.at(series), nullptr};
     std::vector<double> slopes = result.series.at("dissipation");
     for (double& slope : slopes) slope = -slope;
     return {times, result.series.at(series), &slopes};

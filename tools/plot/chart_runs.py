@@ -153,7 +153,7 @@ class Program:
             return
         run.stop_time = rows[-1]["time"]
         run.values = {row["time"]: row[self.quantity] for row in rows if self.quantity in row}
-        totals = [row["energy"] + row.get("kinetic_energy", 0.0) for row in rows]
+        totals = [row.get("free_energy", row["energy"]) + row.get("kinetic_energy", 0.0) for row in rows]
         run.growth = rounded(max(totals) / totals[0]) if totals[0] > 0 else 1.0
         if "integral_K" in rows[0] and run.elements:
             run.width = rounded(math.sqrt(4 / math.sqrt(3) * rows[0]["area"] / run.elements))

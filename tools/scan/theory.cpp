@@ -27,7 +27,8 @@ int repeats(const Tube& tube) {
 // E = INT k20 (H-H0)^2 alone.
 std::optional<double> delaunay_period(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
-    if (!tube || !motion_law(c.model).unconstrained()) return std::nullopt;
+    const MotionLaw law = motion_law(c.model);
+    if (!tube || !law.unconstrained() || !law.without_loads()) return std::nullopt;
     bool only_k20 = true;
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only_k20 = only_k20 && (std::string_view(term.key) == "k20" ? c.energy.k[i] > 0 : c.energy.k[i] == 0);
@@ -48,17 +49,24 @@ std::optional<double> shortest_unduloid(const Case& c) {
     return period ? std::optional(*period * std::abs(c.energy.H0) - 4) : std::nullopt;
 }
 
-// The straight tube at rest. Gradient flow with free volume: radius 1/|H0|, if no term but k20 affects it. Otherwise
-// the straight tube of the start; nothing if a fixed volume makes the tension an unknown.
+// The straight tube at rest. Gradient flow with free volume and without loads: radius 1/|H0|, if no term but k20
+// affects it. With loads that are constant and a radius that nothing keeps: where the radius of the start goes.
+// Otherwise the straight tube of the start; nothing if a fixed area and volume make the tension an unknown.
 std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.equilibrium) return std::nullopt;
     const MotionLaw law = motion_law(c.model);
-    if (law.inextensible) {
-        if (law.keeps_volume) return std::nullopt;
-        return theory::UniformTube{c.energy, tube->radius, theory::tension_of_free_volume(c.energy, tube->radius)};
+    if (law.loads_change()) return std::nullopt;
+    const auto tension = theory::tension_of(law, c.energy, tube->radius);
+    if (!tension) return std::nullopt;
+    theory::UniformTube start{c.energy, tube->radius, *tension};
+    if (law.keeps_volume || !law.area_is_free()) return start;
+    if (law.reservoir || !law.without_loads()) {
+        const auto radius = theory::radius_at_rest(law, start);
+        if (!radius) return std::nullopt;
+        start.radius = *radius;
+        return start;
     }
-    if (law.keeps_volume) return theory::UniformTube{c.energy, tube->radius, 0};
     const theory::UniformTube rest{c.energy, 1 / std::abs(c.energy.H0), 0};
     const double k20 = c.energy.k[term_number("k20")], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
     if (c.energy.H0 == 0 || k20 == 0 || std::abs(theory::radius_rate(rest)) > rounding) return std::nullopt;

@@ -32,7 +32,8 @@ double energy_scale(const Bending& energy, double R) {
 std::optional<UniformFate> UniformFate::of(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.tier != Tier::axisym || c.equilibrium) return std::nullopt;
-    if (!motion_law(c.model).unconstrained()) return std::nullopt;
+    const MotionLaw law = motion_law(c.model);
+    if (!law.unconstrained() || !law.without_loads()) return std::nullopt;
     for (const double H : {-3.0, -1.0, -0.3, 0.7})
         if (density<double>(c.energy, H, 0).HK != 0) return std::nullopt;
     int waves = 0;

@@ -1,0 +1,297 @@
+// Tension, pressure, axial force, reservoirs and free periods: exact states of rest, growth rates, and runs under the
+// loads that other runs measured.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/theory/dispersion.hpp"
+#include "tests/axisym/runs.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+const Bending all_terms = bending(0.5, -0.7, 0.03, 0.1);
+
+struct Density {
+    double f, f_H, f_K;
+};
+Density density_at(const Bending& b, double H, double K) {
+    const double h = H - b.H0;
+    return {b.k[0] * h * h + b.k[1] * h * h * h * h + b.k[2] * K * K, 2 * b.k[0] * h + 4 * b.k[1] * h * h * h,
+            2 * b.k[2] * K};
+}
+
+// theory.md (3.21), (3.22), (3.23)
+double tube_pressure(const Bending& b, double R, double tension) {
+    const Density d = density_at(b, -1 / R, 0);
+    return (d.f + d.f_H / R + tension) / R;
+}
+double tube_force(const Bending& b, double R, double tension, double pressure) {
+    return 2 * pi * R * (density_at(b, -1 / R, 0).f + tension) - pi * R * R * pressure;
+}
+double tension_of_force(const Bending& b, double R, double force) {
+    const Density d = density_at(b, -1 / R, 0);
+    return (force / pi + d.f_H) / R - d.f;
+}
+double sphere_pressure(const Bending& b, double R, double tension) {
+    const Density d = density_at(b, -2 / R, 1 / (R * R));
+    return 2 * (d.f + tension) / R + 2 * d.f_H / (R * R) - 2 * d.f_K / (R * R * R);
+}
+
+struct Scene {
+    std::string name;
+    Model model;
+};
+
+Case case_of(const Bending& energy, const Shape& shape, const Model& model, double end, double accuracy = 1e-6) {
+    Case c;
+    c.energy = energy, c.shape = shape, c.model = model;
+    c.time.end = end;
+    c.accuracy.energy = accuracy;
+    return c;
+}
+
+void expect_balanced(const Outcome& o, const Case& c) {
+    ASSERT_EQ(exit_code(o.summary.stop.reason), 0) << o.summary.stop.message;
+    EXPECT_TRUE(o.summary.as_accurate_as_asked);
+    for (const double defect : o["identity_defect"])
+        EXPECT_LE(std::abs(defect), 20 * c.accuracy.energy * o.summary.reference_energy);
+}
+
+// Stable against changes of the radius where d/dR of the pressure at rest is negative: here for the tension -0.3.
+TEST(Ensembles, tubesComeToRestUnderTensionAndPressure) {
+    const double R = 1, tension = -0.3, pressure = tube_pressure(all_terms, R, tension),
+                 force = tube_force(all_terms, R, tension, pressure);
+    const Model loaded{.keeps_volume = false, .tension = tension, .pressure = pressure};
+    Model fed{.kind = ModelKind::overdamped,
+              .keeps_volume = false,
+              .area = AreaRule::reservoir,
+              .tension = tension,
+              .pressure = pressure};
+    Model viscous = fed, moving = fed;
+    viscous.kind = ModelKind::stokes, viscous.Re = 2, viscous.gamma = 0.5;
+    moving.kind = ModelKind::fluid, moving.gamma = 1;
+    for (const bool curve : {false, true})
+        for (const Model& model : {loaded, fed, viscous, moving}) {
+            if (!curve && model.kind != ModelKind::gradient_flow) continue;
+            Case c = case_of(all_terms, Tube{1.1, 2, {{0.05, 1}}}, model, 60);
+            if (curve && model.kind == ModelKind::gradient_flow)
+                c.discretisation.parametrisation = Parametrisation::even;
+            const Outcome o = run_case(c);
+            expect_balanced(o, c);
+            EXPECT_NEAR(o.last("r_min"), R, 1e-5) << name(model) << curve;
+            EXPECT_NEAR(o.last("r_max"), R, 1e-5) << name(model) << curve;
+            EXPECT_NEAR(o.last("tension"), tension, 1e-12);
+            EXPECT_NEAR(o.last("pressure"), pressure, 1e-12);
+            EXPECT_NEAR(o.last("force"), force, 1e-4) << name(model) << curve;
+            const double L = 2, f = density_at(all_terms, -1 / R, 0).f;
+            EXPECT_NEAR(o.last("free_energy"), 2 * pi * R * L * (f + tension) - pressure * pi * R * R * L, 1e-5);
+        }
+}
+
+TEST(Ensembles, fixedAreaAndVolumeOfTubesMeasureTheirLoads) {
+    const double R = 1;
+    // One load is given, the other is that of the kept quantity. Both kept: a straight tube that keeps its period is
+    // rigid, and its lambda is left out, so that the tension alone holds it.
+    for (const double tension : {0.0, 0.4}) {
+        const double pressure = tube_pressure(all_terms, R, tension);
+        const Model keeps_volume{.keeps_volume = true, .tension = tension},
+            keeps_area{.keeps_volume = false, .area = AreaRule::fixed, .pressure = pressure},
+            fed{.kind = ModelKind::stokes, .keeps_volume = true, .area = AreaRule::reservoir, .tension = tension},
+            flows{.kind = ModelKind::stokes, .keeps_volume = false, .pressure = pressure};
+        for (const Model& model : {keeps_volume, keeps_area, fed, flows}) {
+            Case c = case_of(all_terms, Tube{R, 2, {}}, model, 1);
+            const Outcome o = run_case(c);
+            expect_balanced(o, c);
+            EXPECT_NEAR(o.last("r_max"), R, 1e-9) << name(model);
+            EXPECT_NEAR(o.last("tension"), tension, 1e-7) << name(model);
+            EXPECT_NEAR(o.last("pressure"), pressure, 1e-7) << name(model);
+            EXPECT_NEAR(o.last("force"), tube_force(all_terms, R, tension, pressure), 1e-6) << name(model);
+        }
+    }
+}
+
+TEST(Ensembles, spheresComeToRestUnderTensionAndPressure) {
+    const double R = 1, tension = -0.3, pressure = sphere_pressure(all_terms, R, tension);
+    const Model loaded{.keeps_volume = false, .tension = tension, .pressure = pressure};
+    Model fed{.kind = ModelKind::stokes,
+              .keeps_volume = false,
+              .area = AreaRule::reservoir,
+              .tension = tension,
+              .pressure = pressure};
+    fed.gamma = 0.5;
+    for (const Model& model : {loaded, fed}) {
+        const Case c = case_of(all_terms, Sphere{1.05, {}}, model, 60);
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        EXPECT_NEAR(o.last("r_max"), R, 1e-5) << name(model);
+        EXPECT_NEAR(o.last("tension"), tension, 1e-12);
+    }
+    const Model held{.keeps_volume = true, .tension = tension};
+    const Case c = case_of(all_terms, Sphere{R, {}}, held, 1);
+    EXPECT_NEAR(run_case(c).last("pressure"), pressure, 1e-7);
+}
+
+// With a fixed volume and no tension the force is pi (R f - f_H) by (3.21), with a fixed area and no pressure -2 pi
+// f_H: both rest states are minima of F over the tubes of that volume or area for k20 alone, at 3 pi k20/R and 4 pi
+// k20/R.
+TEST(Ensembles, tubesComeToRestUnderForce) {
+    const double R = 0.9;
+    for (const Bending& b : {bending(0.5), bending(0.5, -0.3, 0.03, 0.1)}) {
+        const Density d = density_at(b, -1 / R, 0);
+        const double of_volume = pi * (R * d.f - d.f_H), of_area = -2 * pi * d.f_H, wide = 1.0, length = 2;
+        const Model keeps_volume{.keeps_volume = true, .free_period = true, .force = of_volume},
+            keeps_area{.keeps_volume = false, .area = AreaRule::fixed, .free_period = true, .force = of_area};
+        Model flows{.kind = ModelKind::overdamped, .keeps_volume = false, .free_period = true, .force = of_area};
+        Model viscous = flows, fed = flows;
+        viscous.kind = ModelKind::stokes, viscous.gamma = 0.5;
+        fed.area = AreaRule::reservoir, fed.keeps_volume = true, fed.force = of_volume;
+        for (const Model& model : {keeps_volume, keeps_area, flows, viscous, fed}) {
+            const Case c = case_of(b, Tube{wide, length, {{0.03, 1}}}, model, 100);
+            const Outcome o = run_case(c);
+            expect_balanced(o, c);
+            EXPECT_NEAR(o.last("r_min"), R, 2e-3) << name(model);  // the wave has made the start narrower
+            EXPECT_NEAR(o.last("r_max"), o.last("r_min"), 1e-4) << name(model);
+            const bool by_volume = motion_law(model).keeps_volume;
+            const double radius = o.last("r_max"), of = by_volume ? o["volume"].front() / (pi * radius * radius)
+                                                                  : o["area"].front() / (2 * pi * radius);
+            EXPECT_NEAR(o.last("height"), of, 1e-4 * of) << name(model);
+            EXPECT_NEAR(o.last("force"), *model.force.values().begin(), 1e-12);
+            EXPECT_NEAR(o.last("r_max"), R, 1e-4) << name(model);
+        }
+    }
+}
+
+// log(a(t)/a(0)) of a wave that begins at rest, from the roots of theory.md (5.12), or from the only one.
+double log_growth(const theory::Growth& g, double t) {
+    if (g.roots.size() == 1) return g.rate() * t;
+    const std::complex<double> a = g.roots[0], b = g.roots[1];
+    return std::log(std::abs((b * std::exp(a * t) - a * std::exp(b * t)) / (b - a)));
+}
+
+struct Wave {
+    Model model;
+    double tension, pressure, length, end;
+};
+
+void expect_growth(const Wave& w) {
+    const double amplitude = 1e-4;  // squares are left out, and the integrator errs by 1e-12 of the radius each step
+    Case c = case_of(all_terms, Tube{1, w.length, {{amplitude, 1}}}, w.model, w.end);
+    explicitly(c, 24, 1e-12, 7);
+    const Outcome o = run_case(c);
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const theory::Growth exact = theory::growth({all_terms, 1, w.tension}, motion_law(w.model), 2 * pi / w.length, 0);
+    const double expected = log_growth(exact, w.end) / w.end;
+    EXPECT_NEAR(std::log(std::abs(o.last("mode_1")) / amplitude) / w.end, expected,
+                1e-6 * std::max(1.0, std::abs(expected)))
+        << name(w.model) << ", tension " << w.tension << ", length " << w.length;
+}
+
+TEST(Ensembles, wavesGrowAtTheTensionThatIsGiven) {
+    // Above the pearling threshold of theory.md (5.22) long waves grow, below it all decay.
+    for (const double tension : {0.1, 2.5})
+        for (const double length : {4.0, 9.0}) {
+            const double pressure = tube_pressure(all_terms, 1, tension);
+            const Model flow{.keeps_volume = false, .tension = tension, .pressure = pressure},
+                holds{.keeps_volume = true, .tension = tension},
+                whole{.keeps_volume = false, .area = AreaRule::fixed, .pressure = pressure},
+                fed{.kind = ModelKind::overdamped,
+                    .keeps_volume = true,
+                    .area = AreaRule::reservoir,
+                    .tension = tension};
+            Model viscous = fed, moving = fed, open = fed;
+            viscous.kind = ModelKind::stokes, viscous.Re = 2, viscous.gamma = 0.3;
+            moving.kind = ModelKind::fluid, moving.Re = 2, moving.gamma = 0.3;
+            open.keeps_volume = false, open.pressure = pressure;
+            for (const Model& model : {flow, holds, whole, fed, viscous, moving, open})
+                expect_growth({model, tension, pressure, length, 0.3});
+        }
+}
+
+TEST(Ensembles, aSingleWaveOfAFreePeriodGrowsAtTheTensionOfItsForce) {
+    for (const double force : {2.0, 7.0}) {
+        const double tension = tension_of_force(all_terms, 1, force), pressure = tube_pressure(all_terms, 1, tension);
+        Model whole{.keeps_volume = true, .area = AreaRule::fixed, .free_period = true, .force = force};
+        Model flows = whole;
+        flows.kind = ModelKind::stokes, flows.gamma = 0.3;
+        for (const Model& model : {whole, flows}) expect_growth({model, tension, pressure, 9, 0.3});
+    }
+}
+
+// A ramp through what a run measured.
+Ramp ramp_of(const Outcome& o, const std::string& series, const std::vector<double>& times) {
+    std::vector<double> values;
+    for (const double t : times) values.push_back(o.at(series, t));
+    return {times, values};
+}
+
+// A fixed volume and the pressure that it measures, a fixed area and its tension, a fixed period and its force: the
+// same motion, as the loads follow from the same equations.
+TEST(Ensembles, runsUnderMeasuredLoadsAreThoseThatKeepWhatTheyMeasured) {
+    const double end = 0.1;
+    std::vector<double> times;  // the loads change fast at first
+    for (int i = 0; i <= 60; ++i) times.push_back(end * i * i / 3600);
+    const Tube waved{1, 3, {{0.2, 1}}};
+    const auto run_with = [&](const Model& model) {
+        Case c = case_of(all_terms, waved, model, end);
+        c.time.output = {times.begin() + 1, times.end() - 1};
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        return o;
+    };
+    const auto expect_same = [&](const Outcome& a, const Outcome& b, const std::string& kept) {
+        for (const double t : {times[20], times[40], end}) {
+            EXPECT_NEAR(b.at("energy", t), a.at("energy", t), 2e-5 * a.summary.reference_energy) << kept << t;
+            EXPECT_NEAR(b.at("r_min", t), a.at("r_min", t), 2e-4) << kept << t;
+            EXPECT_NEAR(b.at(kept, t) / b.at(kept, 0), 1, 5e-5) << t;
+        }
+    };
+    const Model volume{.keeps_volume = true};
+    const Outcome of_volume = run_with(volume);
+    expect_same(of_volume, run_with({.keeps_volume = false, .pressure = ramp_of(of_volume, "pressure", times)}),
+                "volume");
+    const Outcome of_area = run_with({.keeps_volume = false, .area = AreaRule::fixed});
+    expect_same(of_area, run_with({.keeps_volume = false, .tension = ramp_of(of_area, "tension", times)}), "area");
+    expect_same(of_volume,
+                run_with({.keeps_volume = true, .free_period = true, .force = ramp_of(of_volume, "force", times)}),
+                "height");
+    for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes}) {
+        Model flows{.kind = kind, .keeps_volume = true};
+        if (kind == ModelKind::stokes) flows.gamma = 0.5;
+        Model fed = flows;
+        fed.area = AreaRule::reservoir;
+        const Outcome kept = run_with(fed);
+        Model open = fed, pulled = fed;
+        open.keeps_volume = false, open.pressure = ramp_of(kept, "pressure", times);
+        expect_same(kept, run_with(open), "volume");
+        pulled.free_period = true, pulled.force = ramp_of(kept, "force", times);
+        expect_same(kept, run_with(pulled), "height");
+    }
+}
+
+// No step crosses a kink, and the work of the ramp closes the identity.
+TEST(Ensembles, rampsDoWorkThatTheIdentityKnows) {
+    const Ramp opening({0.01, 0.03, 0.05}, {0, 2, 1});
+    Model fed{.kind = ModelKind::overdamped, .keeps_volume = true, .area = AreaRule::reservoir, .tension = opening};
+    Model flow{.keeps_volume = false, .tension = opening, .pressure = Ramp({0, 0.04}, {0, 0.5})};
+    for (const Model& model : {fed, flow}) {
+        const Case c = case_of(all_terms, Tube{1, 4, {{0.1, 1}}}, model, 0.1);
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        for (const double kink : {0.01, 0.03, 0.05}) EXPECT_NO_THROW(o.at("energy", kink)) << kink;
+        EXPECT_EQ(o.at("tension", 0.03), 2);
+        EXPECT_EQ(o.last("tension"), 1);
+        EXPECT_GT(std::abs(o.last("work")), 0.1 * o.summary.reference_energy / 10);
+        // Before the ramp no work, and F is E while tension and pressure are zero.
+        if (model.kind == ModelKind::overdamped) {
+            EXPECT_EQ(o.at("work", 0), 0);
+            EXPECT_NEAR(o.at("work", 0.01), 0, 1e-12);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace tubule::axisym
