@@ -226,8 +226,8 @@ void CurveAttempt::go() {
     }
     summary.stop = *stop;
     summary.energy = now_.o.energy;
-    if (const std::string doubt =
-            doubt_after(setup_.c, stop->reason, past_.total_start, now_.total(), summary.reference_energy);
+    if (const std::string doubt = doubt_after(setup_.c, stop->reason, past_.total_start,
+                                              now_.total() - work(flow_->time()), summary.reference_energy);
         !doubt.empty())
         summary.warnings.push_back(doubt);
     summary.counters = counters();

@@ -517,6 +517,22 @@ class Shown(ScanTest):
             driven = -2 * k20 * x * ((1 + k / k20) * x + 2 * (1 + c))
             np.testing.assert_allclose(buckling[:, j], driven.max(axis=1))
 
+    def test_thresholds_of_tensions(self):
+        """theory.md (5.20), (5.21) at the tension of a reservoir, with c = H0 R and x = q^2."""
+        model = '[model]\nkind = "overdamped"\narea = "reservoir"\n[shape]'
+        self.write("fed.toml", CASE.replace("[shape]", model).replace('parametrisation = "graph"', ""))
+        self.scan("fed.toml", "--over", "shape.length=3:12:7", "--over", "model.tension=0:2:5", "--set", "time.end=1e-9")
+        with h5py.File(self.result) as file:
+            L, tension = (file[f"axes/{i}/values"][:, 0] for i in (0, 1))
+            line = file["thresholds/pearling"]
+            found, first, second = (line[name][()] for name in ("values", "first", "second"))
+        k20, c, n = 0.2, -2, np.arange(1, 40)
+        x = (2 * np.pi * n / L[first, None]) ** 2
+        for j, sigma in enumerate(tension[second]):
+            reduced = sigma / (2 * k20) + (c * c - 1) / 2
+            exact = -2 * k20 * (x**2 + (reduced + 2 * c) * x + 1 - reduced).min(axis=1)
+            np.testing.assert_allclose(found[:, j], exact, atol=1e-12)
+
     def test_the_file_says_what_was_asked(self):
         text = f'title = "A small one"\ncase = "case.toml"\nover = ["{K42}=0,0.1"]\nset = ["{AMPLITUDE}=0.2"]\n'
         self.write("small.toml", text)

@@ -134,6 +134,24 @@ class Stability(ProgramTest):
         viscous = self.json(self.tube, "--model", "stokes", "--Re", "4", "--gamma", "0.5", "--tension", "1")["models"][0]
         self.assertEqual((viscous["Re"], viscous["gamma"]), (4, 0.5))
 
+    def test_ensembles(self):
+        """The tension of the case, or that of its axial force, theory.md (3.22) with f + 1/R f_H = 0 at H0 = -1/R."""
+        fluid = self.write("fluid.toml", FLUID)
+        fed = ("--set", "model.area=reservoir", "--set", "model.tension=-2")
+        given, asked = self.json(fluid, *fed)["models"][0], self.json(fluid, "--tension", "-2")["models"][0]
+        self.assertEqual((given["tension"], given["tension_source"]), (-2, "of the case"))
+        self.assertEqual([w["roots"] for w in given["waves"]], [w["roots"] for w in asked["waves"]])
+        self.assertEqual(self.json(fluid, *fed, "--tension", "3")["models"][0]["tension"], 3)
+        pulled = self.json(fluid, "--set", "model.period=free", "--set", "model.force=6.283185307179586")["models"][0]
+        self.assertAlmostEqual(pulled["tension"], 2, delta=1e-12)
+        self.assertEqual(pulled["tension_source"], "by the axial force")
+        self.refuses("with the period free", fluid, "--set", "model.period=free", "--tension", "1")
+        # The numerical spectrum has the same rates, and needs no --tension.
+        stokes = ("--set", "model.kind=stokes", "--set", "shape.mode=[]", "--modes", "1")
+        closed = max(float(row["rate"]) for row in self.table(fluid, *fed, *stokes) if row["m"] == "1")
+        rows = self.table(fluid, *fed, *stokes, "--numerical")
+        self.assertAlmostEqual(max(float(row["rate"]) for row in rows if row["m"] == "1") / closed, 1, delta=1e-6)
+
     def test_wave_numbers(self):
         rows = self.table(self.tube, "--q", "0.5,1", "--modes", "0")
         self.assertEqual([(row["n"], float(row["q"])) for row in rows], [("", 0.5), ("", 1.0)])

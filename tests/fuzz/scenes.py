@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Random physics of tier axisym, and whether the error that a run states is the error that it has.
 
-A scene is a shape, an energy, a model, an accuracy and an end time. Its run is compared, at 14 times, with one that is
+A scene is a shape, an energy, a model, what that keeps, the loads on the rest, an accuracy and an end time. Its run is compared, at 14 times, with one that is
 asked for a thirtieth of the accuracy; where they differ by more than the run states, a second reference decides, with
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
@@ -85,6 +85,29 @@ def draw_energy(draw, size):
     return energy, scale / size**2
 
 
+def draw_load(draw, size, end):
+    """A number, or a ramp within the run."""
+    value = number(size * draw.uniform(-1, 3))
+    if draw.random() < 0.6:
+        return value
+    times = sorted({0.0, number(end * draw.uniform(0, 0.5)), number(end * draw.uniform(0.5, 1))})
+    return {"time": times, "value": [number(value * draw.uniform(0, 1)) for _ in times]}
+
+
+def draw_ensemble(draw, model, tube, size, modulus, end):
+    """What is kept, and what acts where something is free; as the program allows it."""
+    flows = model["kind"] != "gradient-flow"
+    model["volume"] = draw.choice(("fixed", "free"))
+    model["area"] = draw.choice(("fixed", "reservoir") if flows else ("free", "fixed"))
+    if model["volume"] == "free" and draw.random() < 0.7:
+        model["pressure"] = draw_load(draw, modulus / size, end)
+    if model["area"] != "fixed" and draw.random() < 0.8:
+        model["tension"] = draw_load(draw, modulus, end)
+    if tube and "fixed" in (model["volume"], model["area"]) and draw.random() < 0.5:
+        model["period"] = "free"
+        model["force"] = draw_load(draw, 6 * modulus * size, end)
+
+
 def scene(draw):
     """The case of a scene."""
     shape, size = draw_shape(draw)
@@ -98,6 +121,8 @@ def scene(draw):
         model["volume"] = draw.choice(("fixed", "free"))
     end = size**4 / modulus * math.exp(draw.uniform(math.log(1e-3), math.log(1)))
     asked = math.exp(draw.uniform(math.log(5e-5), math.log(2e-2)))
+    if draw.random() < 0.5:
+        draw_ensemble(draw, model, shape["kind"] == "tube", size, modulus, end)
     return {
         "tier": "axisym",
         "energy": energy,
@@ -109,7 +134,7 @@ def scene(draw):
 
 
 class Run:
-    """A case run to its end: how it ended, what it states, and its energies by time."""
+    """A case run to its end: how it ended, what it states, and its free energies by time."""
 
     def __init__(self, box, case, *sets, limit=LIMIT):
         box.write("case.toml", toml.dump(case))
@@ -125,7 +150,7 @@ class Run:
             about, series = file["about"].attrs, file["series"]
             self.stop, self.scale, self.stated = about.get("stop", "none"), float(about["E_ref"]), float(about["estimated_error"])
             self.warned = bool(about["warnings"])
-            self.energy = dict(zip(series["time"][:], series["energy"][:]))
+            self.energy = dict(zip(series["time"][:], series["free_energy"][:]))
 
     @property
     def finished(self):

@@ -360,6 +360,52 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
 
 // ---- in time
 
+// F = 2 pi R L (f + tension) - pressure pi R^2 L - force L is stationary in R and L: theory.md (3.21), (3.22).
+TEST(Ensembles, tubesAndSpheresRestWhereFIsStationary) {
+    const UniformTube tube = some_tube();
+    const double R = tube.radius, L = 3, h = 1e-4, P = pressure_at_rest(tube), N = axial_force(tube, P);
+    const auto F = [&](double r) {
+        const double f = density(tube.energy, -1 / r, 0.0).f;
+        return 2 * pi * r * L * (f + tube.tension) - P * pi * r * r * L - N * L;
+    };
+    EXPECT_NEAR((F(R + h) - F(R - h)) / (2 * h), 0, 1e-6);
+    EXPECT_NEAR(F(R), 0, 1e-12);  // it is linear in L
+    MotionLaw pulled = law_of(ModelKind::stokes);
+    pulled.free_period = true, pulled.force = N;
+    EXPECT_NEAR(*tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
+    pulled.keeps_volume = false, pulled.pressure = P;
+    EXPECT_NEAR(*tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
+
+    const UniformSphere sphere{tube.energy, R, tube.tension};
+    const double p = pressure_at_rest(sphere);
+    const auto of_sphere = [&](double r) {
+        return 4 * pi * r * r * (density(sphere.energy, -2 / r, 1 / (r * r)).f + sphere.tension) -
+               p * 4 * pi / 3 * r * r * r;
+    };
+    EXPECT_NEAR((of_sphere(R + h) - of_sphere(R - h)) / (2 * h), 0, 1e-6);
+}
+
+TEST(Ensembles, tellTheTensionAndWhereARadiusGoes) {
+    const UniformTube tube = some_tube();
+    MotionLaw law = law_of(ModelKind::gradient_flow);
+    law.tension = 0.7;
+    EXPECT_EQ(tension_of(law, tube.energy, tube.radius), 0.7);
+    law.keeps_area = true, law.tension = 0, law.pressure = 0.2;
+    EXPECT_NEAR(*tension_of(law, tube.energy, tube.radius), tension_of_free_volume(tube.energy, 0.8) + 0.8 * 0.2,
+                1e-14);
+    EXPECT_FALSE(tension_of(law_of(ModelKind::fluid), tube.energy, tube.radius));
+    // pressure R^3 - tension R^2 + k20 = 0, by bisection elsewhere; the same for whatever resists.
+    for (const ModelKind kind : {ModelKind::gradient_flow, ModelKind::stokes}) {
+        MotionLaw swelling = law_of(kind);
+        swelling.reservoir = swelling.inextensible, swelling.keeps_volume = false, swelling.pressure = 0.3;
+        for (const double start : {0.9, 1.5})
+            EXPECT_NEAR(radius_at_rest(swelling, {bending(1), start, 1}).value_or(0), 1.2714840414931645, 1e-12);
+        swelling.pressure = 0.5;  // more than any radius can hold
+        EXPECT_FALSE(radius_at_rest(swelling, {bending(1), 1, 1}));
+    }
+    EXPECT_EQ(radius_rate_of(law_of(ModelKind::fluid), tube), 0);
+}
+
 TEST(Waves, aDriftingTube) {
     // theory.md (7.12): R^4 = R0^4 + 4 k20 t for H0 = 0. The amplitude: s = -(k20/R^4)[2 (x - 1)^2 - (x - 1) + 4 x], x
     // = q^2 R^2, by Simpson's rule over the exact R(t).
