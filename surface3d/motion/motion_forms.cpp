@@ -49,7 +49,7 @@ struct CellWork {
     CellMatrix advection;                  // (c.grad phi_b, phi_a), c = u* - w* along the surface
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
-    Eigen::VectorXd rhs, flux, load, force;
+    Eigen::VectorXd rhs, flux, stretch, load, force;
 };
 
 class Assembler {
@@ -113,7 +113,8 @@ void Assembler::size(CellWork& work) const {
         if (!law_.flows) t.psi_grad.resize(2 * Q, pressure_table_.functions());
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
-    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.load.setZero(w), work.force.setZero(w);
+    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.stretch.setZero(w);
+    work.load.setZero(w), work.force.setZero(w);
 }
 
 Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
@@ -183,12 +184,12 @@ void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& 
     }
 }
 
-// theory.md (10.5): inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (D(u),
-// D(v))
+// theory.md (10.5): inertia (u - ubar, v)/te + inertia ((u* - w*).grad u + supply/2 u, v) + friction (u, v) +
+// 2 viscosity (D(u), D(v))
 void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();
-    const double rate = law_.inertia / base_.te, drag = rate + law_.friction;
+    const double rate = law_.inertia / base_.te, drag = rate + law_.inertia * base_.supply / 2 + law_.friction;
     CellMatrix scalar = CellMatrix::Zero(n_, n_);
     for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
     if (drag != 0) scalar.noalias() += drag * (t.phi.transpose() * work.weighted1);
@@ -210,7 +211,8 @@ void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& w
     work.block.topLeftCorner(nv_, nv_).noalias() += t.strain.transpose() * weighted;
 }
 
-// -(grad f_H + (HP-B) grad f_K, G(v)) + (|B|^2 f_H + H K f_K - H f, v.nu), linear in H and K about those of X*
+// -(grad f_H + (HP-B) grad f_K, G(v)) + (|B|^2 f_H + H K f_K - H f, v.nu) - tension (H - H*, v.nu), linear in H and K
+// about those of X*
 void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();
@@ -224,7 +226,9 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         block.noalias() += t.normal_grad.transpose() * work.weighted2;
         block.noalias() += t.normal.transpose() * work.weighted1;
     };
-    const auto in_H = [](const Point& s) { return s.B2 * s.f.HH + s.trace * s.K * s.f.HK - s.trace * s.f.H; };
+    const auto in_H = [&](const Point& s) {
+        return s.B2 * s.f.HH + s.trace * s.K * s.f.HK - s.trace * s.f.H - base_.tension;
+    };
     const auto in_K = [](const Point& s) { return s.B2 * s.f.HK + s.trace * s.K * s.f.KK - s.trace * s.f.K; };
     add(
         H_, [](const Point& s) { return Eigen::Matrix2d(s.f.HH * Eigen::Matrix2d::Identity() + s.f.HK * s.S); }, in_H);
@@ -238,6 +242,7 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
+        if (!law_.inextensible) work.stretch.head(nv_) -= (s.dS * s.H) * t.normal.row(q).transpose();
     }
     if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
     if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
@@ -339,6 +344,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
     for (int i = 0; i < unknowns_.width(); ++i) {
         system.b[numbers[i]] += work.rhs[i];
         system.flux[numbers[i]] += work.flux[i];
+        system.stretch[numbers[i]] += work.stretch[i];
         system.pressure_load[numbers[i]] += work.load[i];
         system.force[numbers[i]] += work.force[i];
     }
@@ -355,6 +361,7 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const S
     system.b.setZero(unknowns.size());
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());
+    system.stretch.setZero(unknowns.size());
     system.force.setZero(unknowns.size());
     const Assembler assembler(space, unknowns, law, bending, base);
     space.for_each_cell([&](int cell) {

@@ -31,6 +31,8 @@ struct StepBase {
     Eigen::VectorXd past;                // ubar
     double te = 0;                       // the step, effectively
     double curvature_stabilisation = 0;  // L_H is taken 1 + this * |B| (width of a triangle) times
+    double tension = 0;  // expected: its part in the force changes with H at once, -tension (H - H*, v.nu)
+    double supply = 0;   // expected div_P u of a membrane with inertia that a reservoir feeds: theory.md (3.18)
 };
 
 struct StepSystem {
@@ -38,6 +40,7 @@ struct StepSystem {
     Eigen::VectorXd b;
     Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
     Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
+    Eigen::VectorXd stretch;        // the rate of the area, -(H*, v.nu); of extensible membranes
     Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
     Eigen::SparseMatrix<double>
         advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia

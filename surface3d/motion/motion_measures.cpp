@@ -5,21 +5,25 @@
 #include <cmath>
 #include <limits>
 
+#include "surface3d/motion/axial_force.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
-constexpr int n_sums = 15;
+constexpr int n_sums = 16;
 using Sums = Eigen::Matrix<double, n_sums, 1>;
 
-// Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p|^2.
+// Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p|^2, p.
 Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
                const VectorField& rate) {
     const SurfaceSpace& space = surface.space();
     const Tabulation& table = space.tabulation();
     Eigen::Matrix<double, n_sums, Eigen::Dynamic> of_cell(n_sums, space.cells());
-    const bool slips = !surface.law().flows && surface.law().inextensible;
+    const bool presses = s.p.size() > 0, slips = presses && !surface.law().flows;
+    const Eigen::VectorXd pressure = presses ? surface.pressure_at_nodes(s) : Eigen::VectorXd::Zero(mesh.size());
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell), U = space.gather(u, cell), A = space.gather(rate, cell);
+        const auto nodal_p = space.gather(pressure, cell);
         Sums sum = Sums::Zero();
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
@@ -29,7 +33,7 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
             const Eigen::Matrix3d G = P * (U * grad.transpose()), sigma = (G + G.transpose()) / 2;
             Sums here;
             here << v.squaredNorm(), 2 * sigma.squaredNorm(), G.squaredNorm(), G.trace() * G.trace(), a.squaredNorm(),
-                v, p.x.cross(v), p.x, slips ? (grad * space.gather(s.p, cell)).squaredNorm() : 0;
+                v, p.x.cross(v), p.x, slips ? (grad * nodal_p).squaredNorm() : 0, nodal_p.dot(table.value.col(q));
             sum += table.weight[q] * p.area * here;
         }
         of_cell.col(cell) = sum;
@@ -105,6 +109,10 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
         const Eigen::RowVectorXd load = surface.flux(s.u, mesh, m.fields).transpose();
         m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
     }
+    m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume});
+    m.tension = law.area_is_free() ? law.tension.at(s.time) : law.keeps_area ? s.tension : -sum[15] / m.bending.area;
+    m.pressure = law.keeps_volume ? -s.lambda : law.pressure.at(s.time);
+    m.force = axial_force(surface, s, m.fields, m.velocity, m.tension, m.pressure);
     m.acceleration = law.inertia * sum[4] / 2;
     m.speed = m.velocity.colwise().norm().maxCoeff();
     m.stretching = sum[2] > 0 ? std::sqrt(sum[3] / sum[2]) : 0;

@@ -24,11 +24,12 @@ public:
 // Nodal values at a time.
 struct MotionState {
     double time = 0;
-    double step = 0;    // that led here; 0 at the start
-    VectorField X, w;   // positions, their velocity
-    Eigen::VectorXd u;  // velocity as in MotionUnknowns, component by component
-    Eigen::VectorXd p;  // pressure, at the nodes of its own order
-    double lambda = 0;  // multiplier of the volume
+    double step = 0;     // that led here; 0 at the start
+    VectorField X, w;    // positions, their velocity
+    Eigen::VectorXd u;   // velocity as in MotionUnknowns, component by component
+    Eigen::VectorXd p;   // pressure, at the nodes of its own order
+    double lambda = 0;   // multiplier of the volume; 0 where that is free
+    double tension = 0;  // multiplier of the area as a whole; 0 where that is free or p holds it
     // Of the scheme that made the step; null at the start, and for schemes that need none. Steps share it: it is never
     // modified, each step creates its own.
     std::shared_ptr<const SchemeMemory> memory;
@@ -43,7 +44,8 @@ struct MotionStep {
 
 // Whether positions, velocities and multipliers are finite.
 inline bool is_finite(const MotionState& s) {
-    return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda);
+    return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda) &&
+           std::isfinite(s.tension);
 }
 
 }  // namespace tubule::surface3d

@@ -167,9 +167,14 @@ Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
     return momenta(mesh(state.X)).transpose() * state.u;
 }
 
-Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, double tau) const {
+// d_t u + div_P u/2 u: membrane is fed without work, so that momentum grows with the root of the area, theory.md
+// (3.18).
+Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, const MotionState& to) const {
     const Eigen::VectorXd now = momenta(from);
-    return now.size() == 0 ? now : std::exp(-law_.friction / law_.inertia * tau) * now;
+    if (now.size() == 0) return now;
+    const double left = std::exp(-law_.friction / law_.inertia * to.step);
+    if (!law_.reservoir) return left * now;
+    return left * std::sqrt(extent(space_, mesh(to.X)).area / extent(space_, mesh(from.X)).area) * now;
 }
 
 // Only friction changes momentum and angular momentum, but the discrete bending force has a small resultant, which
@@ -194,17 +199,18 @@ double MovingSurface::lack_of_volume(const CurvedMesh& mesh) const {
 }
 
 bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f) const {
-    if (!law_.inextensible) return false;
+    if (law_.area_is_free()) return false;
     const Extent rate = extent_rate(space_, mesh, f.normal);  // -INT H, A
     const Extent by_H = extent_rate(space_, mesh, f.normal * f.H.asDiagonal());
     const double variation = 1 - rate.area * by_H.volume / (rate.volume * by_H.area);
     return variation < control_.least_variation && std::abs(lack_of_volume(mesh)) < control_.most_drift;
 }
 
-// Of the conserved quantities; zero if there are none.
+// Of what is conserved; zero of what is not.
 Extent MovingSurface::lack(const CurvedMesh& mesh) const {
     const Extent now = extent(space_, mesh);
-    return {control_.area ? *control_.area - now.area : 0, control_.volume ? *control_.volume - now.volume : 0};
+    return {control_.area && !law_.area_is_free() ? *control_.area - now.area : 0,
+            control_.volume && law_.keeps_volume ? *control_.volume - now.volume : 0};
 }
 
 Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const VectorField& begin, const VectorField& end, double span,
@@ -216,7 +222,7 @@ Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const VectorField& begi
 // Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
 MovingSurface::Correction MovingSurface::correction(const VectorField& X, const MotionFields& f,
                                                     bool with_volume) const {
-    const bool area = law_.inextensible && control_.area, volume = with_volume && control_.volume;
+    const bool area = !law_.area_is_free() && control_.area, volume = with_volume && control_.volume;
     Correction out{VectorField::Zero(3, X.cols()), {}};
     if (!area && !volume) return out;
     VectorField& sum = out.displacement;

@@ -61,7 +61,8 @@ public:
     // Momentum and angular momentum except for the density (of a tube: about its axis only), which only friction
     // changes; empty without inertia.
     Eigen::VectorXd momenta(const MotionState& state) const;
-    Eigen::VectorXd momenta_after(const MotionState& from, double tau) const;  // after the loss by friction
+    // At the end of a step: after the loss by friction, and with what a reservoir has fed.
+    Eigen::VectorXd momenta_after(const MotionState& from, const MotionState& to) const;
     // Adds the rigid motion that makes them equal to `kept`; to positions for a time te.
     void keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const;
     // Columns r of the conditions (r, v) = 0 that exclude the rigid motions left undetermined by the law.

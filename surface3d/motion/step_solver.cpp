@@ -10,6 +10,7 @@ namespace {
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
 constexpr int most_iterations = 20;      // of that, before it is factored
+constexpr int most_multipliers = 3;      // lambda, tension, supply
 
 }  // namespace
 
@@ -21,23 +22,39 @@ StepSolver::StepSolver(MovingSurface& surface)
 
 StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
     const CurvedMesh at = surface_.mesh(stage.X);
-    StepBase base{&at,      surface_.fields(at),    stage.X - stage.Xbar, stage.w, stage.u, stage.ubar,
-                  stage.te, curvature_stabilisation};
+    const SurfaceLaw& law = surface_.law();
+    StepBase base{&at,
+                  surface_.fields(at),
+                  stage.X - stage.Xbar,
+                  stage.w,
+                  stage.u,
+                  stage.ubar,
+                  stage.te,
+                  curvature_stabilisation,
+                  law.keeps_area ? stage.tension : law.tension.at(stage.time),
+                  expected_supply(at, stage.u)};
     StageSolution out;
-    out.keeps_volume = surface_.law().keeps_volume && !surface_.area_is_volume(at, base.fields);
-    const Eigen::VectorXd x = solve(base, rate, out.keeps_volume, out.lambda);
+    out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
+    const Eigen::VectorXd x = solve(base, stage.time, rate, out);
     out.u = x.head(stage.u.size());
-    if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
     out.w = surface_.mesh_velocity(at, base.fields, mesh_flux(base, out.u), stage.relaxation);
     out.X = stage.Xbar + stage.te * out.w;
     out.fields = std::move(base.fields);
     return out;
 }
 
+// div_P u of a membrane with inertia that a reservoir feeds: what it brings has mass.
+double StepSolver::expected_supply(const CurvedMesh& at, const Eigen::VectorXd& u) const {
+    if (!surface_.law().reservoir || surface_.law().inertia == 0) return 0;
+    const VectorField nodal = u.reshaped(surface_.nodes(), 3).transpose();
+    return extent_rate(surface_.space(), at, nodal).area / extent(surface_.space(), at).area;
+}
+
 KeptExtent StepSolver::keep_extent(const StageSolution& solved, MotionState& to) const {
     const auto [displacement, lacked] = surface_.correction(to.X, solved.fields, solved.keeps_volume);
+    const double energy = work(displacement, to, solved.fields);
     to.X += displacement;
-    return {work(displacement, solved.fields), lacked};
+    return {energy, lacked};
 }
 
 // The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without
@@ -59,23 +76,34 @@ void StepSolver::make_symmetric(const StepBase& base) {
     system_.b.array() *= scale.array();
 }
 
-// With the given rates of area and volume, where they are kept.
-Eigen::VectorXd StepSolver::solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda) {
+// With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
+// also a row: rigid motions; lambda; the tension of an area that is kept as a whole; the supply of a reservoir, whose
+// row is the mean of p.
+Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Extent& rate, StageSolution& out) {
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
     assemble(surface_.space(), unknowns_, law, surface_.bending(), base, system_);
-    if (law.inextensible && control.area) system_.b -= rate.area / *control.area * system_.pressure_load;
+    if (law.inextensible && control.area && !law.reservoir)
+        system_.b -= rate.area / *control.area * system_.pressure_load;
+    if (!law.inextensible) system_.b -= law.tension.at(time) * system_.stretch;
+    system_.b += law.pressure.at(time) * system_.flux;
     make_symmetric(base);
     const Eigen::MatrixXd rigid = surface_.open_rigid_motions(*base.mesh);
-    Eigen::MatrixXd border = Eigen::MatrixXd::Zero(unknowns_.size(), rigid.cols() + with_lambda);
+    Eigen::MatrixXd border = Eigen::MatrixXd::Zero(unknowns_.size(), rigid.cols() + most_multipliers);
     border.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
     Eigen::VectorXd held = Eigen::VectorXd::Zero(border.cols());
-    if (with_lambda) {
-        border.rightCols<1>() = system_.flux;
-        if (control.volume) held.tail<1>()[0] = rate.volume;
-    }
-    const auto [x, y] = solver_.solve(system_.A, system_.b, border, held);
-    lambda = with_lambda ? y.tail<1>()[0] : 0;
+    Eigen::Index n = rigid.cols();
+    const auto add = [&](const Eigen::VectorXd& column, double value) {
+        border.col(n) = column, held[n] = value;
+        return n++;
+    };
+    const Eigen::Index lambda = out.keeps_volume ? add(system_.flux, control.volume ? rate.volume : 0) : -1;
+    const Eigen::Index tension = law.keeps_area ? add(system_.stretch, control.area ? rate.area : 0) : -1;
+    if (law.reservoir) add(system_.pressure_load, -law.tension.at(time) * system_.pressure_load.sum());
+    const auto [x, y] = solver_.solve(system_.A, system_.b, border.leftCols(n), held.head(n));
+    if (lambda >= 0) out.lambda = y[lambda];
+    if (tension >= 0) out.tension = y[tension];
+    if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
     return x;
 }
 
@@ -106,11 +134,12 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
-// -(b, d), to first order the energy that a displacement of the nodes takes.
-double StepSolver::work(const VectorField& d, const MotionFields& fields) const {
+// -(b, d) and that of the loads, to first order the free energy that a displacement of the nodes takes.
+double StepSolver::work(const VectorField& d, const MotionState& at, const MotionFields& fields) const {
     const int n = surface_.nodes();
-    if (!surface_.law().flows) return -system_.force.head(n).dot(d.cwiseProduct(fields.normal).colwise().sum());
-    double sum = 0;
+    const CurvedMesh mesh = surface_.mesh(at.X);
+    double sum = surface_.law().potential(at.time, extent_rate(surface_.space(), mesh, d));
+    if (!surface_.law().flows) return sum - system_.force.head(n).dot(d.cwiseProduct(fields.normal).colwise().sum());
     for (int i = 0; i < 3; ++i) sum -= system_.force.segment(i * n, n).dot(d.row(i));
     return sum;
 }

@@ -10,23 +10,24 @@ namespace tubule::surface3d {
 
 // At the time of a stage X = Xbar + te w and u_t = (u - ubar)/te.
 struct Stage {
-    double te;
+    double time, te;
     VectorField Xbar;
     Eigen::VectorXd ubar;
     VectorField X, w;   // expected positions, velocity of the nodes,
-    Eigen::VectorXd u;  // velocity
+    Eigen::VectorXd u;  // velocity,
+    double tension;     // of an area that is kept as a whole
     double relaxation;  // time in which the mesh becomes even; shorter ones than about te overshoot
 };
 
 struct StageSolution {
     VectorField X, w;
     Eigen::VectorXd u, p;
-    double lambda = 0;
-    MotionFields fields;  // of the surface that was expected
+    double lambda = 0, tension = 0;  // as those of MotionState
+    MotionFields fields;             // of the surface that was expected
     bool keeps_volume = false;
 };
 
-// What keeping area and volume took: energy, to first order, and what was lacking of them.
+// What keeping area and volume took: free energy, to first order, and what was lacking of them.
 struct KeptExtent {
     double energy = 0;
     Extent lacking;
@@ -47,10 +48,11 @@ public:
     const StepSystem& system() const { return system_; }  // of the last stage, rows scaled to be almost symmetric
 
 private:
-    Eigen::VectorXd solve(const StepBase& base, const Extent& rate, bool with_lambda, double& lambda);
+    Eigen::VectorXd solve(const StepBase& base, double time, const Extent& rate, StageSolution& out);
+    double expected_supply(const CurvedMesh& at, const Eigen::VectorXd& u) const;
     Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     void make_symmetric(const StepBase& base);
-    double work(const VectorField& displacement, const MotionFields& fields) const;
+    double work(const VectorField& displacement, const MotionState& at, const MotionFields& fields) const;
 
     MovingSurface& surface_;
     MotionUnknowns unknowns_;

@@ -1,7 +1,10 @@
 // A law of motion, theory.md (3.1), as a step of tier 2 solves for it.
 #pragma once
 
+#include <algorithm>
+
 #include "common/model/model.hpp"
+#include "surface3d/motion/extent.hpp"
 
 namespace tubule::surface3d {
 
@@ -13,6 +16,16 @@ struct SurfaceLaw : MotionLaw {
     bool flows = inertia != 0 || viscosity != 0;
 
     int components() const { return flows ? 3 : 1; }
+
+    // F - E of a surface at a time, theory.md (3.16), and how fast its loads change it.
+    double potential(double time, const Extent& of) const {
+        return tension.at(time) * of.area - pressure.at(time) * of.volume;
+    }
+    double power(double time, const Extent& of) const {
+        return tension.slope(time) * of.area - pressure.slope(time) * of.volume;
+    }
+    // The first time after this at which a load changes its slope, infinite if there is none.
+    double next_kink(double time) const { return std::min(tension.next_kink(time), pressure.next_kink(time)); }
 };
 
 }  // namespace tubule::surface3d

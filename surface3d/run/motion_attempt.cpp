@@ -30,8 +30,8 @@ constexpr double one_condition = 1e-6;  // lack of volume, relative: below, mesh
 constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
 constexpr double kept = 1e-8;           // area and volume, relative: a larger drift is reported
 
-// What dissipates in a step of length tau after one of length `before`: the parabola through three rates.
-double dissipated_in(double tau, double before, double rate, double now, double past) {
+// What comes together in a step of length tau after one of length `before`: the parabola through three rates.
+double sum_of_step(double tau, double before, double rate, double now, double past) {
     const double slope = (rate - now) / tau;
     const double bend = before > 0 ? (slope - (now - past) / before) / (tau + before) : 0;
     return tau * (now + rate) / 2 - bend * tau * tau * tau / 6;
@@ -79,10 +79,10 @@ void MotionAttempt::begin(const Start& from) {
     state_.time = begin_time(case_);
     if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
     look();
-    out_.note(doubt_before(case_, now_.bending.energy, memory_.scale.reference_energy));
+    out_.note(doubt_before(case_, now_.free_energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
-    trace.add(state_.time, now_.bending.energy);
-    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_.bending.energy));
+    trace.add(state_.time, comparable());
+    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, comparable()));
     compare();
     error_now_ = std::max(error_now_, memory_.error);
     write_row();
@@ -97,7 +97,7 @@ void MotionAttempt::set_moving() {
         const MotionState soon = scheme_->step(state_, moment * memory_.next_step).state;
         if (!is_finite(soon)) return;
         state_.u = soon.u, state_.w = soon.w;
-        state_.p = soon.p, state_.lambda = soon.lambda;
+        state_.p = soon.p, state_.lambda = soon.lambda, state_.tension = soon.tension;
     } catch (const SolveError&) {
     }
 }
@@ -134,13 +134,14 @@ std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const 
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
-    const double t = state_.time, rise = (m.bending.energy + m.kinetic - total()) / memory_.scale.reference_energy;
+    const double t = state_.time, E_ref = memory_.scale.reference_energy;
+    const double then = m.free_energy + m.kinetic - memory_.balance.work - work_of(next, m);
     if (const auto spurious = impossible(m.bending, next.state.X))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
-    if (const auto rises = find_rise_in_step(rise, case_.accuracy.energy, t, next.state.step))
+    if (const auto rises = find_rise_in_step((then - total()) / E_ref, case_.accuracy.energy, t, next.state.step))
         return Refusal{0.25, *rises};
-    const double since = m.bending.energy + m.kinetic - memory_.balance.lowest_total;
-    if (const auto rises = find_slow_rise(since / memory_.scale.reference_energy, case_.accuracy.energy, t))
+    const double since = then - memory_.balance.lowest_total;
+    if (const auto rises = find_slow_rise(since / E_ref, case_.accuracy.energy, t))
         return Refusal{0, *rises};  // shorter steps would creep on
     return std::nullopt;
 }
@@ -176,9 +177,24 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     }
 }
 
+// Of the step before; 0 where a load has changed its slope since: rates have a kink there.
+double MotionAttempt::since_kink() const {
+    const double before = std::nextafter(state_.time, -HUGE_VAL);
+    return surface().law().next_kink(before) == state_.time ? 0 : state_.step;
+}
+
+// Of the loads in a step, in which none changes its slope.
+double MotionAttempt::work_of(const MotionStep& next, const MotionMeasures& m) const {
+    const auto power = [&](const Extent& e) { return surface().law().power(state_.time, e); };
+    return sum_of_step(next.state.step, state_.step, power({m.bending.area, m.bending.volume}),
+                       power({now_.bending.area, now_.bending.volume}), power(memory_.balance.past));
+}
+
 void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
+    memory_.balance.work += work_of(next, m);
+    memory_.balance.past = {now_.bending.area, now_.bending.volume};
     memory_.balance.dissipated +=
-        dissipated_in(next.state.step, state_.step, m.dissipation, now_.dissipation, memory_.balance.dissipation_past);
+        sum_of_step(next.state.step, since_kink(), m.dissipation, now_.dissipation, memory_.balance.dissipation_past);
     memory_.balance.dissipation_past = now_.dissipation;
     memory_.balance.corrected += std::abs(next.correction);
     state_ = next.state;
@@ -210,7 +226,7 @@ void MotionAttempt::make_new_mesh() {
     const auto found = remesh(surface().mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
-    const double time = state_.time, energy = now_.bending.energy, before = total();
+    const double time = state_.time, energy = comparable(), before = total();
     const Eigen::VectorXd momenta = surface().momenta(state_);
     const int old_elements = summary.elements;
     std::unique_ptr<TimeScheme> old = std::move(scheme_);
@@ -227,13 +243,13 @@ void MotionAttempt::make_new_mesh() {
     ++memory_.count.meshes;
     state_.time = time;
     look();
-    memory_.error += std::abs(now_.bending.energy - energy);
+    memory_.error += std::abs(comparable() - energy);
     memory_.balance.lowest_total += std::max(total() - before, 0.0);
     if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
 }
 
 std::optional<StopReport> MotionAttempt::step() {
-    const double left = left_until_output();
+    const double kink = next_kink(), left = std::min(outputs_.next(), kink) - state_.time;
     const auto tau = [&] { return left / std::ceil(left / memory_.next_step * (1 - 1e-9)); };  // no short last step
     while (const auto refusal = attempt(tau())) {
         ++memory_.count.rejected;
@@ -242,11 +258,12 @@ std::optional<StopReport> MotionAttempt::step() {
         if (refusal->shrink == 0 || case_.surface.step || !(memory_.next_step > shortest)) return refusal->report;
         check_pause();
     }
-    trace.add(state_.time, now_.bending.energy);
+    if (std::abs(state_.time - kink) <= moment_of_time()) state_.time = kink;
+    trace.add(state_.time, comparable());
     compare();
     write_row();
     if (out_.reported()) out_.progress(state_.time, now_.bending.energy, state_.step);
-    const bool at_output = left_until_output() <= 1e-12 * case_.time.end;
+    const bool at_output = left_until_output() <= moment_of_time();
     auto stop = check_state();
     if (!stop) stop = check_crossing(at_output);
     if (at_output) {
@@ -309,7 +326,8 @@ std::optional<StopReport> MotionAttempt::check_progress() {
     if (auto pause = clock_.find_pause(t)) return pause;
     if (error_ && memory_.error > error_->give_up * memory_.scale.reference_energy)
         return StopReport{Stop::resolution_lost, t, "far less accurate than asked for, already", ""};
-    if (case_.time.stationary && settling_.is_settled(case_, t, now_.dissipation, now_.bending.area) &&
+    if (case_.time.stationary && std::isinf(next_kink()) &&
+        settling_.is_settled(case_, t, now_.dissipation, now_.bending.area) &&
         what_may_change() < *case_.time.stationary * memory_.scale.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     return stall_.look(t, state_.step, first_step * memory_.scale.relaxation,
@@ -327,7 +345,7 @@ double MotionAttempt::what_may_change() const {
 void MotionAttempt::compare() {
     if (!out_.reported()) return;
     std::optional<double> error;
-    if (error_) error = error_->at(state_.time, now_.bending.energy, now_.smoothness);
+    if (error_) error = error_->at(state_.time, comparable(), now_.smoothness);
     const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
     error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
     if (error) memory_.error = std::max({memory_.error, *error, rise});
@@ -339,7 +357,7 @@ double MotionAttempt::volume_drift() const {
 }
 
 void MotionAttempt::warn_of_drift() {
-    const double area = surface().law().inextensible ? std::abs(now_.bending.area / memory_.scale.area - 1) : 0;
+    const double area = !surface().law().area_is_free() ? std::abs(now_.bending.area / memory_.scale.area - 1) : 0;
     const double volume = std::abs(volume_drift());
     const std::string why = traits().controls_mesh ? "on this shape, keeping the area nearly keeps the volume"
                                                    : fmt::format("scheme \"{}\" does not correct them", traits().name);
@@ -350,9 +368,9 @@ void MotionAttempt::warn_of_drift() {
 
 void MotionAttempt::write_row() {
     if (!out_.wants_row(state_.time)) return;
-    out_.row(state_.time,
-             motion_series().values({state_, now_, volume_drift(), memory_.balance.defect_at(total()),
-                                     memory_.balance.corrected, error_now_, summary.elements, out_.seconds()}));
+    out_.row(state_.time, motion_series().values({state_, now_, memory_.balance.work, volume_drift(),
+                                                  memory_.balance.defect_at(total()), memory_.balance.corrected,
+                                                  error_now_, summary.elements, out_.seconds()}));
 }
 
 void MotionAttempt::write_frame() {
@@ -391,6 +409,7 @@ void MotionAttempt::summarise(const StopReport& stop) {
                                                      {"meshes", std::int64_t{memory_.count.meshes}},
                                                      {"relaxation", memory_.scale.relaxation},
                                                      {"dissipated", memory_.balance.dissipated},
+                                                     {"work", memory_.balance.work},
                                                      {"identity_defect", memory_.balance.defect_at(total())},
                                                      {"correction_energy", memory_.balance.corrected}});
 }

@@ -64,6 +64,8 @@ private:
     std::optional<Refusal> attempt(double tau);
     std::optional<StopReport> impossible(const Observables& o, const VectorField& X) const;
     std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
+    double work_of(const MotionStep& next, const MotionMeasures& m) const;
+    double since_kink() const;
     void take(const MotionStep& next, const MotionMeasures& m);
     void set_next_step(double tau, double asked, double error, int order);
     bool wants_new_mesh() const;
@@ -86,8 +88,12 @@ private:
 
     const SchemeEntry& traits() const { return entry(time_scheme(case_)); }
     MovingSurface& surface() const { return scheme_->surface(); }
-    double total() const { return now_.bending.energy + now_.kinetic; }
+    // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
+    double total() const { return comparable() + now_.kinetic; }
+    double comparable() const { return now_.free_energy - memory_.balance.work; }
+    double moment_of_time() const { return 1e-12 * case_.time.end; }
     double left_until_output() const { return outputs_.next() - state_.time; }
+    double next_kink() const { return surface().law().next_kink(state_.time + moment_of_time()); }
 
     const Case& case_;
     const RunClock& clock_;

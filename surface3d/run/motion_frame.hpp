@@ -20,11 +20,14 @@ struct MotionScale {
     double length() const { return std::sqrt(area); }
 };
 
-// The energy with kinetic energy, and what has become of it.
+// The free energy with kinetic energy, less the work of loads that change: what can only fall, and what has become of
+// it.
 struct MotionBalance {
     double total_start = 0, lowest_total = 0;  // then and since
+    double work = 0;                           // of the loads: dF at constant area and volume
+    Extent past;                               // area and volume at the step before
     double dissipated = 0, corrected = 0;
-    double dissipation_past = 0;  // rate at the step before
+    double dissipation_past = 0;  // rate then
     double defect = 0;            // largest defect of the dissipation identity
 
     double defect_at(double total) const { return total - total_start + dissipated; }

@@ -13,6 +13,8 @@ SeriesTable<MotionRow> make_table() {
     table.add_family("energy_<kl>", energy_term_numbers(),
                      [](const MotionRow& r, std::size_t term) { return r.measures.bending.energy_term[term]; });
     table.add({
+        {"free_energy", [](const MotionRow& r) { return r.measures.free_energy; }},
+        {"work", [](const MotionRow& r) { return r.work; }},
         {"dissipation", [](const MotionRow& r) { return r.measures.dissipation; }},
         {"identity_defect", [](const MotionRow& r) { return r.identity_defect; }},
         {"area", [](const MotionRow& r) { return r.measures.bending.area; }},
@@ -29,6 +31,9 @@ SeriesTable<MotionRow> make_table() {
         {"angular_momentum_y", [](const MotionRow& r) { return r.measures.angular_momentum.y(); }},
         {"angular_momentum_z", [](const MotionRow& r) { return r.measures.angular_momentum.z(); }},
         {"lambda", [](const MotionRow& r) { return r.state.lambda; }},
+        {"tension", [](const MotionRow& r) { return r.measures.tension; }},
+        {"pressure", [](const MotionRow& r) { return r.measures.pressure; }},
+        {"force", [](const MotionRow& r) { return r.measures.force; }},
         {"stretching", [](const MotionRow& r) { return r.measures.stretching; }},
         {"correction_energy", [](const MotionRow& r) { return r.correction_energy; }},
         {"integral_H2", [](const MotionRow& r) { return r.measures.bending.integral_H2; }},

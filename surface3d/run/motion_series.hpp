@@ -10,7 +10,7 @@ namespace tubule::surface3d {
 struct MotionRow {
     const MotionState& state;
     const MotionMeasures& measures;
-    double volume_drift, identity_defect, correction_energy, energy_error;
+    double work, volume_drift, identity_defect, correction_energy, energy_error;
     int elements;
     double wall_seconds;
 };

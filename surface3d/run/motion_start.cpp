@@ -12,10 +12,17 @@ constexpr double relaxes_in = 0.2;  // of the time that the shape needs to chang
 constexpr double same_everywhere = 1e-9, times_noise = 4;
 
 // The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.
-double time_to_change(const MotionLaw& law, const Observables& o, bool closed) {
+double time_to_change(const MotionLaw& law, const Observables& o, bool closed, double energy) {
     const double R = (closed ? 3 : 2) * std::abs(o.volume) / o.area;
-    const double drive = std::max(std::abs(o.energy), o.magnitude) / o.area;
+    const double drive = energy / o.area;
     return (law.friction * R * R + law.viscosity) / drive + std::sqrt(law.inertia * R * R / drive);
+}
+
+// theory.md (11.1)
+double own_scale(const Case& c, const Observables& o) {
+    const MotionLaw law = motion_law(c.model);
+    const double loads = law.tension.largest() * o.area + law.pressure.largest() * std::abs(o.volume);
+    return std::max(std::abs(free_energy(c, o)), o.magnitude + loads);
 }
 
 }  // namespace
@@ -40,14 +47,21 @@ Observables observe_start(const Case& c, const StartMesh& start) {
     return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
 }
 
+double free_energy(const Case& c, const Observables& o) {
+    return o.energy + SurfaceLaw(motion_law(c.model)).potential(begin_time(c), {o.area, o.volume});
+}
+
+double reference_energy(const Case& c, const Observables& o) {
+    return c.handover ? c.handover->reference_energy : own_scale(c, o);
+}
+
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
-    memory.scale.reference_energy =
-        c.handover ? c.handover->reference_energy : std::max(std::abs(o.energy), o.magnitude);
-    memory.scale.relaxation =
-        c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0));
+    memory.scale.reference_energy = reference_energy(c, o);
+    memory.scale.relaxation = c.surface.relaxation.value_or(
+        relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0, own_scale(c, o)));
     memory.scale.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
 }
 

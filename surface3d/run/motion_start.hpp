@@ -14,6 +14,10 @@ VectorField start_velocity(const Case& c, const StartMesh& start);
 // Energies, area and volume of a start, as its motion sees them.
 Observables observe_start(const Case& c, const StartMesh& start);
 
+// F at the start, and E_ref, theory.md (11.1).
+double free_energy(const Case& c, const Observables& start);
+double reference_energy(const Case& c, const Observables& start);
+
 // Area, volume, reference energy, relaxation of the mesh, how well H is known.
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);
 

@@ -14,7 +14,7 @@ constexpr double miss_relaxation = 0.5;  // of the expected defect of area and v
 struct Multipliers {
     double time = 0;
     Eigen::VectorXd p;
-    double lambda = 0;
+    double lambda = 0, tension = 0;
 };
 
 struct AlphaMemory : ListedMemory<AlphaMemory> {
@@ -34,6 +34,7 @@ struct AlphaMemory : ListedMemory<AlphaMemory> {
         f.number("restart_solved_time", own.solved.time);
         f.optional_array("restart_solved_p", own.solved.p, state.p.size());
         f.number("restart_solved_lambda", own.solved.lambda);
+        f.number("restart_solved_tension", own.solved.tension);
         f.number("restart_missed_area", own.missed.area);
         f.number("restart_missed_volume", own.missed.volume);
     }
@@ -56,7 +57,7 @@ private:
         next->past = PastState(from);
         next->X_rate = solved.w;
         next->u_rate = (solved.u - stage.ubar) / stage.te;
-        next->solved = {from.time + tau, solved.p, solved.lambda};
+        next->solved = {from.time + tau, solved.p, solved.lambda, solved.tension};
         MotionStep out = finish(from, nullptr, stage, solved, end_of(from, solved, stage, tau)).step;
         out.state.memory = std::move(next);
         return out;
@@ -74,11 +75,12 @@ private:
         next->X_rate = memory.X_rate + a.renewing * (solved.w - memory.X_rate);
         next->u_rate = memory.u_rate + a.renewing * ((solved.u - stage.ubar) / stage.te - memory.u_rate);
         next->lag = a.lag;
-        next->solved = {from.time + stage.level * tau, solved.p, solved.lambda};
+        next->solved = {from.time + stage.level * tau, solved.p, solved.lambda, solved.tension};
         MotionState to = end_of(from, solved, stage, tau);
         if (stage.level < 1) {  // from there to the end, linearly
             const double ahead = (to.time - next->solved.time) / (next->solved.time - memory.solved.time);
             to.lambda += ahead * (to.lambda - memory.solved.lambda);
+            to.tension += ahead * (to.tension - memory.solved.tension);
             if (to.p.size() > 0) to.p += ahead * (to.p - memory.solved.p);
         }
         Finished done = finish(from, &memory.past, stage, solved, std::move(to));

@@ -111,7 +111,7 @@ public:
         const auto* memory = memory_of<BdfMemory>(from);
         const Past past(from, memory, tau);
         const int order = memory ? std::clamp(memory->order, 1, std::min(most_order, past.points())) : 1;
-        const StageSolution solved = solve(past, order);
+        const StageSolution solved = solve(from, past, order, tau);
         MotionStep out{.state = {.time = from.time + tau,
                                  .step = tau,
                                  .X = solved.X,
@@ -119,6 +119,7 @@ public:
                                  .u = solved.u,
                                  .p = solved.p,
                                  .lambda = solved.lambda,
+                                 .tension = solved.tension,
                                  .memory = {}},
                        .order = order};
         const std::vector<double> misses = missed_by(past, solved);
@@ -131,14 +132,16 @@ public:
 private:
     // Of order 4 twice, the second time on the surface that the first has found: extrapolation alone, on which that is
     // solved, is of order 3.
-    StageSolution solve(const Past& past, int order) {
+    StageSolution solve(const MotionState& from, const Past& past, int order, double tau) {
         const int through = std::clamp(order, 1, most_extrapolated);
-        Stage stage{past.te(order),
+        Stage stage{from.time + tau,
+                    past.te(order),
                     past.Xbar(order),
                     *past.u[0],
                     past.ahead(past.X, through),
                     past.ahead(past.w, through),
                     past.ahead(past.u, through),
+                    from.tension,
                     std::max(surface().control().relaxation, least_relaxation * past.te(order))};
         MovingSurface& s = surface();
         const auto rate = [&] { return s.rate_to_keep(s.mesh(stage.X), stage.Xbar, stage.X, stage.te, {}); };

@@ -28,12 +28,14 @@ StageSolution OneStageScheme::solve(const MotionState& from, const PastState* pa
     const auto ahead = [&](double level, const auto& now, auto PastState::*before) {
         return past ? ((1 + level * r) * now - level * r * past->*before).eval() : now;
     };
-    const Stage expected{stage.te,
+    const Stage expected{from.time + stage.level * tau,
+                         stage.te,
                          stage.Xbar,
                          stage.ubar,
                          ahead(stage.level, from.X, &PastState::X),
                          ahead(stage.level, from.w, &PastState::w),
                          ahead(stage.level, from.u, &PastState::u),
+                         from.tension,
                          surface().control().relaxation + stage.te};
     const VectorField begin = from.X + (stage.Xbar - from.X) / stage.level, end = ahead(1, from.X, &PastState::X);
     MovingSurface& s = surface();
@@ -49,6 +51,7 @@ MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution&
                    .u = solved.u,
                    .p = solved.p,
                    .lambda = solved.lambda,
+                   .tension = solved.tension,
                    .memory = {}};
     if (stage.level == 1) return to;
     to.X = from.X + (to.X - from.X) / stage.level;
@@ -59,7 +62,7 @@ MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution&
 
 OneStageScheme::Finished OneStageScheme::finish(const MotionState& from, const PastState* past, const OneStage& stage,
                                                 const StageSolution& solved, MotionState to) {
-    const Eigen::VectorXd momenta = surface().momenta_after(from, to.step);
+    const Eigen::VectorXd momenta = surface().momenta_after(from, to);
     surface().keep_momenta(momenta, stage.te / stage.level, to);
     const double error = estimated_error(from, past, stage, solved.fields.normal, to);
     const KeptExtent kept = solver_.keep_extent(solved, to);

@@ -193,6 +193,8 @@ Paper::Paper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bendi
         throw std::invalid_argument("the paper's scheme has fluid, stokes and overdamped, no gradient flow");
     if (law.inertia == 0 && law.friction == 0)
         throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: rigid motions are undetermined");
+    if (law.reservoir || !law.without_loads())
+        throw std::invalid_argument("the paper's scheme has no reservoir, tension or pressure");
     if (!(control.smoothing >= 0))
         throw std::invalid_argument(
             fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", control.smoothing));

@@ -1,0 +1,36 @@
+#include "surface3d/motion/axial_force.hpp"
+
+namespace tubule::surface3d {
+
+double axial_force(const MovingSurface& surface, const MotionState& state, const MotionFields& fields,
+                   const VectorField& u, double tension, double pressure) {
+    const CurvedMesh mesh = surface.mesh(state.X);
+    if (!(mesh.period > 0)) return 0;
+    const SurfaceSpace& space = surface.space();
+    const SurfaceLaw& law = surface.law();
+    const Tabulation& table = space.tabulation();
+    Eigen::VectorXd p = Eigen::VectorXd::Constant(mesh.size(), -tension);
+    if (law.inextensible && state.p.size() > 0) p = surface.pressure_at_nodes(state);
+    Eigen::VectorXd of_cell(space.cells());
+    space.for_each_cell([&](int cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), U = space.gather(u, cell),
+                             normals = space.gather(fields.normal, cell);
+        const auto nodal_H = space.gather(fields.H, cell), nodal_K = space.gather(fields.K, cell),
+                   nodal_p = space.gather(p, cell);
+        double sum = 0;
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> x = tangent_point(X, table, q);
+            const CellColumns<3> grad = gradients(x, table, q);
+            const auto phi = table.value.col(q);
+            const double H = nodal_H.dot(phi), K = nodal_K.dot(phi);
+            const AxialStretch s = axial_stretch(x.normal, shape_operator(x, grad, normals), H, K);
+            const CurvatureJet<double> f = density(surface.bending(), H, K);
+            const double viscous = 2 * law.viscosity * s.along.dot(U * (grad.transpose() * s.along));
+            sum += table.weight[q] * x.area * (f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + viscous);
+        }
+        of_cell[cell] = sum;
+    });
+    return (of_cell.sum() - pressure * extent(space, mesh).volume) / mesh.period;
+}
+
+}  // namespace tubule::surface3d

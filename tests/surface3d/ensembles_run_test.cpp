@@ -1,0 +1,131 @@
+// Runs at given tension and pressure, at fixed area, and fed by a reservoir: the balance of the free energy with loads
+// that change, guards, resumption, refusals.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/surface3d/run_case.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+const std::string wavy = R"(
+[energy]
+k20 = 0.2
+k42 = 0.05
+[shape]
+kind = "sphere"
+radius = 1
+mode = [{amplitude = 0.15, l = 2, m = 1}, {amplitude = 0.05, l = 3, m = 2}]
+[discretisation]
+elements = 80
+order = 4
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.1
+)";
+
+std::vector<std::string> open_sets(const std::string& kind) {
+    const std::string area = kind == "gradient-flow" ? "free" : "reservoir";
+    return {"model.kind=" + kind,
+            "model.volume=free",
+            "model.area=" + area,
+            "model.tension={time = [0.02, 0.05], value = [0.1, 0.6]}",
+            "model.pressure={time = [0, 0.03, 0.07], value = [0, 0.8, 0.5]}"};
+}
+
+TEST(EnsembleRuns, TheFreeEnergyBalances) {
+    // theory.md (3.16): F + kinetic energy - work falls by what dissipates; no step crosses a kink; F is what it is made
+    // of.
+    for (const std::string kind : {"gradient-flow", "overdamped", "stokes", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome o = run_case(wavy, open_sets(kind));
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double E_ref = o.summary.reference_energy;
+        const auto time = o.series("time"), F = o.series("free_energy"), E = o.series("energy"), A = o.series("area"),
+                   V = o.series("volume"), work = o.series("work"), K = o.series("kinetic_energy"),
+                   sigma = o.series("tension"), P = o.series("pressure"), defect = o.series("identity_defect");
+        for (const double kink : {0.02, 0.03, 0.05, 0.07}) EXPECT_TRUE(std::ranges::count(time, kink)) << kink;
+        for (std::size_t i = 0; i < time.size(); ++i) {
+            EXPECT_NEAR(F[i], E[i] + sigma[i] * A[i] - P[i] * V[i], 1e-12 * E_ref);
+            EXPECT_LT(std::abs(defect[i]), 2e-3 * E_ref);
+            const std::size_t before = i > 0 ? i - 1 : 0;
+            EXPECT_LT(F[i] + K[i] - work[i], F[before] + K[before] - work[before] + 1e-4 * E_ref);
+        }
+        // Their work, by the trapezoidal rule on these rows, and much more than the defect.
+        double sum = 0;
+        for (std::size_t i = 1; i < time.size(); ++i)
+            sum += (sigma[i] - sigma[i - 1]) * (A[i] + A[i - 1]) / 2 - (P[i] - P[i - 1]) * (V[i] + V[i - 1]) / 2;
+        EXPECT_NEAR(work.back(), sum, 1e-3 * std::abs(sum));
+        EXPECT_GT(std::abs(sum), 0.05 * E_ref);
+        EXPECT_GT(std::abs(A.back() / A.front() - 1), 1e-4);
+    }
+}
+
+TEST(EnsembleRuns, AreaAsAWholeIsKept) {
+    for (const std::string volume : {"free", "fixed"}) {
+        SCOPED_TRACE(volume);
+        const Outcome o = run_case(wavy, {"model.area=fixed", "model.volume=" + volume});
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        for (const double area : o.series("area")) EXPECT_NEAR(area / o.series("area").front(), 1, 1e-8);
+        const double change = std::abs(o.last("volume") / o.series("volume").front() - 1);
+        EXPECT_EQ(change < 1e-8, volume == "fixed") << change;
+        EXPECT_NE(o.last("tension"), 0);
+        EXPECT_LT(std::abs(o.last("identity_defect")), 2e-3 * o.summary.reference_energy);
+        EXPECT_LT(o.last("energy"), o.series("energy").front() - 1e-3 * o.summary.reference_energy);
+    }
+}
+
+TEST(EnsembleRuns, ResumedRunsEndAsUndisturbedOnes) {
+    for (const std::string kind : {"gradient-flow", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome whole = run_case(wavy, open_sets(kind));
+        Outcome first = begin(wavy, open_sets(kind));
+        first.watch.most_rows = whole.watch.rows.size() / 2;
+        first.summary = run(first.c, first.watch);
+        ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
+        ASSERT_TRUE(first.watch.saved);
+        const Restart restart{*first.watch.saved, first.watch.meshes.back()};
+        Outcome second = begin(wavy, open_sets(kind));
+        second.summary = run(second.c, second.watch, &restart);
+        ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+        for (const char* name : {"free_energy", "work", "identity_defect", "energy_error", "area"})
+            EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+    }
+}
+
+TEST(EnsembleRuns, NothingIsStationaryBeforeTheLastKink) {
+    // A sphere at rest until its tension changes: f = 0 and f_H = 0 at H0 = -2.
+    const Outcome o = run_case(
+        "[energy]\nk20 = 1\nH0 = -2\n[model]\ntension = {time = [1, 1.1], value = [0, 0.5]}\n[shape]\n"
+        "kind = \"sphere\"\nradius = 1\n[time]\nend = 20\nstationary = 1e-4\n[discretisation]\nelements = 80\n");
+    EXPECT_EQ(o.summary.stop.reason, Stop::stationary) << o.summary.stop.message;
+    EXPECT_GT(o.summary.stop.time, 1.1);
+    EXPECT_LT(o.last("area"), 0.98 * o.series("area").front());
+}
+
+std::string refusal(const std::vector<std::string>& sets) {
+    try {
+        begin(wavy, sets);
+    } catch (const CaseError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(EnsembleRuns, WhatASchemeDoesNotHaveIsRefused) {
+    const std::vector<std::string> paper{"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=1e-3",
+                                         "model.volume=free"};
+    const auto with = [&](const std::string& set) {
+        std::vector<std::string> sets = paper;
+        sets.push_back(set);
+        return refusal(sets);
+    };
+    EXPECT_EQ(refusal(paper), "");
+    EXPECT_NE(with("model.pressure=1").find("must not be \"paper\" with model.pressure"), std::string::npos);
+    EXPECT_NE(with("model.area=reservoir").find("must not be \"paper\" with model.area"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tubule::surface3d
