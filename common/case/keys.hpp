@@ -371,8 +371,8 @@ void check_ensemble(Keys& k, const Case& c, const MotionLaw& law) {
             return fmt::format("is not computed in tier \"{}\" yet", c.tier == Tier::surface3d ? "surface3d" : "auto");
         });
     };
-    refuse("model.period", law.free_period);
     if (c.tier == Tier::surface3d && !c.equilibrium) return;
+    refuse("model.period", law.free_period);
     refuse("model.area", law.reservoir || law.keeps_area);
     refuse("model.tension", !law.tension.is_zero());
     refuse("model.pressure", !law.pressure.is_zero());
@@ -405,9 +405,11 @@ void check_together(Keys& k, const Case& c) {
                 return fmt::format(
                     "must not be \"{}\" for a Stokes flow without friction: rigid motions are undetermined",
                     scheme.name);
-            if (law.reservoir || !law.without_loads())
+            if (law.reservoir || law.free_period || !law.without_loads())
                 return fmt::format("must not be \"{}\" with model.{}", scheme.name,
-                                   law.reservoir ? "area = \"reservoir\"" : "pressure");
+                                   law.reservoir     ? "area = \"reservoir\""
+                                   : law.free_period ? "period = \"free\""
+                                                     : "pressure");
             if (const auto key = term_beyond_paper(c.energy); !key.empty())
                 return fmt::format("must not be \"{}\" with energy.{}: it has k20, k40 and k42 only", scheme.name, key);
             return {};

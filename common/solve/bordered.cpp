@@ -38,36 +38,42 @@ BorderedSolver::BorderedSolver(const Eigen::SparseMatrix<double>& pattern, const
 BorderedSolver::Answer BorderedSolver::solve(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
                                              const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
     const Eigen::MatrixXd columns = C.cols() > 0 ? C : Eigen::MatrixXd(b.size(), 0);
+    return solve(A, b, {columns, columns, Eigen::MatrixXd::Zero(columns.cols(), columns.cols()), d});
+}
+
+BorderedSolver::Answer BorderedSolver::solve(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
+                                             const Border& border) {
     try {
-        return iterate(A, b, columns, d);
+        return iterate(A, b, border);
     } catch (const SolveError&) {
         ++fallbacks_;
-        return directly(A, b, columns, d);
+        return directly(A, b, border);
     }
 }
 
 // Preconditioned by the same block elimination with the factors in place of A.
 BorderedSolver::Answer BorderedSolver::iterate(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
-                                               const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+                                               const Border& border) {
+    const auto& [C, R, D, d] = border;
     const int n = static_cast<int>(b.size()), m = static_cast<int>(C.cols());
     factors_.factor(A);
     Eigen::MatrixXd W(n, m);
     for (int j = 0; j < m; ++j) W.col(j) = factors_.solve(C.col(j));
-    const Eigen::MatrixXd S = C.transpose() * W;
+    const Eigen::MatrixXd S = R.transpose() * W - D;
     const Eigen::PartialPivLU<Eigen::MatrixXd> schur(m > 0 ? S : Eigen::MatrixXd::Identity(1, 1).eval());
     Product product(A);
     const Gmres::Operator whole = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {
         product(x.head(n), y.head(n));
         if (m == 0) return;
         y.head(n).noalias() += C * x.tail(m);
-        y.tail(m).noalias() = C.transpose() * x.head(n);
+        y.tail(m).noalias() = R.transpose() * x.head(n) + D * x.tail(m);
     };
     Eigen::VectorXd part;
     const Gmres::Operator nearly = [&](const Eigen::VectorXd& r, Eigen::VectorXd& x) {
         factors_.solve(r.head(n), part);
         x.head(n) = part;
         if (m == 0) return;
-        x.tail(m) = schur.solve(C.transpose() * part - r.tail(m));
+        x.tail(m) = schur.solve(R.transpose() * part - r.tail(m));
         x.head(n).noalias() -= W * x.tail(m);
     };
     if (!gmres_ || border_ != m) gmres_.emplace(n + m);
@@ -81,14 +87,15 @@ BorderedSolver::Answer BorderedSolver::iterate(const Eigen::SparseMatrix<double>
 }
 
 BorderedSolver::Answer BorderedSolver::directly(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b,
-                                                const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+                                                const Border& border) {
+    const auto& [C, R, D, d] = border;
     if (!lu_) lu_.emplace(ordering_);
     lu_->factor(A);
     const Eigen::VectorXd x = lu_->solve(b, 1);
     if (C.cols() == 0) return {x, {}};
     const Eigen::MatrixXd W = lu_->solve(C, 1);
-    const Eigen::MatrixXd S = C.transpose() * W;
-    const Eigen::VectorXd y = S.partialPivLu().solve(C.transpose() * x - d);
+    const Eigen::MatrixXd S = R.transpose() * W - D;
+    const Eigen::VectorXd y = S.partialPivLu().solve(R.transpose() * x - d);
     return {x - W * y, y};
 }
 

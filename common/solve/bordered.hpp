@@ -10,9 +10,9 @@
 
 namespace tubule {
 
-// Solves A x + C y = b, C^T x = d. A has the pattern given at first; its symmetric part is quasi-definite or nearly so,
-// and close to A. Factors of it in single precision precondition GMRES on the whole; where that fails, LU factors of A
-// take over (`fallbacks` counts how often).
+// Solves A x + C y = b, R^T x + D y = d. A has the pattern given at first; its symmetric part is quasi-definite or
+// nearly so, and close to A. Factors of it in single precision precondition GMRES on the whole; where that fails, LU
+// factors of A take over (`fallbacks` counts how often).
 class BorderedSolver {
 public:
     // `node_of_unknown` as in nested_dissection().
@@ -21,7 +21,14 @@ public:
     struct Answer {
         Eigen::VectorXd x, y;
     };
-    // C may have no columns. SolveError.
+    // One column of C and R for each y; there may be none.
+    struct Border {
+        Eigen::MatrixXd C, R, D;
+        Eigen::VectorXd d;
+    };
+    // SolveError.
+    Answer solve(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Border& border);
+    // With R = C and D = 0.
     Answer solve(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Eigen::MatrixXd& C = {},
                  const Eigen::VectorXd& d = {});
 
@@ -29,10 +36,8 @@ public:
     int fallbacks() const { return fallbacks_; }
 
 private:
-    Answer iterate(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Eigen::MatrixXd& C,
-                   const Eigen::VectorXd& d);
-    Answer directly(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Eigen::MatrixXd& C,
-                    const Eigen::VectorXd& d);
+    Answer iterate(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Border& border);
+    Answer directly(const Eigen::SparseMatrix<double>& A, const Eigen::VectorXd& b, const Border& border);
 
     Ordering ordering_;
     SparseLdlt<float> factors_;

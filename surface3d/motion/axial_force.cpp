@@ -1,10 +1,12 @@
 #include "surface3d/motion/axial_force.hpp"
 
+#include "surface3d/motion/axial_stretch.hpp"
+
 namespace tubule::surface3d {
 
 double axial_force(const MovingSurface& surface, const MotionState& state, const MotionFields& fields,
                    const VectorField& u, double tension, double pressure) {
-    const CurvedMesh mesh = surface.mesh(state.X);
+    const CurvedMesh mesh = surface.mesh(state);
     if (!(mesh.period > 0)) return 0;
     const SurfaceSpace& space = surface.space();
     const SurfaceLaw& law = surface.law();
@@ -23,10 +25,15 @@ double axial_force(const MovingSurface& surface, const MotionState& state, const
             const CellColumns<3> grad = gradients(x, table, q);
             const auto phi = table.value.col(q);
             const double H = nodal_H.dot(phi), K = nodal_K.dot(phi);
-            const AxialStretch s = axial_stretch(x.normal, shape_operator(x, grad, normals), H, K);
+            Eigen::Matrix<double, 3, 2> e;
+            e << x.tangent[0].normalized(), x.normal.cross(x.tangent[0].normalized());
+            const Eigen::Matrix2d B = e.transpose() * shape_operator(x, grad, normals) * e;
+            const AxialStretch s = axial_stretch(e.row(2).transpose(), B, H, K);
+            const Eigen::Vector3d along = e * s.along;
             const CurvatureJet<double> f = density(surface.bending(), H, K);
-            const double viscous = 2 * law.viscosity * s.along.dot(U * (grad.transpose() * s.along));
-            sum += table.weight[q] * x.area * (f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + viscous);
+            const double strain = along.dot(U * (grad.transpose() * along)) + state.stretch * s.area * s.area;
+            sum += table.weight[q] * x.area *
+                   (f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + 2 * law.viscosity * strain);
         }
         of_cell[cell] = sum;
     });

@@ -19,17 +19,29 @@ Extent sum_over(const SurfaceSpace& space, const CurvedMesh& mesh, OfCell&& of_c
         sums.col(cell) = sum;
     });
     const Eigen::Vector2d total = sums.rowwise().sum();
-    return {total[0], total[1]};
+    return {total[0], total[1], 0};
 }
 
 }  // namespace
 
 Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh) {
-    return sum_over(space, mesh, [](int) {
+    Extent out = sum_over(space, mesh, [](int) {
         return [](const SurfacePoint<double>& p, int) {
             return Eigen::Vector2d(1, p.x.head<2>().dot(p.normal.head<2>()) / 2);  // the flux of (x, y, 0)/2
         };
     });
+    out.length = mesh.period;
+    return out;
+}
+
+Extent stretch_rate(const SurfaceSpace& space, const CurvedMesh& mesh) {
+    Extent out = sum_over(space, mesh, [](int) {
+        return [](const SurfacePoint<double>& p, int) {
+            return Eigen::Vector2d(1 - p.normal.z() * p.normal.z(), p.x.head<2>().dot(p.normal.head<2>()) / 2);
+        };
+    });
+    out.length = mesh.period;
+    return out;
 }
 
 Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "surface3d/motion/axial_stretch.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -49,7 +51,8 @@ struct CellWork {
     CellMatrix advection;                  // (c.grad phi_b, phi_a), c = u* - w* along the surface
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
-    Eigen::VectorXd rhs, flux, stretch, load, force;
+    Eigen::VectorXd rhs, flux, widening, load, force, row, column;
+    double own = 0, energy = 0;  // of a stretch
 };
 
 class Assembler {
@@ -67,9 +70,11 @@ public:
           nv_(law.components() * n_),
           H_(unknowns.H < 0 ? -1 : nv_),
           K_(unknowns.K < 0 ? -1 : nv_ + (H_ < 0 ? 0 : n_)),
-          p_(unknowns.p < 0 ? -1 : unknowns.width() - pressure_table_.functions()) {}
+          p_(unknowns.p < 0 ? -1 : unknowns.width() - pressure_table_.functions()),
+          of_cell_(law.free_period ? space.cells() : 0) {}
 
-    void add_cell(int cell, CellWork& work, StepSystem& system) const;
+    void add_cell(int cell, CellWork& work, StepSystem& system);
+    void sum_stretch(StepSystem& system) const;
 
 private:
     // The state at a point.
@@ -91,6 +96,7 @@ private:
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
+    void add_stretch(const std::vector<Point>& at, CellWork& work) const;
 
     const SurfaceSpace& space_;
     const MotionUnknowns& unknowns_;
@@ -99,7 +105,8 @@ private:
     const StepBase& base_;
     const Tabulation& table_;
     Tabulation pressure_table_;
-    int n_, nv_, H_, K_, p_;  // nodes and velocities of a cell, first columns of its blocks
+    int n_, nv_, H_, K_, p_;                // nodes and velocities of a cell, first columns of its blocks
+    std::vector<Eigen::Vector2d> of_cell_;  // own and energy of a stretch: their sum does not depend on the threads
 };
 
 void Assembler::size(CellWork& work) const {
@@ -113,8 +120,9 @@ void Assembler::size(CellWork& work) const {
         if (!law_.flows) t.psi_grad.resize(2 * Q, pressure_table_.functions());
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
-    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.stretch.setZero(w);
+    work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.widening.setZero(w);
     work.load.setZero(w), work.force.setZero(w);
+    if (law_.free_period) work.row.setZero(w), work.column.setZero(w), work.own = work.energy = 0;
 }
 
 Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
@@ -242,7 +250,7 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
-        if (!law_.inextensible) work.stretch.head(nv_) -= (s.dS * s.H) * t.normal.row(q).transpose();
+        if (!law_.inextensible) work.widening.head(nv_) -= (s.dS * s.H) * t.normal.row(q).transpose();
     }
     if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
     if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
@@ -322,7 +330,38 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
         K_, base_.fields.K, [](const Point& s) { return s.S; }, [](const Point& s) { return s.trace * s.K; });
 }
 
-void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
+// The column and the row of a stretch e, u = .. + e z e_z: theory.md (3.19), (10.18). Nodes go along with it, so that H
+// and K change as those of points of the membrane.
+void Assembler::add_stretch(const std::vector<Point>& at, CellWork& work) const {
+    if (!law_.free_period) return;
+    const CellTables& t = work.t;
+    for (int q = 0; q < table_.points(); ++q) {
+        const Point& s = at[q];
+        const AxialStretch by = axial_stretch(s.e.row(2).transpose(), s.B * s.e, s.H, s.K);
+        const auto phi = t.phi.row(q).transpose();
+        work.energy += s.dS * (s.f.H * by.H + s.f.K * by.K + s.f.f * by.area);
+        const auto add = [&](int first, double rate, double force, double value) {
+            if (first < 0) return;
+            work.column.segment(first, n_) -= (base_.te * s.dS * rate) * phi;
+            work.rhs.segment(first, n_) -= (base_.stretch * s.dS * rate) * phi;
+            work.row.segment(first, n_) += (s.dS * force) * phi;
+            work.energy -= s.dS * force * value;
+        };
+        add(H_, by.H, s.f.HH * by.H + s.f.HK * by.K + s.f.H, s.H);
+        add(K_, by.K, s.f.HK * by.H + s.f.KK * by.K + s.f.K * (2 - 3 * by.area), s.K);
+        if (p_ >= 0) work.row.tail(t.psi.cols()) -= (s.dS * by.area) * t.psi.row(q).transpose();
+        if (law_.viscosity == 0) continue;
+        const double drag = 2 * law_.viscosity * s.dS;
+        const Eigen::Vector3d D(by.along[0] * by.along[0], by.along[1] * by.along[1],
+                                std::sqrt(2.0) * by.along[0] * by.along[1]);
+        work.row.head(nv_) += drag * (t.strain.middleRows<3>(3 * q).transpose() * D);
+        work.own += drag * by.area * by.area;
+    }
+    work.column.head(nv_) = work.row.head(nv_);
+    if (p_ >= 0) work.column.tail(t.psi.cols()) = work.row.tail(t.psi.cols());
+}
+
+void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
     size(work);
     const CellColumns<3> X = cell_nodes(*base_.mesh, cell), normals = space_.gather(base_.fields.normal, cell);
     std::vector<Point> at;
@@ -338,16 +377,31 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) const {
     add_bending(at, cell, work);
     add_pressure(at, work);
     add_curvature_evolution(at, cell, work);
+    add_stretch(at, work);
     unknowns_.add(system.A, cell, work.block);
     if (law_.inertia != 0) space_.add(system.advection, cell, work.advection);
     const int* numbers = unknowns_.of_cell(cell);
     for (int i = 0; i < unknowns_.width(); ++i) {
         system.b[numbers[i]] += work.rhs[i];
         system.flux[numbers[i]] += work.flux[i];
-        system.stretch[numbers[i]] += work.stretch[i];
+        system.widening[numbers[i]] += work.widening[i];
         system.pressure_load[numbers[i]] += work.load[i];
         system.force[numbers[i]] += work.force[i];
     }
+    if (!law_.free_period) return;
+    for (int i = 0; i < unknowns_.width(); ++i) {
+        system.stretch.row[numbers[i]] += work.row[i];
+        system.stretch.column[numbers[i]] += work.column[i];
+    }
+    of_cell_[cell] = {work.own, work.energy};
+}
+
+void Assembler::sum_stretch(StepSystem& system) const {
+    if (!law_.free_period) return;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& of : of_cell_) sum += of;
+    system.stretch.own = sum[0], system.stretch.energy = sum[1];
+    system.stretch.rate = stretch_rate(space_, *base_.mesh);
 }
 
 }  // namespace
@@ -361,13 +415,15 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const S
     system.b.setZero(unknowns.size());
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());
-    system.stretch.setZero(unknowns.size());
+    system.widening.setZero(unknowns.size());
     system.force.setZero(unknowns.size());
-    const Assembler assembler(space, unknowns, law, bending, base);
+    if (law.free_period) system.stretch.row.setZero(unknowns.size()), system.stretch.column.setZero(unknowns.size());
+    Assembler assembler(space, unknowns, law, bending, base);
     space.for_each_cell([&](int cell) {
         static thread_local CellWork work;
         assembler.add_cell(cell, work, system);
     });
+    assembler.sum_stretch(system);
 }
 
 }  // namespace tubule::surface3d

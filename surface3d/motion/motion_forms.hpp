@@ -5,6 +5,7 @@
 
 #include "common/energy/bending.hpp"
 #include "surface3d/fem/field_unknowns.hpp"
+#include "surface3d/motion/extent.hpp"
 #include "surface3d/motion/motion_fields.hpp"
 #include "surface3d/motion/surface_law.hpp"
 
@@ -25,14 +26,23 @@ struct MotionUnknowns : FieldUnknowns {
 struct StepBase {
     const CurvedMesh* mesh;              // X*
     MotionFields fields;                 // of X*
-    VectorField displacement;            // X* - Xbar
+    VectorField displacement;            // X* - Xbar, without its stretch
     VectorField mesh_velocity;           // w*, expected
     Eigen::VectorXd velocity;            // u*, expected, as numbered in MotionUnknowns; of one or three components
     Eigen::VectorXd past;                // ubar
     double te = 0;                       // the step, effectively
     double curvature_stabilisation = 0;  // L_H is taken 1 + this * |B| (width of a triangle) times
     double tension = 0;  // expected: its part in the force changes with H at once, -tension (H - H*, v.nu)
+    double stretch = 0;  // in X* - Xbar, of a free period
     double supply = 0;   // expected div_P u of a membrane with inertia that a reservoir feeds: theory.md (3.18)
+};
+
+// What belongs to the stretch e of a free period, u = .. + e z e_z: theory.md (3.19), (10.18).
+struct StretchTerms {
+    Eigen::VectorXd column, row;
+    double own = 0;     // of e in its row
+    double energy = 0;  // dE[z e_z], less what H and K in the row add to it
+    Extent rate;        // of area, volume and period on X*
 };
 
 struct StepSystem {
@@ -40,8 +50,9 @@ struct StepSystem {
     Eigen::VectorXd b;
     Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
     Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
-    Eigen::VectorXd stretch;        // the rate of the area, -(H*, v.nu); of extensible membranes
+    Eigen::VectorXd widening;       // the rate of the area, -(H*, v.nu); of extensible membranes
     Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
+    StretchTerms stretch;
     Eigen::SparseMatrix<double>
         advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia
 };

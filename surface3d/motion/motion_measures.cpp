@@ -30,7 +30,9 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
             const CellColumns<3> grad = gradients(p, table, q);
             const Eigen::Vector3d v = U * table.value.col(q), a = A * table.value.col(q);
             const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - p.normal * p.normal.transpose();
-            const Eigen::Matrix3d G = P * (U * grad.transpose()), sigma = (G + G.transpose()) / 2;
+            const Eigen::Vector3d along = P.col(2);
+            const Eigen::Matrix3d G = P * (U * grad.transpose()) + s.stretch * along * along.transpose(),
+                                  sigma = (G + G.transpose()) / 2;
             Sums here;
             here << v.squaredNorm(), 2 * sigma.squaredNorm(), G.squaredNorm(), G.trace() * G.trace(), a.squaredNorm(),
                 v, p.x.cross(v), p.x, slips ? (grad * nodal_p).squaredNorm() : 0, nodal_p.dot(table.value.col(q));
@@ -93,7 +95,7 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     const Bending& bending = surface.bending();
     const SurfaceLaw& law = surface.law();
     const SurfaceSpace& space = surface.space();
-    const CurvedMesh mesh = surface.mesh(s.X);
+    const CurvedMesh mesh = surface.mesh(s);
     MotionMeasures m;
     m.fields = surface.fields(mesh);
     m.bending = observe(space, mesh, {m.fields.normal, {}, m.fields.H, m.fields.K}, bending);
@@ -109,10 +111,11 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
         const Eigen::RowVectorXd load = surface.flux(s.u, mesh, m.fields).transpose();
         m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
     }
-    m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume});
+    m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume, s.period});
     m.tension = law.area_is_free() ? law.tension.at(s.time) : law.keeps_area ? s.tension : -sum[15] / m.bending.area;
     m.pressure = law.keeps_volume ? -s.lambda : law.pressure.at(s.time);
-    m.force = axial_force(surface, s, m.fields, m.velocity, m.tension, m.pressure);
+    m.force =
+        law.free_period ? law.force.at(s.time) : axial_force(surface, s, m.fields, m.velocity, m.tension, m.pressure);
     m.acceleration = law.inertia * sum[4] / 2;
     m.speed = m.velocity.colwise().norm().maxCoeff();
     m.stretching = sum[2] > 0 ? std::sqrt(sum[3] / sum[2]) : 0;
@@ -123,6 +126,8 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
         const double r = mesh.period > 0 ? x.head<2>().norm() : (x - m.centre).norm();
         m.r_min = std::min(m.r_min, r), m.r_max = std::max(m.r_max, r);
     }
+    const Eigen::RowVectorXd z = s.X.row(2);
+    m.height = mesh.period > 0 ? mesh.period : z.maxCoeff() - z.minCoeff();
     m.quality = mesh_quality(mesh);
     m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
     measure_neck(mesh, m);

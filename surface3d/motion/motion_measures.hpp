@@ -21,6 +21,7 @@ struct MotionMeasures {
     double speed = 0;         // largest |u|
     double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
     Eigen::Vector3d momentum, angular_momentum, centre;
+    double height = 0;            // period of a tube; extent of a closed surface along z
     double r_min = 0, r_max = 0;  // distances from the axis of a tube; from the centre of a closed surface
     MeshQuality quality;
     MeshTurn turn;

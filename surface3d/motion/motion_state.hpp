@@ -24,12 +24,13 @@ public:
 // Nodal values at a time.
 struct MotionState {
     double time = 0;
-    double step = 0;     // that led here; 0 at the start
-    VectorField X, w;    // positions, their velocity
-    Eigen::VectorXd u;   // velocity as in MotionUnknowns, component by component
-    Eigen::VectorXd p;   // pressure, at the nodes of its own order
-    double lambda = 0;   // multiplier of the volume; 0 where that is free
-    double tension = 0;  // multiplier of the area as a whole; 0 where that is free or p holds it
+    double step = 0;                 // that led here; 0 at the start
+    VectorField X, w;                // positions, their velocity without stretch z e_z
+    Eigen::VectorXd u;               // velocity as in MotionUnknowns, component by component, without the same
+    Eigen::VectorXd p;               // pressure, at the nodes of its own order
+    double lambda = 0;               // multiplier of the volume; 0 where that is free
+    double tension = 0;              // multiplier of the area as a whole; 0 where that is free or p holds it
+    double period = 0, stretch = 0;  // of a tube: length, and the rate at which it grows over itself
     // Of the scheme that made the step; null at the start, and for schemes that need none. Steps share it: it is never
     // modified, each step creates its own.
     std::shared_ptr<const SchemeMemory> memory;
@@ -45,7 +46,14 @@ struct MotionStep {
 // Whether positions, velocities and multipliers are finite.
 inline bool is_finite(const MotionState& s) {
     return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda) &&
-           std::isfinite(s.tension);
+           std::isfinite(s.tension) && std::isfinite(s.period) && std::isfinite(s.stretch);
+}
+
+// by z e_z at the nodes.
+inline VectorField stretched(const VectorField& X, double by) {
+    VectorField out = VectorField::Zero(3, X.cols());
+    out.row(2) = by * X.row(2);
+    return out;
 }
 
 }  // namespace tubule::surface3d

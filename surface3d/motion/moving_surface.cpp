@@ -35,12 +35,12 @@ MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, cons
 
 MotionState MovingSurface::start(const CurvedMesh& mesh) {
     MotionState s;
-    s.X = node_positions(mesh);
+    s.X = node_positions(mesh), s.period = mesh.period;
     s.w = VectorField::Zero(3, mesh.size());
     s.u = Eigen::VectorXd::Zero(law_.components() * mesh.size());
     s.p = Eigen::VectorXd::Zero(pressure_mesh_.size());
     const MotionFields f = fields(mesh);
-    s.X += correction(s.X, f, law_.keeps_volume && !area_is_volume(mesh, f)).displacement;
+    correct(f, law_.keeps_volume && !area_is_volume(mesh, f), s);
     return s;
 }
 
@@ -48,10 +48,16 @@ MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u,
     MotionState s = start(at);
     s.u = u;
     keep_momenta(momenta, 0, s);
-    const CurvedMesh now = mesh(s.X);
+    const CurvedMesh now = mesh(s);
     const MotionFields f = fields(now);
     s.w = mesh_velocity(now, f, flux(s.u, now, f), control_.relaxation);
     return s;
+}
+
+CurvedMesh MovingSurface::mesh(const VectorField& X, double period) const {
+    CurvedMesh out = with_nodes(mesh_, X);
+    out.period = period;
+    return out;
 }
 
 MotionFields MovingSurface::fields(const CurvedMesh& mesh) {
@@ -98,7 +104,7 @@ VectorField MovingSurface::velocity(const MotionState& state, const MotionFields
     if (!law_.inextensible) return out;
     const Tabulation& table = space_.tabulation();
     return out - (*projection_)(
-                     load<3>(space_, mesh(state.X), [&](int cell, const CellColumns<3>& X, int q, CellColumns<3>& sum) {
+                     load<3>(space_, mesh(state), [&](int cell, const CellColumns<3>& X, int q, CellColumns<3>& sum) {
                          const SurfacePoint<double> p = tangent_point(X, table, q);
                          const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
                          sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
@@ -164,7 +170,7 @@ Eigen::MatrixXd MovingSurface::open_rigid_motions(const CurvedMesh& mesh) const 
 
 Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
     if (!law_.flows || law_.inertia == 0) return {};
-    return momenta(mesh(state.X)).transpose() * state.u;
+    return momenta(mesh(state)).transpose() * state.u;
 }
 
 // d_t u + div_P u/2 u: membrane is fed without work, so that momentum grows with the root of the area, theory.md
@@ -174,14 +180,14 @@ Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, const Moti
     if (now.size() == 0) return now;
     const double left = std::exp(-law_.friction / law_.inertia * to.step);
     if (!law_.reservoir) return left * now;
-    return left * std::sqrt(extent(space_, mesh(to.X)).area / extent(space_, mesh(from.X)).area) * now;
+    return left * std::sqrt(extent(space_, mesh(to)).area / extent(space_, mesh(from)).area) * now;
 }
 
 // Only friction changes momentum and angular momentum, but the discrete bending force has a small resultant, which
 // would accelerate a surface at rest: a rigid motion cancels it without a change of shape.
 void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
     if (kept.size() == 0) return;
-    const CurvedMesh m = mesh(to.X);
+    const CurvedMesh m = mesh(to);
     const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m);
     const Eigen::VectorXd lack = kept - of.transpose() * to.u;
     const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
@@ -199,7 +205,7 @@ double MovingSurface::lack_of_volume(const CurvedMesh& mesh) const {
 }
 
 bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f) const {
-    if (law_.area_is_free()) return false;
+    if (law_.area_is_free() || law_.free_period) return false;
     const Extent rate = extent_rate(space_, mesh, f.normal);  // -INT H, A
     const Extent by_H = extent_rate(space_, mesh, f.normal * f.H.asDiagonal());
     const double variation = 1 - rate.area * by_H.volume / (rate.volume * by_H.area);
@@ -213,22 +219,28 @@ Extent MovingSurface::lack(const CurvedMesh& mesh) const {
             control_.volume && law_.keeps_volume ? *control_.volume - now.volume : 0};
 }
 
-Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const VectorField& begin, const VectorField& end, double span,
+Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const CurvedMesh& begin, const CurvedMesh& end, double span,
                                    const Extent& missed) const {
-    const Extent lacks = lack(mesh(end)), back = extent_rate(space_, at, end - begin);
-    return {(lacks.area + back.area + missed.area) / span, (lacks.volume + back.volume + missed.volume) / span};
+    const double stretch = at.period > 0 ? (end.period - begin.period) / at.period : 0;
+    const VectorField moved = node_positions(end) - node_positions(begin) - stretched(node_positions(at), stretch);
+    const Extent lacks = lack(end), back = extent_rate(space_, at, moved);
+    const Extent along = stretch != 0 ? stretch_rate(space_, at) : Extent{};
+    return {(lacks.area + back.area + stretch * along.area + missed.area) / span,
+            (lacks.volume + back.volume + stretch * along.volume + missed.volume) / span};
 }
 
-// Newton's method for two numbers: displacements along nu and H nu, those of the expected surface.
-MovingSurface::Correction MovingSurface::correction(const VectorField& X, const MotionFields& f,
-                                                    bool with_volume) const {
+// Newton's method for two numbers: displacements along nu and H nu, those of the expected surface; or along nu and
+// z e_z, by which a straight tube meets both.
+MovingSurface::Correction MovingSurface::correct(const MotionFields& f, bool with_volume, MotionState& s) const {
     const bool area = !law_.area_is_free() && control_.area, volume = with_volume && control_.volume;
-    Correction out{VectorField::Zero(3, X.cols()), {}};
+    Correction out{VectorField::Zero(3, s.X.cols()), 0, {}};
     if (!area && !volume) return out;
-    VectorField& sum = out.displacement;
-    const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal();
+    const bool stretches = area && volume && law_.free_period;
+    const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal(), X = s.X;
+    const double period = s.period;
     for (int k = 0;; ++k) {
-        const CurvedMesh m = mesh(X + sum);
+        s.X = X + stretched(X, out.stretch) + out.displacement, s.period = (1 + out.stretch) * period;
+        const CurvedMesh m = mesh(s);
         const Extent lacks = lack(m);
         if (k == 0) out.lacking = lacks;
         const Eigen::Vector2d missing(area ? lacks.area : 0, volume ? lacks.volume : 0);
@@ -239,15 +251,23 @@ MovingSurface::Correction MovingSurface::correction(const VectorField& X, const 
             throw SolveError(
                 fmt::format("area and volume are not conserved: relative error {:.2g} after {} corrections", off,
                             most_corrections));
-        const Extent a = extent_rate(space_, m, by_normal), b = extent_rate(space_, m, by_H);
+        const Extent a = extent_rate(space_, m, by_normal),
+                     b = stretches ? stretch_rate(space_, m) : extent_rate(space_, m, by_H);
+        Eigen::Vector2d x(0, 0);
         if (area && volume) {
             Eigen::Matrix2d J;
             J << a.area, b.area, a.volume, b.volume;
-            const Eigen::Vector2d x = J.inverse() * missing;
-            sum += x[0] * by_normal + x[1] * by_H;
+            x = J.inverse() * missing;
+        } else if (volume) {
+            x[0] = missing[1] / a.volume;
         } else {
-            sum += volume ? VectorField(missing[1] / a.volume * by_normal) : VectorField(missing[0] / b.area * by_H);
+            x[1] = missing[0] / b.area;
         }
+        out.displacement += x[0] * by_normal;
+        if (stretches)
+            out.stretch += x[1];
+        else
+            out.displacement += x[1] * by_H;
     }
 }
 

@@ -47,7 +47,8 @@ public:
     int nodes() const { return space_.size(); }
 
     const CurvedMesh& mesh() const { return mesh_; }
-    CurvedMesh mesh(const VectorField& X) const { return with_nodes(mesh_, X); }
+    CurvedMesh mesh(const VectorField& X, double period) const;
+    CurvedMesh mesh(const MotionState& s) const { return mesh(s.X, s.period); }
     MotionFields fields(const CurvedMesh& mesh);
     // (u.nu, phi) of a velocity as in MotionState.
     Eigen::VectorXd flux(const Eigen::VectorXd& u, const CurvedMesh& mesh, const MotionFields& fields) const;
@@ -73,15 +74,17 @@ public:
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
     // The rates of area and volume that take `begin` to the conserved values in a time `span`: linearised about the
     // surface `at`, as seen from the expected `end`, plus `missed`, which a step like this is expected to miss.
-    Extent rate_to_keep(const CurvedMesh& at, const VectorField& begin, const VectorField& end, double span,
+    Extent rate_to_keep(const CurvedMesh& at, const CurvedMesh& begin, const CurvedMesh& end, double span,
                         const Extent& missed) const;
-    // Corrects area and volume to the conserved values by displacements along nu and H nu; returns the previous defect.
-    // SolveError if they cannot be met to 1e-8.
+    // Corrects area and volume to the conserved values by displacements along nu and H nu, or along nu and z e_z where
+    // both are kept and the period is free; returns these and the previous defect. SolveError if they cannot be met to
+    // 1e-8.
     struct Correction {
-        VectorField displacement;
+        VectorField displacement;  // without the stretch
+        double stretch = 0;
         Extent lacking;
     };
-    Correction correction(const VectorField& X, const MotionFields& fields, bool with_volume) const;
+    Correction correct(const MotionFields& fields, bool with_volume, MotionState& s) const;
 
 private:
     // 1 and x at the nodes, or their integrals against each function: one column a node.

@@ -10,7 +10,7 @@ namespace {
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
 constexpr int most_iterations = 20;      // of that, before it is factored
-constexpr int most_multipliers = 3;      // lambda, tension, supply
+constexpr int most_multipliers = 4;      // lambda, tension, supply, stretch
 
 }  // namespace
 
@@ -21,40 +21,43 @@ StepSolver::StepSolver(MovingSurface& surface)
       gmres_(unknowns_.nodes()) {}
 
 StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
-    const CurvedMesh at = surface_.mesh(stage.X);
+    const CurvedMesh at = surface_.mesh(stage.X, stage.period);
     const SurfaceLaw& law = surface_.law();
-    StepBase base{&at,
-                  surface_.fields(at),
-                  stage.X - stage.Xbar,
-                  stage.w,
-                  stage.u,
-                  stage.ubar,
-                  stage.te,
-                  curvature_stabilisation,
-                  law.keeps_area ? stage.tension : law.tension.at(stage.time),
-                  expected_supply(at, stage.u)};
+    const double stretch = at.period > 0 ? (stage.period - stage.period_bar) / stage.period : 0;
+    StepBase base{.mesh = &at,
+                  .fields = surface_.fields(at),
+                  .displacement = stage.X - stage.Xbar - stretched(stage.X, stretch),
+                  .mesh_velocity = stage.w,
+                  .velocity = stage.u,
+                  .past = stage.ubar,
+                  .te = stage.te,
+                  .curvature_stabilisation = curvature_stabilisation,
+                  .tension = law.keeps_area ? stage.tension : law.tension.at(stage.time),
+                  .stretch = stretch,
+                  .supply = expected_supply(at, stage)};
     StageSolution out;
     out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
     const Eigen::VectorXd x = solve(base, stage.time, rate, out);
     out.u = x.head(stage.u.size());
     out.w = surface_.mesh_velocity(at, base.fields, mesh_flux(base, out.u), stage.relaxation);
-    out.X = stage.Xbar + stage.te * out.w;
+    out.X = stage.Xbar + stage.te * (out.w + stretched(stage.X, out.stretch));
+    out.period = stage.period_bar + stage.te * out.stretch * stage.period;
     out.fields = std::move(base.fields);
     return out;
 }
 
 // div_P u of a membrane with inertia that a reservoir feeds: what it brings has mass.
-double StepSolver::expected_supply(const CurvedMesh& at, const Eigen::VectorXd& u) const {
+double StepSolver::expected_supply(const CurvedMesh& at, const Stage& stage) const {
     if (!surface_.law().reservoir || surface_.law().inertia == 0) return 0;
-    const VectorField nodal = u.reshaped(surface_.nodes(), 3).transpose();
-    return extent_rate(surface_.space(), at, nodal).area / extent(surface_.space(), at).area;
+    const SurfaceSpace& space = surface_.space();
+    const VectorField u = stage.u.reshaped(surface_.nodes(), 3).transpose();
+    const double along = stage.stretch != 0 ? stage.stretch * stretch_rate(space, at).area : 0;
+    return (extent_rate(space, at, u).area + along) / extent(space, at).area;
 }
 
 KeptExtent StepSolver::keep_extent(const StageSolution& solved, MotionState& to) const {
-    const auto [displacement, lacked] = surface_.correction(to.X, solved.fields, solved.keeps_volume);
-    const double energy = work(displacement, to, solved.fields);
-    to.X += displacement;
-    return {energy, lacked};
+    const auto by = surface_.correct(solved.fields, solved.keeps_volume, to);
+    return {work(by, to, solved.fields), by.lacking};
 }
 
 // The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without
@@ -74,34 +77,53 @@ void StepSolver::make_symmetric(const StepBase& base) {
             A.valuePtr()[k] *= scale[A.innerIndexPtr()[k]];
     });
     system_.b.array() *= scale.array();
+    if (surface_.law().free_period) system_.stretch.column.array() *= scale.array();
 }
 
 // With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
 // also a row: rigid motions; lambda; the tension of an area that is kept as a whole; the supply of a reservoir, whose
-// row is the mean of p.
+// row is the mean of p; the stretch of a free period.
 Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Extent& rate, StageSolution& out) {
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
     assemble(surface_.space(), unknowns_, law, surface_.bending(), base, system_);
     if (law.inextensible && control.area && !law.reservoir)
         system_.b -= rate.area / *control.area * system_.pressure_load;
-    if (!law.inextensible) system_.b -= law.tension.at(time) * system_.stretch;
+    if (!law.inextensible) system_.b -= law.tension.at(time) * system_.widening;
     system_.b += law.pressure.at(time) * system_.flux;
     make_symmetric(base);
     const Eigen::MatrixXd rigid = surface_.open_rigid_motions(*base.mesh);
-    Eigen::MatrixXd border = Eigen::MatrixXd::Zero(unknowns_.size(), rigid.cols() + most_multipliers);
-    border.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
-    Eigen::VectorXd held = Eigen::VectorXd::Zero(border.cols());
+    const Eigen::Index most = rigid.cols() + most_multipliers;
+    BorderedSolver::Border border{Eigen::MatrixXd::Zero(unknowns_.size(), most),
+                                  {},
+                                  Eigen::MatrixXd::Zero(most, most),
+                                  Eigen::VectorXd::Zero(most)};
+    border.C.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
+    border.R = border.C;
     Eigen::Index n = rigid.cols();
-    const auto add = [&](const Eigen::VectorXd& column, double value) {
-        border.col(n) = column, held[n] = value;
+    const auto add = [&](const Eigen::VectorXd& column, const Eigen::VectorXd& row, double value) {
+        border.C.col(n) = column, border.R.col(n) = row, border.d[n] = value;
         return n++;
     };
-    const Eigen::Index lambda = out.keeps_volume ? add(system_.flux, control.volume ? rate.volume : 0) : -1;
-    const Eigen::Index tension = law.keeps_area ? add(system_.stretch, control.area ? rate.area : 0) : -1;
-    if (law.reservoir) add(system_.pressure_load, -law.tension.at(time) * system_.pressure_load.sum());
-    const auto [x, y] = solver_.solve(system_.A, system_.b, border.leftCols(n), held.head(n));
+    const auto add_both = [&](const Eigen::VectorXd& column, double value) { return add(column, column, value); };
+    const Eigen::Index lambda = out.keeps_volume ? add_both(system_.flux, control.volume ? rate.volume : 0) : -1;
+    const Eigen::Index tension = law.keeps_area ? add_both(system_.widening, control.area ? rate.area : 0) : -1;
+    if (law.reservoir) add_both(system_.pressure_load, -law.tension.at(time) * system_.pressure_load.sum());
+    Eigen::Index stretch = -1;
+    if (law.free_period) {
+        const StretchTerms& s = system_.stretch;
+        // What the tension of a reservoir does is in p.
+        const double loads = law.potential(time, {law.reservoir ? 0 : s.rate.area, s.rate.volume, s.rate.length});
+        stretch = add(s.column, s.row, -s.energy - loads);
+        border.D(stretch, stretch) = s.own;
+        if (lambda >= 0) border.D(lambda, stretch) = border.D(stretch, lambda) = s.rate.volume;
+        if (tension >= 0) border.D(tension, stretch) = border.D(stretch, tension) = s.rate.area;
+    }
+    border.C.conservativeResize(Eigen::NoChange, n), border.R.conservativeResize(Eigen::NoChange, n);
+    border.D.conservativeResize(n, n), border.d.conservativeResize(n);
+    const auto [x, y] = solver_.solve(system_.A, system_.b, border);
     if (lambda >= 0) out.lambda = y[lambda];
+    if (stretch >= 0) out.stretch = y[stretch];
     if (tension >= 0) out.tension = y[tension];
     if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
     return x;
@@ -134,13 +156,21 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
-// -(b, d) and that of the loads, to first order the free energy that a displacement of the nodes takes.
-double StepSolver::work(const VectorField& d, const MotionState& at, const MotionFields& fields) const {
+// -(b, d) and that of the loads, to first order the free energy that a correction takes.
+double StepSolver::work(const MovingSurface::Correction& by, const MotionState& at, const MotionFields& fields) const {
     const int n = surface_.nodes();
-    const CurvedMesh mesh = surface_.mesh(at.X);
-    double sum = surface_.law().potential(at.time, extent_rate(surface_.space(), mesh, d));
-    if (!surface_.law().flows) return sum - system_.force.head(n).dot(d.cwiseProduct(fields.normal).colwise().sum());
-    for (int i = 0; i < 3; ++i) sum -= system_.force.segment(i * n, n).dot(d.row(i));
+    const SurfaceSpace& space = surface_.space();
+    const SurfaceLaw& law = surface_.law();
+    double sum = law.potential(at.time, extent_rate(space, surface_.mesh(at), by.displacement));
+    if (by.stretch != 0) {
+        const StretchTerms& s = system_.stretch;
+        double energy = s.energy + law.potential(at.time, s.rate);
+        if (unknowns_.H >= 0) energy += s.row.segment(unknowns_.H, n).dot(fields.H);
+        if (unknowns_.K >= 0) energy += s.row.segment(unknowns_.K, n).dot(fields.K);
+        sum += by.stretch * energy;
+    }
+    if (!law.flows) return sum - system_.force.head(n).dot(by.displacement.cwiseProduct(fields.normal).colwise().sum());
+    for (int i = 0; i < 3; ++i) sum -= system_.force.segment(i * n, n).dot(by.displacement.row(i));
     return sum;
 }
 

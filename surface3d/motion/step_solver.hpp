@@ -8,12 +8,14 @@
 
 namespace tubule::surface3d {
 
-// At the time of a stage X = Xbar + te w and u_t = (u - ubar)/te.
+// At the time of a stage X = Xbar + te (w + stretch z e_z) and u_t = (u - ubar)/te.
 struct Stage {
     double time, te;
     VectorField Xbar;
+    double period_bar;
     Eigen::VectorXd ubar;
-    VectorField X, w;   // expected positions, velocity of the nodes,
+    VectorField X, w;  // expected positions, velocity of the nodes,
+    double period, stretch;
     Eigen::VectorXd u;  // velocity,
     double tension;     // of an area that is kept as a whole
     double relaxation;  // time in which the mesh becomes even; shorter ones than about te overshoot
@@ -22,8 +24,8 @@ struct Stage {
 struct StageSolution {
     VectorField X, w;
     Eigen::VectorXd u, p;
-    double lambda = 0, tension = 0;  // as those of MotionState
-    MotionFields fields;             // of the surface that was expected
+    double lambda = 0, tension = 0, period = 0, stretch = 0;  // as those of MotionState
+    MotionFields fields;                                      // of the surface that was expected
     bool keeps_volume = false;
 };
 
@@ -49,10 +51,10 @@ public:
 
 private:
     Eigen::VectorXd solve(const StepBase& base, double time, const Extent& rate, StageSolution& out);
-    double expected_supply(const CurvedMesh& at, const Eigen::VectorXd& u) const;
+    double expected_supply(const CurvedMesh& at, const Stage& stage) const;
     Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     void make_symmetric(const StepBase& base);
-    double work(const VectorField& displacement, const MotionState& at, const MotionFields& fields) const;
+    double work(const MovingSurface::Correction& by, const MotionState& at, const MotionFields& fields) const;
 
     MovingSurface& surface_;
     MotionUnknowns unknowns_;

@@ -19,13 +19,15 @@ struct SurfaceLaw : MotionLaw {
 
     // F - E of a surface at a time, theory.md (3.16), and how fast its loads change it.
     double potential(double time, const Extent& of) const {
-        return tension.at(time) * of.area - pressure.at(time) * of.volume;
+        return tension.at(time) * of.area - pressure.at(time) * of.volume - force.at(time) * of.length;
     }
     double power(double time, const Extent& of) const {
-        return tension.slope(time) * of.area - pressure.slope(time) * of.volume;
+        return tension.slope(time) * of.area - pressure.slope(time) * of.volume - force.slope(time) * of.length;
     }
     // The first time after this at which a load changes its slope, infinite if there is none.
-    double next_kink(double time) const { return std::min(tension.next_kink(time), pressure.next_kink(time)); }
+    double next_kink(double time) const {
+        return std::min({tension.next_kink(time), pressure.next_kink(time), force.next_kink(time)});
+    }
 };
 
 }  // namespace tubule::surface3d

@@ -97,7 +97,7 @@ void MotionAttempt::set_moving() {
         const MotionState soon = scheme_->step(state_, moment * memory_.next_step).state;
         if (!is_finite(soon)) return;
         state_.u = soon.u, state_.w = soon.w;
-        state_.p = soon.p, state_.lambda = soon.lambda, state_.tension = soon.tension;
+        state_.p = soon.p, state_.lambda = soon.lambda, state_.tension = soon.tension, state_.stretch = soon.stretch;
     } catch (const SolveError&) {
     }
 }
@@ -120,7 +120,7 @@ void MotionAttempt::resume(const Restart& restart) {
 // Whether it is worth while to go on at all.
 void MotionAttempt::check_start() {
     stop_ = check_state();
-    if (!stop_) stop_ = impossible(now_.bending, state_.X);
+    if (!stop_) stop_ = impossible(now_.bending, state_);
     if (!stop_) stop_ = check_crossing(true);
 }
 
@@ -129,14 +129,14 @@ void MotionAttempt::look() {
 }
 
 // A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
-std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const VectorField& X) const {
-    return find_impossible_motion(o, surface().mesh(X), out_.reported() ? 0.01 : 0.05, state_.time);
+std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const MotionState& s) const {
+    return find_impossible_motion(o, surface().mesh(s), out_.reported() ? 0.01 : 0.05, state_.time);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
     const double t = state_.time, E_ref = memory_.scale.reference_energy;
     const double then = m.free_energy + m.kinetic - memory_.balance.work - work_of(next, m);
-    if (const auto spurious = impossible(m.bending, next.state.X))
+    if (const auto spurious = impossible(m.bending, next.state))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
     if (const auto rises = find_rise_in_step((then - total()) / E_ref, case_.accuracy.energy, t, next.state.step))
         return Refusal{0.25, *rises};
@@ -160,7 +160,7 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
                             "ask for less accuracy, or use more elements"}};
-        const CurvedMesh mesh = surface().mesh(next.state.X);
+        const CurvedMesh mesh = surface().mesh(next.state);
         if (auto fold = find_fold(mesh_quality(mesh))) {
             fold->time = t;
             return Refusal{0.25, *fold};
@@ -186,13 +186,13 @@ double MotionAttempt::since_kink() const {
 // Of the loads in a step, in which none changes its slope.
 double MotionAttempt::work_of(const MotionStep& next, const MotionMeasures& m) const {
     const auto power = [&](const Extent& e) { return surface().law().power(state_.time, e); };
-    return sum_of_step(next.state.step, state_.step, power({m.bending.area, m.bending.volume}),
-                       power({now_.bending.area, now_.bending.volume}), power(memory_.balance.past));
+    return sum_of_step(next.state.step, state_.step, power({m.bending.area, m.bending.volume, next.state.period}),
+                       power(extent_now()), power(memory_.balance.past));
 }
 
 void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.work += work_of(next, m);
-    memory_.balance.past = {now_.bending.area, now_.bending.volume};
+    memory_.balance.past = extent_now();
     memory_.balance.dissipated +=
         sum_of_step(next.state.step, since_kink(), m.dissipation, now_.dissipation, memory_.balance.dissipation_past);
     memory_.balance.dissipation_past = now_.dissipation;
@@ -223,10 +223,10 @@ bool MotionAttempt::wants_new_mesh() const {
 void MotionAttempt::make_new_mesh() {
     memory_.count.mesh_since = memory_.count.steps;
     const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
-    const auto found = remesh(surface().mesh(state_.X), state_.u.reshaped(n, d).transpose(), {});
+    const auto found = remesh(surface().mesh(state_), state_.u.reshaped(n, d).transpose(), {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
-    const double time = state_.time, energy = comparable(), before = total();
+    const double time = state_.time, stretch = state_.stretch, energy = comparable(), before = total();
     const Eigen::VectorXd momenta = surface().momenta(state_);
     const int old_elements = summary.elements;
     std::unique_ptr<TimeScheme> old = std::move(scheme_);
@@ -241,7 +241,7 @@ void MotionAttempt::make_new_mesh() {
         throw;
     }
     ++memory_.count.meshes;
-    state_.time = time;
+    state_.time = time, state_.stretch = stretch;
     look();
     memory_.error += std::abs(comparable() - energy);
     memory_.balance.lowest_total += std::max(total() - before, 0.0);
@@ -305,10 +305,10 @@ std::optional<StopReport> MotionAttempt::check_state() const {
 // is no deeper than that.
 std::optional<StopReport> MotionAttempt::check_crossing(bool at_output) {
     const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / element_order(case_);
-    memory_.moved += state_.step * now_.speed;
+    memory_.moved += state_.step * (now_.speed + std::abs(state_.stretch) * state_.period);
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
     try {
-        auto crossing = find_self_intersection(surface().mesh(state_.X));
+        auto crossing = find_self_intersection(surface().mesh(state_));
         memory_.moved = 0;
         if (!crossing) return std::nullopt;
         crossing->time = state_.time;
@@ -378,7 +378,7 @@ void MotionAttempt::write_frame() {
 }
 
 Record MotionAttempt::record() {
-    const std::size_t mesh = out_.mesh(cells_of(surface().mesh(state_.X)));
+    const std::size_t mesh = out_.mesh(cells_of(surface().mesh(state_)));
     Record out = motion_record(surface(), state_, now_, memory_, mesh);
     if (error_) error_->save(out);
     return out;

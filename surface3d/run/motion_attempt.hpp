@@ -40,7 +40,7 @@ public:
     const std::optional<StopReport>& stop() const { return stop_; }
     const MotionSettings& settings() const { return memory_.settings; }
     const MotionState& state() const { return state_; }  // no nodes: it could not begin
-    CurvedMesh mesh() const { return scheme_->surface().mesh(state_.X); }
+    CurvedMesh mesh() const { return scheme_->surface().mesh(state_); }
     Record saved() const { return state_record(state_, memory_); }
     // Largest errors, absolute: of the energy; of the balance with dissipation.
     double error() const { return memory_.error; }
@@ -62,7 +62,7 @@ private:
     // A step.
     std::optional<StopReport> step();
     std::optional<Refusal> attempt(double tau);
-    std::optional<StopReport> impossible(const Observables& o, const VectorField& X) const;
+    std::optional<StopReport> impossible(const Observables& o, const MotionState& s) const;
     std::optional<Refusal> judge(const MotionStep& next, const MotionMeasures& m) const;
     double work_of(const MotionStep& next, const MotionMeasures& m) const;
     double since_kink() const;
@@ -90,6 +90,7 @@ private:
     MovingSurface& surface() const { return scheme_->surface(); }
     // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
     double total() const { return comparable() + now_.kinetic; }
+    Extent extent_now() const { return {now_.bending.area, now_.bending.volume, state_.period}; }
     double comparable() const { return now_.free_energy - memory_.balance.work; }
     double moment_of_time() const { return 1e-12 * case_.time.end; }
     double left_until_output() const { return outputs_.next() - state_.time; }

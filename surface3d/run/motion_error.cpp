@@ -99,7 +99,8 @@ double MotionError::error_of_start(double energy) const {
     if (!start_.resizable()) return 0;
     try {
         const StartMesh finer = start_.mesh(static_cast<int>(much_finer * of_.elements), element_order(case_));
-        return std::abs(free_energy(case_, observe_start(case_, finer)) - energy) * much_finer / (much_finer - 1);
+        return std::abs(free_energy(case_, observe_start(case_, finer), finer.mesh.period) - energy) * much_finer /
+               (much_finer - 1);
     } catch (const TooLarge&) {
         return 0;
     }

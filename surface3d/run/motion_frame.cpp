@@ -11,7 +11,8 @@ template <class Fields, class State>
 void state_fields(Fields&& f, State& s) {
     const auto nodes = s.X.cols();
     f.number("restart_step", s.step), f.number("restart_lambda", s.lambda);
-    f.number("restart_tension", s.tension);
+    f.number("restart_tension", s.tension), f.number("restart_period", s.period);
+    f.number("restart_stretch", s.stretch);
     f.array("restart_w", s.w, nodes), f.array("restart_u", s.u), f.optional_array("restart_p", s.p);
 }
 template <class Fields, class Memory>
@@ -25,7 +26,7 @@ void memory_fields(Fields&& f, Memory& m) {
         f.number("restart_lowest_total", m.balance.lowest_total);
     f.number("restart_total_start", m.balance.total_start), f.number("restart_dissipated", m.balance.dissipated);
     f.number("restart_work", m.balance.work), f.number("restart_area_past", m.balance.past.area);
-    f.number("restart_volume_past", m.balance.past.volume);
+    f.number("restart_volume_past", m.balance.past.volume), f.number("restart_length_past", m.balance.past.length);
     f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
     f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);
     f.number("restart_dissipation_past", m.balance.dissipation_past), f.number("restart_moved", m.moved);

@@ -25,7 +25,7 @@ struct MotionScale {
 struct MotionBalance {
     double total_start = 0, lowest_total = 0;  // then and since
     double work = 0;                           // of the loads: dF at constant area and volume
-    Extent past;                               // area and volume at the step before
+    Extent past;                               // area, volume and period at the step before
     double dissipated = 0, corrected = 0;
     double dissipation_past = 0;  // rate then
     double defect = 0;            // largest defect of the dissipation identity

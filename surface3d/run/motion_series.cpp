@@ -19,6 +19,7 @@ SeriesTable<MotionRow> make_table() {
         {"identity_defect", [](const MotionRow& r) { return r.identity_defect; }},
         {"area", [](const MotionRow& r) { return r.measures.bending.area; }},
         {"volume", [](const MotionRow& r) { return r.measures.bending.volume; }},
+        {"height", [](const MotionRow& r) { return r.measures.height; }},
         {"volume_drift", [](const MotionRow& r) { return r.volume_drift; }},
         {"r_min", [](const MotionRow& r) { return r.measures.r_min; }},
         {"r_max", [](const MotionRow& r) { return r.measures.r_max; }},

@@ -45,9 +45,9 @@ int triangles_for_start(const Case& c, const Start& start) {
         StartMesh mesh = start.mesh(n, order);
         const Observables o = observe_start(c, mesh), before = observe_start(c, coarse);
         other.coarser_by = std::max(1.0 * mesh.mesh.triangles() / coarse.mesh.triangles(), least_longer / fewer);
-        const double error =
-            std::abs(free_energy(c, o) - free_energy(c, before)) / (growth_in_space(other, smooth_order) - 1);
-        const bool more = later * error > c.accuracy.energy * reference_energy(c, o);
+        const double error = std::abs(free_energy(c, o, mesh.mesh.period) - free_energy(c, before, mesh.mesh.period)) /
+                             (growth_in_space(other, smooth_order) - 1);
+        const bool more = later * error > c.accuracy.energy * reference_energy(c, o, mesh.mesh.period);
         if (!more || fewer * n > most_first_triangles) return n;
         coarse = std::move(mesh);
     }

@@ -19,10 +19,11 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed, d
 }
 
 // theory.md (11.1)
-double own_scale(const Case& c, const Observables& o) {
+double own_scale(const Case& c, const Observables& o, double period) {
     const MotionLaw law = motion_law(c.model);
-    const double loads = law.tension.largest() * o.area + law.pressure.largest() * std::abs(o.volume);
-    return std::max(std::abs(free_energy(c, o)), o.magnitude + loads);
+    const double loads =
+        law.tension.largest() * o.area + law.pressure.largest() * std::abs(o.volume) + law.force.largest() * period;
+    return std::max(std::abs(free_energy(c, o, period)), o.magnitude + loads);
 }
 
 }  // namespace
@@ -47,21 +48,22 @@ Observables observe_start(const Case& c, const StartMesh& start) {
     return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
 }
 
-double free_energy(const Case& c, const Observables& o) {
-    return o.energy + SurfaceLaw(motion_law(c.model)).potential(begin_time(c), {o.area, o.volume});
+double free_energy(const Case& c, const Observables& o, double period) {
+    return o.energy + SurfaceLaw(motion_law(c.model)).potential(begin_time(c), {o.area, o.volume, period});
 }
 
-double reference_energy(const Case& c, const Observables& o) {
-    return c.handover ? c.handover->reference_energy : own_scale(c, o);
+double reference_energy(const Case& c, const Observables& o, double period) {
+    return c.handover ? c.handover->reference_energy : own_scale(c, o, period);
 }
 
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
-    memory.scale.reference_energy = reference_energy(c, o);
-    memory.scale.relaxation = c.surface.relaxation.value_or(
-        relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0, own_scale(c, o)));
+    memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);
+    memory.scale.relaxation =
+        c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0,
+                                                                  own_scale(c, o, start.mesh.period)));
     memory.scale.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
 }
 

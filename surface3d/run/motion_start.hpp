@@ -15,8 +15,8 @@ VectorField start_velocity(const Case& c, const StartMesh& start);
 Observables observe_start(const Case& c, const StartMesh& start);
 
 // F at the start, and E_ref, theory.md (11.1).
-double free_energy(const Case& c, const Observables& start);
-double reference_energy(const Case& c, const Observables& start);
+double free_energy(const Case& c, const Observables& start, double period);
+double reference_energy(const Case& c, const Observables& start, double period);
 
 // Area, volume, reference energy, relaxation of the mesh, how well H is known.
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);

@@ -34,7 +34,7 @@ struct Scene {
           solver(dynamic_cast<OneStageScheme&>(*scheme).solver()),
           state(surface.start(mesh)) {
         for (int i = 0; i < 3; ++i) before = std::exchange(state, scheme->step(state, tau).state);
-        mesh = surface.mesh(state.X);
+        mesh = surface.mesh(state);
         fields = surface.fields(mesh);
         base = {&mesh, fields, state.X - before.X, state.w, state.u, state.u, tau};
         assemble(surface.space(), solver.unknowns(), fluid, energy, base, system);

@@ -28,16 +28,14 @@ end = 0.1
 
 std::vector<std::string> open_sets(const std::string& kind) {
     const std::string area = kind == "gradient-flow" ? "free" : "reservoir";
-    return {"model.kind=" + kind,
-            "model.volume=free",
-            "model.area=" + area,
+    return {"model.kind=" + kind, "model.volume=free", "model.area=" + area,
             "model.tension={time = [0.02, 0.05], value = [0.1, 0.6]}",
             "model.pressure={time = [0, 0.03, 0.07], value = [0, 0.8, 0.5]}"};
 }
 
 TEST(EnsembleRuns, TheFreeEnergyBalances) {
-    // theory.md (3.16): F + kinetic energy - work falls by what dissipates; no step crosses a kink; F is what it is made
-    // of.
+    // theory.md (3.16): F + kinetic energy - work falls by what dissipates; no step crosses a kink; F is what it is
+    // made of.
     for (const std::string kind : {"gradient-flow", "overdamped", "stokes", "fluid"}) {
         SCOPED_TRACE(kind);
         const Outcome o = run_case(wavy, open_sets(kind));
@@ -105,6 +103,73 @@ TEST(EnsembleRuns, NothingIsStationaryBeforeTheLastKink) {
     EXPECT_LT(o.last("area"), 0.98 * o.series("area").front());
 }
 
+const std::string tube = R"(
+[energy]
+k20 = 0.5
+k42 = 0.05
+H0 = -0.5
+[shape]
+kind = "tube"
+radius = 1
+length = 3
+mode = [{amplitude = 0.15, n = 1}, {amplitude = 0.05, n = 1, m = 2}]
+[discretisation]
+elements = 96
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.1
+)";
+
+std::vector<std::string> pulled(const std::string& kind) {
+    return {"model.kind=" + kind, "model.volume=fixed", "model.area=fixed", "model.period=free",
+            "model.force={time = [0.03, 0.06], value = [0, 6]}"};
+}
+
+TEST(EnsembleRuns, ATubeIsPulled) {
+    // theory.md (3.16), (3.20): the period follows the force, area and volume are kept, F - work falls by what
+    // dissipates. Frames have the period of their time.
+    for (const std::string kind : {"gradient-flow", "overdamped", "stokes", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome o = run_case(tube, pulled(kind));
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double E_ref = o.summary.reference_energy;
+        const auto F = o.series("free_energy"), E = o.series("energy"), L = o.series("height"), N = o.series("force"),
+                   A = o.series("area"), V = o.series("volume"), defect = o.series("identity_defect");
+        for (std::size_t i = 0; i < F.size(); ++i) {
+            EXPECT_NEAR(F[i], E[i] - N[i] * L[i], 1e-12 * E_ref);
+            EXPECT_NEAR(A[i] / A[0], 1, 1e-8);
+            EXPECT_NEAR(V[i] / V[0], 1, 1e-8);
+            EXPECT_LT(std::abs(defect[i]), 2e-3 * E_ref);
+        }
+        EXPECT_GT(std::abs(L.back() / L.front() - 1), kind == "fluid" ? 1e-4 : 2e-3);
+        ASSERT_EQ(o.watch.meshes.size(), o.watch.frames.size());
+        EXPECT_EQ(o.watch.meshes.back().period, L.back());
+        EXPECT_NE(o.watch.meshes.front().period, L.back());
+    }
+}
+
+TEST(EnsembleRuns, APulledTubeGoesOn) {
+    for (const auto& [kind, scheme] :
+         {std::pair<std::string, std::string>{"gradient-flow", "bdf2"}, {"stokes", "bdf"}, {"fluid", "alpha"}}) {
+        SCOPED_TRACE(kind);
+        std::vector<std::string> sets = pulled(kind);
+        sets.push_back("discretisation.scheme=" + scheme);
+        const Outcome whole = run_case(tube, sets);
+        Outcome first = begin(tube, sets);
+        first.watch.most_rows = whole.watch.rows.size() / 2;
+        first.summary = run(first.c, first.watch);
+        ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
+        ASSERT_TRUE(first.watch.saved);
+        const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
+        Outcome second = begin(tube, sets);
+        second.summary = run(second.c, second.watch, &restart);
+        ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+        for (const char* name : {"free_energy", "work", "identity_defect", "energy_error", "height"})
+            EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+    }
+}
+
 std::string refusal(const std::vector<std::string>& sets) {
     try {
         begin(wavy, sets);
@@ -125,6 +190,8 @@ TEST(EnsembleRuns, WhatASchemeDoesNotHaveIsRefused) {
     EXPECT_EQ(refusal(paper), "");
     EXPECT_NE(with("model.pressure=1").find("must not be \"paper\" with model.pressure"), std::string::npos);
     EXPECT_NE(with("model.area=reservoir").find("must not be \"paper\" with model.area"), std::string::npos);
+    // And what a shape does not have.
+    EXPECT_NE(refusal({"model.volume=fixed", "model.period=free"}).find("only a tube has a period"), std::string::npos);
 }
 
 }  // namespace

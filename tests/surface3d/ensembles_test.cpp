@@ -7,6 +7,7 @@
 #include <complex>
 
 #include "common/theory/dispersion.hpp"
+#include "surface3d/fem/projection.hpp"
 #include "tests/surface3d/motion.hpp"
 
 namespace tubule::surface3d {
@@ -44,8 +45,8 @@ TEST(Ensembles, ATubeRestsAtItsTensionAndPressure) {
     const double R = 0.8, tension = 0.4, pressure = pressure_of_tube(all_terms, R, tension);
     for (const ModelKind kind : kinds) {
         SCOPED_TRACE(static_cast<int>(kind));
-        Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4),
-                      open_model(kind, tension, pressure), all_terms);
+        Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4), open_model(kind, tension, pressure),
+                      all_terms);
         motion.until(0.2, 20);
         const MotionMeasures m = motion.measures();
         EXPECT_NEAR(m.r_min, R, 2e-5);
@@ -69,8 +70,8 @@ TEST(Ensembles, ASphereRestsAtItsTensionAndPressure) {
     const double R = 1.2, tension = 0.3, pressure = pressure_of_sphere(all_terms, R, tension);
     for (const ModelKind kind : kinds) {
         SCOPED_TRACE(static_cast<int>(kind));
-        Motion motion(mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(3), 4),
-                      open_model(kind, tension, pressure), all_terms);
+        Motion motion(mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(3), 4), open_model(kind, tension, pressure),
+                      all_terms);
         motion.until(0.2, 20);
         const MotionMeasures m = motion.measures();
         EXPECT_NEAR(m.r_min, R, 2e-5);
@@ -101,30 +102,177 @@ struct Wave {
     double tension;
     int m;
     double length;
-    int n_z, n_theta;
+    int n_z, n_theta, steps;
 };
 
+// Log-amplitudes of a single wave on a tube of radius 1, which area, volume and period together would freeze, to a
+// thousandth of its rate, the error of the mesh: theory.md (5.6), (5.9), (5.10), (5.12) at its tension.
+void expect_rate(const Wave& wave, const Model& model) {
+    const auto& [tension, m, length, n_z, n_theta, steps] = wave;
+    const double q = 2 * pi / length;
+    const theory::UniformTube tube{all_terms, 1, tension};
+    const double fastest = std::abs(theory::growth(tube, motion_law(model), q, m).roots.front()), end = 0.5 / fastest;
+    Motion motion(tube_mesh({.radius = 1, .length = length, .modes = {{1e-4, 1, m}}}, n_z, n_theta, 4), model,
+                  all_terms);
+    const double start = tube_wave(motion.mesh(), 1, m);
+    motion.until(end, steps);
+    const double found = tube_wave(motion.mesh(), 1, m) / start,
+                 exact = amplitude_at(end, tube, motion_law(model), q, m);
+    EXPECT_NEAR(std::log(found) / end, std::log(exact) / end, 1e-3 * fastest) << tension << ' ' << m;
+    EXPECT_GT(std::abs(std::log(exact)), 0.05);
+}
+
 TEST(Ensembles, WavesGrowOrDecayAtTheirRates) {
-    // A single wave, which area and volume would freeze: theory.md (5.6), (5.9), (5.10), (5.12), below and above the
-    // thresholds of pearling and buckling. Log-amplitudes to a thousandth of the rate, the error of the mesh.
-    const double R = 1, a0 = 1e-4;
+    // At the tension that is given, below and above the thresholds of pearling and buckling.
     for (const ModelKind kind : kinds)
-        for (const auto& [tension, m, length, n_z, n_theta] :
-             {Wave{-1.5, 0, 5, 8, 6}, {4.5, 0, 8, 10, 8}, {-4, 1, 5, 8, 12}, {2, 2, 5, 6, 12}}) {
-            const double q = 2 * pi / length;
-            const Model model = open_model(kind, tension, pressure_of_tube(all_terms, R, tension));
-            const MotionLaw law = motion_law(model);
-            const theory::UniformTube tube{all_terms, R, tension};
-            const double fastest = std::abs(theory::growth(tube, law, q, m).roots.front());
-            const double end = 0.5 / fastest;
-            Motion motion(tube_mesh({.radius = R, .length = length, .modes = {{a0, 1, m}}}, n_z, n_theta, 4), model,
-                          all_terms);
-            const double start = tube_wave(motion.mesh(), 1, m);
-            motion.until(end, 24);
-            const double found = tube_wave(motion.mesh(), 1, m) / start, exact = amplitude_at(end, tube, law, q, m);
-            EXPECT_NEAR(std::log(found) / end, std::log(exact) / end, 1e-3 * fastest)
-                << static_cast<int>(kind) << ' ' << tension << ' ' << m;
+        for (const Wave& wave :
+             {Wave{-1.5, 0, 5, 8, 6, 20}, {4.5, 0, 8, 10, 8, 40}, {-4, 1, 5, 8, 10, 40}, {2, 2, 5, 6, 12, 24}}) {
+            SCOPED_TRACE(static_cast<int>(kind));
+            expect_rate(wave, open_model(kind, wave.tension, pressure_of_tube(all_terms, 1, wave.tension)));
         }
+}
+
+// A tube whose period is free under a force: what is kept, of area and volume, at first.
+Model stretching_model(ModelKind kind, double force, bool area, bool volume) {
+    Model out = open_model(kind, {}, {});
+    out.free_period = true, out.force = force, out.keeps_volume = volume;
+    if (area) out.area = AreaRule::fixed;
+    return out;
+}
+
+CurvedMesh stretched_mesh(CurvedMesh mesh, double by) {
+    for (Eigen::Vector3d& x : mesh.nodes) x.z() *= 1 + by;
+    mesh.period *= 1 + by;
+    return mesh;
+}
+
+// d/ds of quantity(mesh stretched by s) at s = 0, fourth order in the step.
+template <class Quantity>
+double rate_of_stretch(const CurvedMesh& mesh, const Quantity& quantity) {
+    const double s = 1e-3;
+    const auto at = [&](double x) { return quantity(stretched_mesh(mesh, x)); };
+    return (8 * (at(s) - at(-s)) - (at(2 * s) - at(-2 * s))) / (12 * s);
+}
+
+TEST(FreePeriod, ItsTermsAreDerivatives) {
+    // theory.md (10.18), (10.19): of area, volume and energy of the mesh; the last as far as the mesh resolves it,
+    // since the force belongs to the energy of the smooth surface.
+    double error[2];
+    for (int i : {0, 1}) {
+        const CurvedMesh mesh =
+            tube_mesh({.radius = 1, .length = 4, .modes = {{0.2, 1, 0}, {0.1, 1, 2}}}, 6 << i, 8 << i, 4);
+        const SurfaceSpace space(mesh);
+        const Extent rate = stretch_rate(space, mesh);
+        EXPECT_NEAR(rate_of_stretch(mesh, [&](const CurvedMesh& m) { return extent(space, m).area; }), rate.area, 1e-8);
+        EXPECT_NEAR(rate_of_stretch(mesh, [&](const CurvedMesh& m) { return extent(space, m).volume; }), rate.volume,
+                    1e-8);
+        const auto energy = [&](const CurvedMesh& m) {
+            const MotionFields f = motion_fields(space, m, Projection(space, m));
+            return observe(space, m, {f.normal, {}, f.H, f.K}, all_terms).energy;
+        };
+        const double exact = rate_of_stretch(mesh, energy) / mesh.period;
+        const double found = Motion(mesh, {}, all_terms).measures().force;
+        error[i] = std::abs(found / exact - 1);
+    }
+    EXPECT_LT(error[1], 1e-3);
+    EXPECT_GT(error[0] / error[1], 4);
+}
+
+TEST(FreePeriod, ATubeRestsAtItsForce) {
+    // theory.md (3.21). What holds area and volume is measured.
+    const double R = 0.8, tension = 0.4;
+    const double pressure = pressure_of_tube(all_terms, R, tension),
+                 force = force_of_tube(all_terms, R, tension, pressure);
+    const CurvedMesh mesh = tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4);
+    for (const ModelKind kind : kinds)
+        for (const auto& [area, volume] : {std::pair{true, true}, {true, false}, {false, true}}) {
+            SCOPED_TRACE(testing::Message() << static_cast<int>(kind) << ' ' << area << ' ' << volume);
+            Model model = stretching_model(kind, force, area, volume);
+            if (!area) model.tension = tension;
+            if (!volume) model.pressure = pressure;
+            Motion motion(mesh, model, all_terms);
+            motion.until(0.1, 10);
+            const MotionMeasures m = motion.measures();
+            EXPECT_NEAR(motion.state.period, 2, 2e-4);
+            EXPECT_NEAR(m.r_max, R, 1e-4);
+            EXPECT_NEAR(m.tension, tension, 1e-3);
+            EXPECT_NEAR(m.pressure, pressure, 1e-3);
+        }
+}
+
+// Radius and period of a straight tube in gradient flow, by the classical method of Runge and Kutta. With one of area
+// and volume kept, theory.md (3.17) and (3.19) in closed form: (u, N) follow from R alone.
+struct Straight {
+    double R, L;
+};
+Straight straight_tube(double end, const Bending& energy, Straight start, double force, double pressure) {
+    // Area kept: sigma from the force, R_t = b + sigma H + P, and R L is constant.
+    const auto rate = [&](double R) {
+        const CurvatureJet<double> f = density(energy, -1 / R, 0.0);
+        const double sigma = (force + pi * R * R * pressure) / (2 * pi * R) - f.f;
+        return pressure - (f.f + f.H / R + sigma) / R;
+    };
+    const int steps = 2000;
+    const double h = end / steps;
+    double R = start.R;
+    for (int i = 0; i < steps; ++i) {
+        const double a = rate(R), b = rate(R + h / 2 * a), c = rate(R + h / 2 * b), d = rate(R + h * c);
+        R += h / 6 * (a + 2 * b + 2 * c + d);
+    }
+    return {R, start.R * start.L / R};
+}
+
+TEST(FreePeriod, AStraightTubeFollowsItsForce) {
+    const double R = 0.8, L = 2, pressure = 0.2, force = 7, end = 0.3;
+    const Straight exact = straight_tube(end, all_terms, {R, L}, force, pressure);
+    EXPECT_GT(std::abs(exact.L / L - 1), 0.1);
+    for (const auto& [scheme, order, most] : {std::tuple{scheme_named("euler"), 1, 2e-2},
+                                              {scheme_named("bdf2"), 2, 1e-3},
+                                              {scheme_named("alpha"), 2, 1e-3},
+                                              {scheme_named("bdf"), 2, 1e-3}}) {
+        SCOPED_TRACE(static_cast<int>(scheme));
+        Model model = stretching_model(ModelKind::gradient_flow, force, true, false);
+        model.pressure = pressure;
+        double error[2];
+        for (int i : {0, 1}) {
+            Motion motion(tube_mesh({.radius = R, .length = L, .modes = {}}, 4, 8, 4), model, all_terms, {}, scheme);
+            const double area = motion.measures().bending.area;
+            motion.until(end, 10 << i);
+            EXPECT_NEAR(motion.measures().bending.area / area, 1, 1e-10);
+            error[i] = std::abs(motion.state.period - exact.L);
+        }
+        EXPECT_GT(std::log2(error[0] / error[1]), order - 0.3);
+        EXPECT_LT(error[1], most * L);
+    }
+}
+
+TEST(FreePeriod, AtTheMeasuredForceNothingChanges) {
+    // A wave under a force at which the period stays for a moment, in all models: a run at fixed period measures it.
+    const CurvedMesh mesh = tube_mesh({.radius = 1, .length = 3, .modes = {{0.1, 1, 0}, {0.05, 1, 2}}}, 6, 8, 4);
+    for (const ModelKind kind : kinds) {
+        SCOPED_TRACE(static_cast<int>(kind));
+        Model held = stretching_model(kind, 0, true, true);
+        held.free_period = false, held.force = {};
+        Motion fixed(mesh, held, all_terms);
+        fixed.steps(1e-3, 1);
+        const double force = fixed.measures().force;
+        const auto stretch_at = [&](double f) {
+            Motion open(mesh, stretching_model(kind, f, true, true), all_terms);
+            open.steps(1e-3, 1);
+            return open.state.stretch;
+        };
+        EXPECT_LT(std::abs(stretch_at(force)), 0.02 * std::abs(stretch_at(force + 1)));
+    }
+}
+
+TEST(FreePeriod, WavesGrowOrDecayAtTheRatesOfItsForce) {
+    // Area and volume kept, the tension by theory.md (3.22): with a fixed period this wave would stay as it is.
+    for (const ModelKind kind : kinds) {
+        SCOPED_TRACE(static_cast<int>(kind));
+        const Wave wave{-4, 1, 5, 8, 10, 60};
+        const double pressure = pressure_of_tube(all_terms, 1, wave.tension);
+        expect_rate(wave, stretching_model(kind, force_of_tube(all_terms, 1, wave.tension, pressure), true, true));
+    }
 }
 
 }  // namespace

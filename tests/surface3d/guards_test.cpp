@@ -247,7 +247,7 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
             const MotionLaw law = motion_law({.kind = kind, .Re = 1, .gamma = 1, .keeps_volume = {}});
             const auto scheme = make_scheme(scheme_named("bdf2"), mesh, law, bending, control);
             const MotionState start = scheme->surface().start(mesh);
-            EXPECT_NEAR(extent(space, scheme->surface().mesh(start.X)).area / *control.area, 1, 1e-12);
+            EXPECT_NEAR(extent(space, scheme->surface().mesh(start)).area / *control.area, 1, 1e-12);
             // A sphere's radius grows by half as much, relatively, a tube's by as much.
             const double most = (start.X - node_positions(mesh)).colwise().norm().maxCoeff();
             EXPECT_NEAR(most, tube ? 1e-6 : 0.5e-6, 2e-7);
@@ -282,7 +282,7 @@ TEST(NewMesh, OnlyNearASphereAreAreaAndVolumeOneCondition) {
         EXPECT_EQ(scheme->surface().area_is_volume(*mesh, fields), mesh == &sphere);
         MotionState state = scheme->surface().start(*mesh);
         for (int i = 0; i < 3; ++i) state = scheme->step(state, 1e-5).state;
-        const Extent after = extent(space, scheme->surface().mesh(state.X));
+        const Extent after = extent(space, scheme->surface().mesh(state));
         EXPECT_NEAR(after.area / e.area, 1, 1e-11);
         EXPECT_NEAR(after.volume / e.volume, 1, mesh == &sphere ? 1e-6 : 1e-11);
     }

@@ -40,7 +40,7 @@ struct Motion {
         for (int i = 0; i < n; ++i) state = scheme->step(state, tau).state;
     }
     void until(double end, int n) { steps(end / n, n); }
-    CurvedMesh mesh() const { return surface.mesh(state.X); }
+    CurvedMesh mesh() const { return surface.mesh(state); }
     MotionMeasures measures() { return measure(surface, state); }
 
     Bending bending;

@@ -399,6 +399,32 @@ TEST(StepSolve, AgreesWithLu) {
     }
 }
 
+TEST(StepSolve, TakesRowsThatAreNotItsColumns) {
+    // As those of a stretch of the period; the residual of all equations, by GMRES and by factors.
+    AtRest rest(mesh_of(wavy, icosphere(2), 3), gradient_flow, {.k = {1, 0, 0.5}, .H0 = -0.5}, 1e-3);
+    rest.assembled();
+    scale(rest);
+    const Eigen::Index n = rest.system.b.size();
+    BorderedSolver::Border border{Eigen::MatrixXd::Zero(n, 2), Eigen::MatrixXd::Zero(n, 2), Eigen::MatrixXd(2, 2),
+                                  Eigen::Vector2d(0.02, -0.3)};
+    border.C.col(0) = border.R.col(0) = rest.system.flux;
+    for (Eigen::Index i = 0; i < n; ++i)
+        border.C(i, 1) = 0.01 * std::sin(0.7 * i), border.R(i, 1) = 0.02 * std::cos(0.3 * i);
+    border.D << 0, 0.4, 0.7, 1.5;
+    Eigen::SparseMatrix<double> twisted = rest.system.A;
+    for (int j = 0; j < twisted.outerSize(); ++j)
+        for (Eigen::SparseMatrix<double>::InnerIterator it(twisted, j); it; ++it)
+            it.valueRef() = it.row() == j ? 1e-6 : (it.row() < j ? 1 : -1) * (1 + 0.3 * std::sin(it.row() + 2.0 * j));
+    for (const bool directly : {false, true}) {
+        const Eigen::SparseMatrix<double>& A = directly ? twisted : rest.system.A;
+        BorderedSolver solver(rest.unknowns.pattern(), rest.unknowns.node_of_unknown());
+        const auto [x, y] = solver.solve(A, rest.system.b, border);
+        EXPECT_EQ(solver.fallbacks(), directly);
+        EXPECT_LT((A * x + border.C * y - rest.system.b).norm(), 1e-8 * rest.system.b.norm());
+        EXPECT_LT((border.R.transpose() * x + border.D * y - border.d).norm(), 1e-8);
+    }
+}
+
 TEST(StepSolve, HoldsRigidMotions) {
     // Stokes flow without friction: the matrix is singular, or nearly so, in the six rigid motions, which the border
     // holds at the rates given.

@@ -27,7 +27,7 @@ inline MotionControl kept(const CurvedMesh& mesh) {
 // Bending energy of the fields that drive the surface, and INT inertia u^2/2.
 inline double total_energy(const MovingSurface& surface, const MotionState& state) {
     const SurfaceSpace& space = surface.space();
-    const CurvedMesh mesh = surface.mesh(state.X);
+    const CurvedMesh mesh = surface.mesh(state);
     const MotionFields fields = motion_fields(space, mesh, Projection(space, mesh));
     double energy = observe(space, mesh, {fields.normal, {}, fields.H, fields.K}, surface.bending()).energy;
     if (surface.law().inertia == 0) return energy;

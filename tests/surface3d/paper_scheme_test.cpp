@@ -94,7 +94,7 @@ TEST(PaperScheme, IsOfFirstOrderInTimeAndLosesEnergyAtEveryStep) {
         const EnergyRun run = run_steps(*scheme, end / steps, steps);
         EXPECT_EQ(run.largest, run.first);
         const SurfaceSpace& space = scheme->surface().space();
-        const CurvedMesh at = scheme->surface().mesh(run.state.X);
+        const CurvedMesh at = scheme->surface().mesh(run.state);
         return observe(space, at, recover(space, at), bending).energy + std::pow(norm(space, at, run.state.u), 2) / 2;
     };
     const auto standard = [&](int steps) { return energy(scheme_named("bdf2"), steps); };

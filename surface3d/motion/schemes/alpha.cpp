@@ -21,6 +21,7 @@ struct AlphaMemory : ListedMemory<AlphaMemory> {
     PastState past;
     VectorField X_rate;  // the rates that are carried on
     Eigen::VectorXd u_rate;
+    double period_rate = 0;
     double lag = 0;  // by how much their time precedes that of the state
     Multipliers solved;
     Extent missed;  // expected defect of area and volume after the linear system of a step
@@ -30,6 +31,7 @@ struct AlphaMemory : ListedMemory<AlphaMemory> {
         PastState::fields(f, own.past, state);
         f.array("restart_X_rate", own.X_rate, state.X.cols());
         f.array("restart_u_rate", own.u_rate, state.u.size());
+        f.number("restart_period_rate", own.period_rate);
         f.number("restart_lag", own.lag);
         f.number("restart_solved_time", own.solved.time);
         f.optional_array("restart_solved_p", own.solved.p, state.p.size());
@@ -55,8 +57,9 @@ private:
         const StageSolution solved = solve(from, nullptr, stage, tau);
         auto next = std::make_shared<AlphaMemory>();
         next->past = PastState(from);
-        next->X_rate = solved.w;
+        next->X_rate = (solved.X - stage.Xbar) / stage.te;
         next->u_rate = (solved.u - stage.ubar) / stage.te;
+        next->period_rate = (solved.period - stage.period_bar) / stage.te;
         next->solved = {from.time + tau, solved.p, solved.lambda, solved.tension};
         MotionStep out = finish(from, nullptr, stage, solved, end_of(from, solved, stage, tau)).step;
         out.state.memory = std::move(next);
@@ -65,15 +68,24 @@ private:
 
     MotionStep next_step(const MotionState& from, const AlphaMemory& memory, double tau) {
         const AlphaNumbers a = alpha_numbers(tau, memory.lag, wave_factor(from, tau));
-        const OneStage stage{a.level, a.te, from.X + a.kept * memory.X_rate, from.u + a.kept * memory.u_rate, a.error};
+        const OneStage stage{a.level,
+                             a.te,
+                             from.X + a.kept * memory.X_rate,
+                             from.period + a.kept * memory.period_rate,
+                             from.u + a.kept * memory.u_rate,
+                             a.error};
         const double again = std::pow(tau / from.step, 3);  // the defect of a step is of third order
         const Extent missed{again * memory.missed.area, again * memory.missed.volume};
         const StageSolution solved = solve(from, &memory.past, stage, tau, missed);
 
         auto next = std::make_shared<AlphaMemory>();
         next->past = PastState(from);
-        next->X_rate = memory.X_rate + a.renewing * (solved.w - memory.X_rate);
-        next->u_rate = memory.u_rate + a.renewing * ((solved.u - stage.ubar) / stage.te - memory.u_rate);
+        const auto renewed = [&](const auto& old, const auto& end, const auto& bar) {
+            return (old + a.renewing * ((end - bar) / stage.te - old));
+        };
+        next->X_rate = renewed(memory.X_rate, solved.X, stage.Xbar);
+        next->u_rate = renewed(memory.u_rate, solved.u, stage.ubar);
+        next->period_rate = renewed(memory.period_rate, solved.period, stage.period_bar);
         next->lag = a.lag;
         next->solved = {from.time + stage.level * tau, solved.p, solved.lambda, solved.tension};
         MotionState to = end_of(from, solved, stage, tau);
@@ -96,7 +108,7 @@ private:
     double wave_factor(const MotionState& from, double tau) {
         const SurfaceLaw& law = surface().law();
         if (law.inertia == 0) return 0;
-        const CurvedMesh m = surface().mesh(from.X);
+        const CurvedMesh m = surface().mesh(from);
         const Extent e = extent(surface().space(), m);
         const double curvature = e.area / ((m.period > 0 ? 2 : 3) * e.volume);
         const double rate = (2 * law.viscosity * curvature * curvature + law.friction / 2) / law.inertia;

@@ -26,6 +26,8 @@ struct BdfMemory : ListedMemory<BdfMemory> {
     int made = 0;   // and how many steps had it up to now
     std::array<double, most_order> times{};
     std::array<VectorField, most_order> X;
+    std::array<double, most_order> periods{};
+    std::array<double, most_extrapolated - 1> stretches{};
     std::array<VectorField, most_extrapolated - 1> w;
     std::array<Eigen::VectorXd, most_extrapolated - 1> u;
 
@@ -43,10 +45,12 @@ struct BdfMemory : ListedMemory<BdfMemory> {
         for (std::size_t i = 0; i < own.X.size(); ++i) {
             f.number(name("time", i), own.times[i]);
             f.optional_array(name("X", i), own.X[i], state.X.cols());
+            f.number(name("period", i), own.periods[i]);
         }
         for (std::size_t i = 0; i < own.w.size(); ++i) {
             f.optional_array(name("w", i), own.w[i], state.X.cols());
             f.optional_array(name("u", i), own.u[i], state.u.size());
+            f.number(name("stretch", i), own.stretches[i]);
         }
     }
 };
@@ -57,14 +61,18 @@ struct Past {
     std::vector<double> ago;
     std::vector<const VectorField*> X, w;
     std::vector<const Eigen::VectorXd*> u;
+    std::vector<const double*> period, stretch;
 
-    Past(const MotionState& from, const BdfMemory* memory, double tau) : ago{tau}, X{&from.X}, w{&from.w}, u{&from.u} {
+    Past(const MotionState& from, const BdfMemory* memory, double tau)
+        : ago{tau}, X{&from.X}, w{&from.w}, u{&from.u}, period{&from.period}, stretch{&from.stretch} {
         for (std::size_t i = 0; memory && memory->knows(i); ++i) {
             ago.push_back(from.time + tau - memory->times[i]);
             X.push_back(&memory->X[i]);
+            period.push_back(&memory->periods[i]);
             if (i >= memory->w.size()) continue;
             w.push_back(&memory->w[i]);
             u.push_back(&memory->u[i]);
+            stretch.push_back(&memory->stretches[i]);
         }
     }
     int points() const { return static_cast<int>(ago.size()); }
@@ -88,11 +96,14 @@ struct Past {
         for (int j = 0; j < k; ++j) rate += 1 / ago[j];
         return 1 / rate;
     }
-    VectorField Xbar(int k) const {
-        VectorField out = te(k) / ago[0] * weight(0, k) * *X[0];
-        for (int j = 1; j < k; ++j) out += te(k) / ago[j] * weight(j, k) * *X[j];
+    template <class Values>
+    Values bar(const std::vector<const Values*>& values, int k) const {
+        Values out = te(k) / ago[0] * weight(0, k) * *values[0];
+        for (int j = 1; j < k; ++j) out += te(k) / ago[j] * weight(j, k) * *values[j];
         return out;
     }
+    // Of the nodes.
+    VectorField rate(int j) const { return *w[j] + stretched(*X[j], *stretch[j]); }
 };
 
 double largest_along(const VectorField& normal, const VectorField& change) {
@@ -120,6 +131,8 @@ public:
                                  .p = solved.p,
                                  .lambda = solved.lambda,
                                  .tension = solved.tension,
+                                 .period = solved.period,
+                                 .stretch = solved.stretch,
                                  .memory = {}},
                        .order = order};
         const std::vector<double> misses = missed_by(past, solved);
@@ -136,18 +149,25 @@ private:
         const int through = std::clamp(order, 1, most_extrapolated);
         Stage stage{from.time + tau,
                     past.te(order),
-                    past.Xbar(order),
+                    past.bar(past.X, order),
+                    past.bar(past.period, order),
                     *past.u[0],
                     past.ahead(past.X, through),
                     past.ahead(past.w, through),
+                    past.ahead(past.period, through),
+                    past.ahead(past.stretch, through),
                     past.ahead(past.u, through),
                     from.tension,
                     std::max(surface().control().relaxation, least_relaxation * past.te(order))};
         MovingSurface& s = surface();
-        const auto rate = [&] { return s.rate_to_keep(s.mesh(stage.X), stage.Xbar, stage.X, stage.te, {}); };
+        const auto rate = [&] {
+            const CurvedMesh at = s.mesh(stage.X, stage.period);
+            return s.rate_to_keep(at, s.mesh(stage.Xbar, stage.period_bar), at, stage.te, {});
+        };
         StageSolution out = solver_.solve(stage, rate());
         if (order <= most_extrapolated) return out;
         stage.X = out.X, stage.w = out.w, stage.u = out.u;
+        stage.period = out.period, stage.stretch = out.stretch;
         return solver_.solve(stage, rate());
     }
 
@@ -155,9 +175,12 @@ private:
     // [0], where there is no state before: by how much the velocity does.
     std::vector<double> missed_by(const Past& past, const StageSolution& solved) const {
         const VectorField& normal = solved.fields.normal;
-        std::vector<double> out{largest_along(normal, solved.X - *past.X[0] - past.ago[0] * *past.w[0])};
+        const double longer = solved.period - *past.period[0] * (1 + past.ago[0] * *past.stretch[0]);
+        std::vector<double> out{
+            std::max(largest_along(normal, solved.X - *past.X[0] - past.ago[0] * past.rate(0)), std::abs(longer))};
         for (int n = 1; n < past.points(); ++n)
-            out.push_back(largest_along(normal, solved.X - past.ahead(past.X, n + 1)));
+            out.push_back(std::max(largest_along(normal, solved.X - past.ahead(past.X, n + 1)),
+                                   std::abs(solved.period - past.ahead(past.period, n + 1))));
         return out;
     }
 
@@ -167,7 +190,7 @@ private:
         if (past.points() > order) return misses[order] / (1 + past.ago[order] / past.te(order));
         // The second step: the parabola through two states with the velocity of the first of them.
         const double span = past.ago[1] - past.ago[0], te = past.te(order);
-        const VectorField bend = ((*past.X[0] - *past.X[1]) / span - *past.w[1]) / span;
+        const VectorField bend = ((*past.X[0] - *past.X[1]) / span - past.rate(1)) / span;
         const VectorField end = past.ahead(past.X, 2) + past.ago[0] * past.ago[1] * bend;
         return largest_along(solved.fields.normal, solved.X - end) / (1 + past.ago[1] / te);
     }
@@ -192,9 +215,12 @@ private:
         next->order = order.next, next->made = order.made;
         next->times[0] = from.time;
         next->X[0] = from.X, next->w[0] = from.w, next->u[0] = from.u;
+        next->periods[0] = from.period, next->stretches[0] = from.stretch;
         if (!memory) return next;
         std::copy_n(memory->times.begin(), most_order - 1, next->times.begin() + 1);
         std::copy_n(memory->X.begin(), most_order - 1, next->X.begin() + 1);
+        std::copy_n(memory->periods.begin(), most_order - 1, next->periods.begin() + 1);
+        std::copy_n(memory->stretches.begin(), most_extrapolated - 2, next->stretches.begin() + 1);
         std::copy_n(memory->w.begin(), most_extrapolated - 2, next->w.begin() + 1);
         std::copy_n(memory->u.begin(), most_extrapolated - 2, next->u.begin() + 1);
         return next;

@@ -18,7 +18,12 @@ OneStage bdf2(const MotionState& from, const PastState& past, double tau) {
     const auto bar = [&](const auto& now, const auto& before) {
         return ((1 + r) * now - r * r / (1 + r) * before) * (te / tau);
     };
-    return {1, te, bar(from.X, past.X), bar(from.u, past.u), -(1 + r) * (1 + r) / (6 * r * (1 + 2 * r))};
+    return {1,
+            te,
+            bar(from.X, past.X),
+            bar(from.period, past.period),
+            bar(from.u, past.u),
+            -(1 + r) * (1 + r) / (6 * r * (1 + 2 * r))};
 }
 
 class Bdf2 : public OneStageScheme {

@@ -1,5 +1,6 @@
 #include "surface3d/motion/schemes/one_stage.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tubule::surface3d {
@@ -11,13 +12,18 @@ double estimated_error(const MotionState& from, const PastState* past, const One
                        const MotionState& to) {
     const double tau = to.step;
     if (!past) {
-        const Eigen::RowVectorXd along = (to.X - from.X - tau * from.w).cwiseProduct(normal).colwise().sum();
-        return along.cwiseAbs().maxCoeff() / 2;
+        const VectorField rate = from.w + stretched(from.X, from.stretch);
+        const Eigen::RowVectorXd along = (to.X - from.X - tau * rate).cwiseProduct(normal).colwise().sum();
+        const double longer = to.period - (1 + tau * from.stretch) * from.period;
+        return std::max(along.cwiseAbs().maxCoeff(), std::abs(longer)) / 2;
     }
     const double r = tau / from.step, theirs = (2 * r + 3) / (12 * r);
-    const VectorField explicitly = from.X + tau * ((1 + r / 2) * from.w - r / 2 * past->w);
+    const auto ahead = [&](const auto& now, const auto& before) { return tau * ((1 + r / 2) * now - r / 2 * before); };
+    const VectorField explicitly =
+        from.X + ahead(from.w + stretched(from.X, from.stretch), past->w + stretched(past->X, past->stretch));
     const Eigen::RowVectorXd along = (to.X - explicitly).cwiseProduct(normal).colwise().sum();
-    return std::abs(stage.error / (theirs - stage.error)) * along.cwiseAbs().maxCoeff();
+    const double longer = to.period - from.period - ahead(from.stretch * from.period, past->stretch * past->period);
+    return std::abs(stage.error / (theirs - stage.error)) * std::max(along.cwiseAbs().maxCoeff(), std::abs(longer));
 }
 
 }  // namespace
@@ -25,21 +31,29 @@ double estimated_error(const MotionState& from, const PastState* past, const One
 StageSolution OneStageScheme::solve(const MotionState& from, const PastState* past, const OneStage& stage, double tau,
                                     const Extent& missed) {
     const double r = past ? tau / from.step : 0;
-    const auto ahead = [&](double level, const auto& now, auto PastState::*before) {
-        return past ? ((1 + level * r) * now - level * r * past->*before).eval() : now;
+    const auto ahead = [&](double level, const auto& now, const auto& before) {
+        using Value = std::decay_t<decltype(now)>;
+        return past ? Value((1 + level * r) * now - level * r * before) : now;
     };
+    const PastState before = past ? *past : PastState(from);
     const Stage expected{from.time + stage.level * tau,
                          stage.te,
                          stage.Xbar,
+                         stage.period_bar,
                          stage.ubar,
-                         ahead(stage.level, from.X, &PastState::X),
-                         ahead(stage.level, from.w, &PastState::w),
-                         ahead(stage.level, from.u, &PastState::u),
+                         ahead(stage.level, from.X, before.X),
+                         ahead(stage.level, from.w, before.w),
+                         ahead(stage.level, from.period, before.period),
+                         ahead(stage.level, from.stretch, before.stretch),
+                         ahead(stage.level, from.u, before.u),
                          from.tension,
                          surface().control().relaxation + stage.te};
-    const VectorField begin = from.X + (stage.Xbar - from.X) / stage.level, end = ahead(1, from.X, &PastState::X);
     MovingSurface& s = surface();
-    return solver_.solve(expected, s.rate_to_keep(s.mesh(expected.X), begin, end, stage.te / stage.level, missed));
+    const CurvedMesh begin = s.mesh(from.X + (stage.Xbar - from.X) / stage.level,
+                                    from.period + (stage.period_bar - from.period) / stage.level);
+    const CurvedMesh end = s.mesh(ahead(1, from.X, before.X), ahead(1, from.period, before.period));
+    return solver_.solve(
+        expected, s.rate_to_keep(s.mesh(expected.X, expected.period), begin, end, stage.te / stage.level, missed));
 }
 
 MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution& solved, const OneStage& stage,
@@ -52,11 +66,15 @@ MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution&
                    .p = solved.p,
                    .lambda = solved.lambda,
                    .tension = solved.tension,
+                   .period = solved.period,
+                   .stretch = solved.stretch,
                    .memory = {}};
     if (stage.level == 1) return to;
     to.X = from.X + (to.X - from.X) / stage.level;
     to.w = from.w + (to.w - from.w) / stage.level;
     to.u = from.u + (to.u - from.u) / stage.level;
+    to.period = from.period + (to.period - from.period) / stage.level;
+    to.stretch = from.stretch + (to.stretch - from.stretch) / stage.level;
     return to;
 }
 

@@ -11,14 +11,16 @@ namespace tubule::surface3d {
 struct PastState {
     VectorField X, w;
     Eigen::VectorXd u;
+    double period, stretch;
 
-    explicit PastState(const MotionState& s = {}) : X(s.X), w(s.w), u(s.u) {}
+    explicit PastState(const MotionState& s = {}) : X(s.X), w(s.w), u(s.u), period(s.period), stretch(s.stretch) {}
 
     template <class Fields, class Own>
     static void fields(Fields& f, Own& own, const MotionState& state) {
         f.array("restart_X_past", own.X, state.X.cols());
         f.array("restart_w_past", own.w, state.X.cols());
         f.array("restart_u_past", own.u, state.u.size());
+        f.number("restart_period_past", own.period), f.number("restart_stretch_past", own.stretch);
     }
 };
 
@@ -27,6 +29,7 @@ struct PastState {
 struct OneStage {
     double level, te;
     VectorField Xbar;
+    double period_bar;
     Eigen::VectorXd ubar;
     double error;  // of the positions in a step, in units of their third derivative * tau^3
 };
@@ -40,7 +43,7 @@ public:
 
 protected:
     // Of the first step of all these schemes.
-    static OneStage euler(const MotionState& from, double tau) { return {1, tau, from.X, from.u, 0}; }
+    static OneStage euler(const MotionState& from, double tau) { return {1, tau, from.X, from.period, from.u, 0}; }
 
     // Solved on what the last two states extrapolate to, or on that of `from` if there is no past, with `missed` more
     // of area and volume than is expected to be lacking.

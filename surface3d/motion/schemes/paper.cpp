@@ -193,8 +193,8 @@ Paper::Paper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bendi
         throw std::invalid_argument("the paper's scheme has fluid, stokes and overdamped, no gradient flow");
     if (law.inertia == 0 && law.friction == 0)
         throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: rigid motions are undetermined");
-    if (law.reservoir || !law.without_loads())
-        throw std::invalid_argument("the paper's scheme has no reservoir, tension or pressure");
+    if (law.reservoir || law.free_period || !law.without_loads())
+        throw std::invalid_argument("the paper's scheme has no reservoir, no free period, and no loads");
     if (!(control.smoothing >= 0))
         throw std::invalid_argument(
             fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", control.smoothing));
@@ -212,7 +212,7 @@ void Paper::assemble(const MotionState& from, double tau) {
     b_.setZero(unknowns_.size());
     flux_.setZero(unknowns_.size());
     const SurfaceSpace& space = surface().space();
-    const CurvedMesh at = surface().mesh(from.X);
+    const CurvedMesh at = surface().mesh(from);
     const PaperFields nodal = fields(at);
     const int n = space.width();
     VectorField u_old(3, space.size());
@@ -257,6 +257,7 @@ MotionStep Paper::step(const MotionState& from, double tau) {
     if (surface().law().keeps_volume) to.lambda = flux_.dot(both.col(0)) / flux_.dot(both.col(1));
     const Eigen::VectorXd x = both.col(0) - to.lambda * both.col(1);
     to.time = from.time + tau, to.step = tau;
+    to.period = from.period;
     to.u = x.head(unknowns_.Y);
     to.p = x.tail(unknowns_.size() - unknowns_.p);
     to.w.resize(3, n);
