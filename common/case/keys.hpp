@@ -364,14 +364,12 @@ void check_ensemble(Keys& k, const Case& c, const MotionLaw& law) {
         const bool period = is_tube(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
         return law.free_period && !period ? "must not be \"free\": only a tube has a period" : "";
     });
-    if (c.tier == Tier::axisym) return;
+    if (c.tier != Tier::automatic) return;
     const auto refuse = [&](const char* key, bool chosen) {
         k.check(key, [&]() -> std::string {
-            if (!chosen) return {};
-            return fmt::format("is not computed in tier \"{}\" yet", c.tier == Tier::surface3d ? "surface3d" : "auto");
+            return chosen ? "is not computed in tier \"auto\" yet" : "";
         });
     };
-    if (c.tier == Tier::surface3d && !c.equilibrium) return;
     refuse("model.period", law.free_period);
     refuse("model.area", law.reservoir || law.keeps_area);
     refuse("model.tension", !law.tension.is_zero());
