@@ -315,7 +315,7 @@ class Others(ProgramTest):
         """And names the exit statuses and pages of docs/. `confirm` is left out: it computes in three dimensions."""
         root = Path(__file__).parents[2]
         (self.folder / "cases").symlink_to(root / "cases")
-        readme = (root / "README.md").read_text()
+        statuses = (root / "docs/command.md").read_text()
         commands = re.findall(r"(?m)^  (\w+) ", self.tubule("--help")[0].split("Subcommands:")[1].split("Exit status")[0])
         self.assertEqual(len(commands), 10)
         for command in commands:
@@ -323,7 +323,7 @@ class Others(ProgramTest):
             examples = re.findall(r"(?m)^  (tubule .*)$", out)
             self.assertTrue(examples, command)
             for status in re.findall(r"(?m)^  (\d+) ", out.split("Exit status:")[1]):
-                self.assertIn(f"| {status} | ", readme)
+                self.assertIn(f"| {status} | ", statuses)
             pages = re.search(r"(?m)^More: (.*)$", out)[1].split()
             for page in pages:
                 self.assertTrue((root / page).is_file(), page)

@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 
 MEMORY = 8 << 30  # bytes that the program may ask for
-EXIT_STATUSES = (0, 2, 3, 4, 5)  # README; 1 and 130 have to be asked for
+EXIT_STATUSES = (0, 2, 3, 4, 5)  # docs/command.md; 1 and 130 have to be asked for
 # What only the inside of the program would say: no user can do anything with it.
 INTERNALS = re.compile(
     rb"Traceback \(most recent|terminate called|Assertion|AddressSanitizer|runtime error:|bad_alloc|std::|vector::|map::at"

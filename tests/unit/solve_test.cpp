@@ -309,7 +309,7 @@ TEST(DerivativeCheck, refusesWhatDoesNotFit) {
 }
 
 TEST(Stop, namesAndExitCodes) {
-    // Exit statuses as the README's table has them: 0 as asked, 3 the physics, 4 the numerics, 5 time limit, 130
+    // Exit statuses as docs/command.md has them: 0 as asked, 3 the physics, 4 the numerics, 5 time limit, 130
     // signal.
     const std::set<int> codes{0, 3, 4, 5, 130};
     for (const StopKind& kind : stop_kinds) {
