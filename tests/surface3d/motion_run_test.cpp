@@ -293,7 +293,7 @@ TEST(MotionGuards, StepsThatAreTooLarge) {
 }
 
 TEST(MotionGuards, ThePaperSchemeIsGuardedToo) {
-    // Its explicit K limits the step to about h^2 for k42 > 0 (docs/surface_motion.md): far less than .2 on 80
+    // Its explicit K limits the step to h^2.3 to h^3.3 for k42 > 0 (docs/surface_motion.md): far less than .2 on 80
     // triangles of order 3.
     const Outcome o = run_case(wavy, {"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=0.2",
                                       "energy.k42=1", "time.end=20"});

@@ -593,7 +593,7 @@ class StepCosts(InFolder):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         texts = svg_texts(self.folder / "s.svg")
         # The factors' own time beside their bar; iterations of the factors that are kept longest.
-        for words in ("some factors", "28", "k = 3, 320 triangles", "19", "rest of the step", "two threads"):
+        for words in ("some factors", "28 of 68", "k = 3, 320 triangles", "19", "rest of the step", "two threads"):
             self.assertIn(words, texts)
 
     def test_without_threads(self):

@@ -27,7 +27,7 @@ std::string version() {
 
 // The exit status.
 int run(int argc, char** argv) {
-    CLI::App app("Membranes as fluid deformable surfaces with bending energies of any order in H and K.", "tubule");
+    CLI::App app("Membranes as fluid deformable surfaces whose bending energy is a function of H and K.", "tubule");
     app.require_subcommand(0, 1);
     bool asks_version = false;
     app.add_flag("--version", asks_version, "what this program is made of");

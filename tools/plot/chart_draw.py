@@ -1,11 +1,13 @@
 """The pictures of `tubule chart`."""
 
+import re
 import textwrap
 
 import style
-from labels import as_label
+from labels import as_label, power
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 FLOOR = 1e-16  # an error of zero is drawn here
@@ -31,6 +33,13 @@ def label_axes(axes):
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def in_words(text):
+    """Settings as `key=value`, in the words of a reader."""
+    text = re.sub(r"\belements=(\S+)", r"\1 elements,", text)
+    text = re.sub(r"\btime_tolerance=([^\s;]+)", lambda m: f"tolerance {power(float(m[1]), 1)}", text)
+    return re.sub(r"(\w)=(?=\S)", r"\1 ", text).rstrip(",")
 
 
 def words_beside(figure, left, lines, height):
@@ -59,7 +68,7 @@ def stops_in_words(failed):
     for job, run in failed.values():
         stops.setdefault((job.series, run.outcome), []).append((job, run))
     for (series, outcome), of in stops.items():
-        which = "; ".join(f"{' '.join(job.told)} (t = {run.stop_time:.3g})" for job, run in of)
+        which = "; ".join(f"{in_words(' '.join(job.told))} (t = {run.stop_time:.3g})" for job, run in of)
         yield f"{series}: {outcome}: {which}"
 
 
@@ -104,7 +113,7 @@ def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
     if failed:
         handles.append(Line2D([], [], color="0.3", label="stopped early", **FAILED))
     axes.legend(handles=handles, loc="best", fontsize=SMALL)
-    lines = ["The front, cheapest first:"] + [f"{n}  {named[run.key]}" for n, run in enumerate(front, 1)]
+    lines = ["The front, cheapest first:"] + [f"{n}  {in_words(named[run.key])}" for n, run in enumerate(front, 1)]
     if failed:
         lines += ["", "Stopped early:", *stops_in_words(failed)]
     words_beside(figure, 1 - (SIDE - 0.08) / style.WIDTH, lines, height)
@@ -116,50 +125,52 @@ def columns(points):
 
 
 def stability_map(chart, lines, jobs, runs, outputs):
-    """Every run as a mark, filled where stable, with the line between for each series."""
+    """A panel for each mesh, a bar for each series: up to the largest stable value, with a mark at the smallest unstable
+    one, which says how that run ended."""
     styles = series_styles(chart)
-    height = 3.4
-    figure = Figure(figsize=(style.WIDTH * 0.75, height))
-    axes = figure.add_axes([0.13, 0.125, 0.52, 0.8])
-    widths = {line.against: 0.0 for line in lines}
-    for line in lines:
-        for i in range(len(line.values)):
-            run = runs.get(line.job(i).key)
-            if run and chart.against == "discretisation.elements":
-                widths[line.against] = max(widths[line.against], run.width)
-    by_width = all(widths.values())
-    shift = 1.0
-    for name in styles:
-        border = []
-        for line in (line for line in lines if line.series.name == name):
-            x = (widths[line.against] if by_width else line.against) * shift
-            for i, value in enumerate(line.values):
-                run = runs.get(line.job(i).key)
-                if run:
-                    marks(axes, x, value, run, styles[name])
-            low, high = line.limits
-            if low:
-                border.append((x, (low * high) ** 0.5 if high else low))
-        axes.loglog(*columns(sorted(border)), color=styles[name]["color"], zorder=2)
-        shift *= 1.03  # so that coinciding marks of several series are distinguishable
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlabel("mesh width h (edge of a triangle of the mean area)" if by_width else chart.against)
-    axes.set_ylabel(chart.map.key.rpartition(".")[2])
-    axes.set_title(as_label(chart.title or chart.case.stem), loc="left", fontsize=7)
-    label_axes(axes)
-    handles = [Line2D([], [], ls="-", label=name, **styles[name]) for name in styles]
-    handles.append(Line2D([], [], color="0.3", ls="", marker="o", label="stable"))
-    handles.append(Line2D([], [], color="0.3", label="run stopped", **FAILED))
-    handles.append(Line2D([], [], color="0.3", ls="", marker="o", mfc="white", label="energy grew by 10 %"))
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0)
+    panels = sorted({line.against for line in lines})
+    inches = 0.17 * len(styles)
+    height = inches + 1.15
+    figure = Figure(figsize=(style.WIDTH, height))
+    names = list(reversed(styles))
+    left, right = 0.2, 0.985
+    width = (right - left + 0.03) / len(panels)
+    lowest = min(value for line in lines for value in line.values) / 1.5
+    for column, against in enumerate(panels):
+        axes = figure.add_axes([left + column * width, 0.62 / height, width - 0.03, inches / height])
+        for line in (line for line in lines if line.against == against):
+            draw_limits(axes, names.index(line.series.name), line, runs, styles[line.series.name]["color"], lowest)
+        axes.set_xscale("log")
+        axes.set_xlim(lowest, 5 * max(value for line in lines for value in line.values))
+        axes.set_ylim(-0.6, len(names) - 0.4)
+        axes.set_yticks(range(len(names)), names if column == 0 else [""] * len(names), fontsize=SMALL)
+        axes.tick_params(axis="y", length=0)
+        axes.tick_params(axis="x", which="both", top=True)
+        axes.set_xlabel(chart.map.key.rpartition(".")[2])
+        axes.set_title(f"{as_label(chart.against.rpartition('.')[2])} = {against:g}", fontsize=7)
+    figure.text(left, 1 - 0.12 / height, as_label(chart.title or chart.case.stem), va="top", fontsize=7.5)
+    handles = [
+        Patch(color="0.5", label="stable"),
+        Line2D([], [], color="0.3", label="run stopped", **FAILED),
+        Line2D([], [], color="0.3", ls="", marker="o", mfc="white", label="energy grew by 10 %"),
+    ]
+    figure.legend(handles=handles, loc="lower center", bbox_to_anchor=((left + right) / 2, 0), ncol=3, fontsize=SMALL)
     style.save(figure, list(map(str, outputs)))
 
 
-def marks(axes, x, y, run, look):
-    if run.stable:
-        axes.plot(x, y, ls="", zorder=3, **look)
-    elif run.finished:
-        axes.plot(x, y, ls="", zorder=3, mfc="white", **look)
+def draw_limits(axes, place, line, runs, colour, lowest):
+    """The bar of a line of the map, and the run that bounds it."""
+    found = {value: runs.get(line.job(i).key) for i, value in enumerate(line.values)}
+    stable = [value for value, run in found.items() if run and run.stable]
+    unstable = [value for value, run in found.items() if run and not run.stable]
+    if stable:
+        axes.barh(place, max(stable) - lowest, left=lowest, height=0.62, color=colour)
+    if not unstable:
+        axes.annotate("all stable", (max(stable, default=lowest), place), (3, 0), textcoords="offset points", va="center",
+                      fontsize=5.8)  # fmt: skip
+        return
+    first = min(unstable)
+    if found[first].finished:
+        axes.plot(first, place, ls="", marker="o", mfc="white", color=colour, markersize=4)
     else:
-        axes.plot(x, y, zorder=3, color=look["color"], **FAILED)
+        axes.plot(first, place, color=colour, **FAILED)

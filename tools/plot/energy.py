@@ -14,6 +14,7 @@ STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6
 HEIGHT = 2.15  # inches of the axes
 KINETIC, BAND_ALPHA = "kinetic E\u2096, up to E + E\u2096", 0.25
 VISIBLE = 2e-3  # part of the total below which a term would coincide with the zero line
+LEAST_CHANGE = 0.05  # of the height of the panel: terms are left out rather than that the total shows less of it
 SETTLED = 0.3  # the initial phase ends when this part of the change is left
 
 
@@ -100,8 +101,18 @@ class EnergyPanel:
         self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
-        self.terms = visible_terms(results, term_labels)
+        self.terms = [] if self._terms_hide_change() else visible_terms(results, term_labels)
         self.height = HEIGHT + 0.62
+
+    def _terms_hide_change(self):
+        """Whether an axis with all terms would show the total as a straight line."""
+        rows = [result.series for result in self.results]
+        every = [values for row in rows for name, values in row.items() if name.startswith("energy_") and name != "energy_error"]
+        if not every:
+            return False
+        change = max(float(np.ptp(row["energy"])) for row in rows)
+        span = max(row["energy"].max() for row in rows) - min(float(values.min()) for values in every)
+        return change < LEAST_CHANGE * span
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
@@ -182,7 +193,7 @@ class EnergyPanel:
                 continue
             axes.axvline(time, color="0.75", linewidth=0.5, zorder=0)
             place = axes.transLimits.transform(axes.transScale.transform((time, 1)))[0] * inches
-            if place - before > 0.11 and not self.numbered:
+            if place - before > 0.095 and not self.numbered:
                 axes.annotate(time_name(index), (time, 1), (0, 2), xycoords=("data", "axes fraction"),
                               textcoords="offset points", ha="center", va="bottom", fontsize=7)
                 before = place

@@ -18,12 +18,20 @@ def curve_label(m):
     return f"m = {m}" + {0: ", pearling", 1: ", buckling"}.get(m, "")
 
 
+def largest_shown(curves):
+    """The largest rate, at least 0. Without friction, rates of rings grow beyond all bounds at long waves; then four times
+    the largest rate of shorter waves."""
+    of_all = [rate for curve in curves for rate in curve["rate"] if rate is not None]
+    of_short = [r for curve in curves for r in curve["rate"][len(curve["rate"]) // 2 :] if r is not None]
+    highest, far = max([0.0, *of_all]), max([0.0, *of_short])
+    return 4 * far if 0 < 20 * far < highest else highest
+
+
 def rate_limits(models):
     """The range to show for each model: all growing waves, and about as much below zero."""
     limits = []
     for model in models:
-        rates = [rate for curve in model["curves"] for rate in curve["rate"] if rate is not None]
-        top = max([rate for rate in rates if rate > 0], default=0.0)
+        top = largest_shown(model["curves"])
         # Rings may be infinitely fast without friction, so m = 0 sets the scale.
         lowest = min([rate for rate in model["curves"][0]["rate"] if rate is not None], default=-1.0)
         bottom = max(lowest, -2.0 * top) if top > 0 else lowest / 4
@@ -43,7 +51,7 @@ def draw_model(axes, model, length, limits, colours):
                   mfc="white", mew=0.9, zorder=3)
         fastest = model["report"]["fastest"][curve["m"]]
         if fastest["q"] is not None:
-            axes.plot([fastest["q"]], [fastest["rate"]], marker="*", markersize=7, color=colour, zorder=5)
+            axes.plot([fastest["q"]], [fastest["rate"]], marker="*", markersize=7, color=colour, zorder=5, clip_on=False)
     axes.set_xlim(0, model["curves"][0]["q"][-1])
     axes.set_ylim(*limits)
     axes.set_title(f"{model['title']}; tension {model['report']['tension']:.4g}")

@@ -27,7 +27,7 @@ def read_table(path):
 
 
 def draw_solvers(axes, rows, colours):
-    """One bar per measure: its linear solve (the number) and the rest of a step. Bold: the method of the program."""
+    """One bar per measure: its linear solve and the rest of a step, as numbers: solve of step. Bold: the method of the program."""
     by_name = {row.measure: row for row in rows}
     rest = by_name[STEP].whole - by_name[SYSTEM].whole
     names = [name for name in by_name if name not in (STEP, SYSTEM, DENSE)]
@@ -37,11 +37,11 @@ def draw_solvers(axes, rows, colours):
         for part, colour in zip(parts, colours):
             axes.barh(place, part, left=left, color=colour, height=0.7)
             left += part
-        axes.annotate(f"{row.whole:.0f}", (left, place), (2, 0), textcoords="offset points", va="center", fontsize=6.5)
+        axes.annotate(f"{row.whole:.0f} of {left:.0f}", (left, place), (2, 0), textcoords="offset points", va="center", fontsize=6.5)
     axes.set_yticks(range(len(names)), reversed(names))
     for label in axes.get_yticklabels():
         label.set_fontweight("bold" if label.get_text() == CHOSEN else "normal")
-    axes.set_xlim(0, 1.15 * axes.get_xlim()[1])
+    axes.set_xlim(0, 1.7 * axes.get_xlim()[1])
     axes.tick_params(axis="y", length=0)
 
 

@@ -201,7 +201,7 @@ class TubePanel(ProfilePanel):
         middle = (s[1:] + s[:-1]) / 2
         slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened, because necks would become black
         lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
-        shade = (0.7 + 0.3 * np.clip(lit, 0, 1))[..., None]
+        shade = (0.85 + 0.15 * np.clip(lit, 0, 1))[..., None]
         for side, values, colours in ((-1, frame.H, self.H), (1, frame.K, self.K)):
             values = sampled(values)
             rgb = colours.rgb((values[1:] + values[:-1]) / 2)[:, None] * shade

@@ -40,18 +40,20 @@ def draw(folder, outputs):
     k42 = formula("k_{42}")
 
     figure = Figure(figsize=(style.WIDTH, 5.6))
-    shapes = figure.add_axes([0.03, 0.47, 0.95, 0.51])
+    shapes = figure.add_axes([0.03, 0.46, 0.95, 0.52])
     shapes.set_aspect("equal")
     shapes.axis("off")
     for column, (length, branch) in enumerate(branches.items()):
         shift = 2.2 * column
         r, z = capsule(0.5, length)
         shapes.plot(r + shift, z, color="0.6", linestyle=":", linewidth=0.9)
-        for value, colour in colours.items():
+        for (value, colour), dashes in zip(colours.items(), ("-", "-", (0, (3, 2)))):  # the last two nearly coincide
             frame = branch.frames[nearest(branch.series["parameter"], value)]
             r, z = mirrored(frame)
-            shapes.plot(r + shift, z, color=colour)
-        shapes.text(shift, 2.75, f"l = {length}", ha="center")
+            shapes.plot(r + shift, z, color=colour, linestyle=dashes)
+        shapes.text(shift, 2.62, f"l = {length}", ha="center")
+    shapes.plot([5.9, 5.9], [-2.5, -1.5], color="0.1", linewidth=1.0, solid_capstyle="butt")
+    shapes.text(5.98, -2.0, "1", va="center", fontsize=7)
 
     energy = figure.add_axes([0.09, 0.09, 0.37, 0.29])
     for value, colour in colours.items():

@@ -40,7 +40,7 @@ def draw_model(axes, runs, styles):
     # Nothing is known below the error of the reference.
     runs = [run._replace(error=max(run.error, reference.error)) for run in runs if run is not reference]
     axes.axhspan(reference.error * 1e-6, reference.error, color="0.93", zorder=0)
-    axes.annotate("the reference is no better known", (1, reference.error), (-3, -3), ha="right", va="top",
+    axes.annotate("the reference is no better known", (1, reference.error), (-8, -3), ha="right", va="top",
                   xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=6.5, color="0.35")
     for series, look in styles.items():
         every = [run for run in runs if run.series == series]
@@ -53,7 +53,7 @@ def draw_model(axes, runs, styles):
             axes.loglog([run.cpu_s] * 2, [run.error, run.estimate], color="k", lw=0.6, zorder=2)
             axes.loglog(run.cpu_s, run.error, zorder=4, **STAR)
             axes.loglog(run.cpu_s, run.estimate, mfc="white", zorder=3, **STAR)
-    axes.set_ylim(bottom=reference.error / 2)
+    axes.set_ylim(bottom=reference.error / 3)
 
 
 def draw(path, outputs):
