@@ -12,7 +12,7 @@ namespace tubule::axisym {
 namespace {
 
 constexpr int steps_between_looks = 10;
-// Measured choices: docs/decisions.md, "How large is the error of a curve in motion?".
+// Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
 constexpr double error_per_defect = 0.5;  // of the energy balance
 constexpr double least_error = 0.02;      // of what is asked for: no estimate is trusted below
 constexpr double start_steps = 40;        // of a run whose steps grow to its end

@@ -6,7 +6,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "Curves in motion".
+// Measured choices: docs/decisions/curves.md, "Curves in motion".
 constexpr double finer_mesh = 1.5;  // elements of a pair of runs
 constexpr double finer_time = 0.1;  // tolerances of a pair of runs
 // Of the first run; the waves of a fluid, weakly damped, cost steps.

@@ -11,7 +11,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "Curves in motion".
+// Measured choices: docs/decisions/curves.md, "Curves in motion".
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
 constexpr double seam_size = 0.15, seam_per_accuracy = 5;
@@ -147,7 +147,7 @@ CurveBegin begin_state(const CurveSetup& setup) {
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     std::optional<CurveMotion::Start> consistent;
     // Short, since a start that is not smooth changes fast, and over before the first output; yet long enough that
-    // rounding at the small elements of a seam does not prevent the next step (docs/decisions.md, "Curves in motion").
+    // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
     double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
                         0.1 * OutputTimes(setup.c).next());
     for (int tries = 0; !consistent; ++tries) try {

@@ -76,7 +76,7 @@ struct EquilibriumSettings {
     int degree = 5;
     int elements = 16;       // to begin with, of a whole cell
     int max_elements = 400;  // more are never taken
-    double gauge = 0.01;     // weight of the gauge energy relative to E_ref; docs/decisions.md
+    double gauge = 0.01;     // weight of the gauge energy relative to E_ref; docs/decisions/equilibria.md
     bool descend = true;     // look for a minimum, from any start; if not, for any stationary shape near a good one
 };
 

@@ -14,7 +14,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "Ask for accuracy".
+// Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
 constexpr double first_remesh_margin = 1.0 / 10;  // defect after a remesh / defect before
 constexpr int few_steps = 50;                     // between two remeshes of a shape that keeps sharpening
 constexpr int damping_steps = 3;                  // after a remesh

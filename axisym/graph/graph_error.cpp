@@ -3,7 +3,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "How large is the error?". The error is carried on after so many steps, or when
+// Measured choices: docs/decisions/graphs.md. The error is carried on after so many steps, or when
 // the logarithm of the dissipation changed so much.
 constexpr int error_steps = 8;
 constexpr double error_change = 0.25;

@@ -55,7 +55,7 @@ public:
 
     // `defect`, if given, receives for each element the energy lost to the spline there: half the second
     // variation of the best approximation error, from the jumps of the highest derivative
-    // (docs/decisions.md), over the whole period.
+    // (docs/decisions/graphs.md), over the whole period.
     Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
     // The axial force that keeps the period, theory.md (3.19): dF/dL while the profile is stretched along z.
     double axial_force(const Eigen::VectorXd& x) const;

@@ -6,7 +6,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "Ask for accuracy".
+// Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
 constexpr double tolerance_per_accuracy = 0.35;   // time tolerance / asked accuracy
 constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh / (asked accuracy * E_ref)
 

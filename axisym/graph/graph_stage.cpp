@@ -10,7 +10,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions.md, "Ask for accuracy".
+// Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
 constexpr double start_margin = 1.0 / 4;  // defect of the start / defect at which to remesh
 constexpr int fewest_elements = 3;
 

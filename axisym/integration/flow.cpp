@@ -154,7 +154,7 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     }
     require(IDASetMaxOrd(s.ida, control.max_order), "the order");
     // Newton much more exact than the error test asks, and a Jacobian never far off: fewer steps and fewer
-    // failures, and errors that follow the tolerance (docs/decisions.md).
+    // failures, and errors that follow the tolerance (docs/decisions/graphs.md).
     require(IDASetNonlinConvCoef(s.ida, control.newton), "the Newton tolerance");
     require(IDASetDeltaCjLSetup(s.ida, 0.1), "the lifetime of the Jacobian");
     require(IDASetInitStep(s.ida, control.first_step), "the first step");

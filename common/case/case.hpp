@@ -137,7 +137,8 @@ inline Held held_of(const Case& c) {
     return c.equilibrium->held.value_or(default_held(c.model));
 }
 
-// Of curved triangles: fourth order follows motion better, third is enough to look at a shape (docs/decisions.md).
+// Of curved triangles: fourth order follows motion better, third is enough for a shape at rest
+// (docs/decisions/surface_motion.md).
 inline int element_order(const Case& c) {
     return c.surface.order.value_or(c.moves() ? 4 : 3);
 }

@@ -12,7 +12,7 @@
 namespace tubule {
 namespace {
 
-// Measured choices: docs/decisions.md, "Time and memory".
+// Measured choices: docs/decisions/time_and_memory.md, "Time and memory".
 constexpr double always_there = 1e8;              // less is not worth a look
 constexpr double multiplications_a_second = 3e9;  // of a sparse factorisation, one thread
 

@@ -18,7 +18,8 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 
 // While it lives, parallel regions have one thread. CHOLMOD asks for four in every supernode, whatever the machine has,
-// and these wait for each other by spinning: on two busy cores it took 2 to 30 times as long (docs/decisions.md).
+// and these wait for each other by spinning: on two busy cores it took 2 to 30 times as long
+// (docs/decisions/linear_algebra.md).
 class OneThread {
 public:
     OneThread() { omp_set_max_active_levels(0); }

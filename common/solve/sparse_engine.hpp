@@ -35,7 +35,7 @@ public:
 void require_ordering(const Ordering& ordering, int size);
 
 // A second BLAS thread gains nothing in factors as small as ours, and OpenBLAS's wait by spinning, on the core that the
-// next assembly wants (docs/decisions.md). A value of OPENBLAS_NUM_THREADS takes precedence.
+// next assembly wants (docs/decisions/linear_algebra.md). A value of OPENBLAS_NUM_THREADS takes precedence.
 void use_one_blas_thread();
 
 }  // namespace tubule

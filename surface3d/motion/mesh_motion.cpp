@@ -6,7 +6,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "Surfaces in motion".
+// Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double most = 4;  // bound of the wanted density of triangles, relative to the mean, and of its inverse
 constexpr double tolerance = 1e-5;  // of the velocity along the surface
 constexpr int most_iterations = 300;

@@ -17,7 +17,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "Surfaces in motion".
+// Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double first_step = 1e-4;            // of the time in which the mesh relaxes
 constexpr double moment = 1e-2;                // of the first step, see set_moving()
 constexpr double growth = 1.6, safety = 0.85;  // of steps

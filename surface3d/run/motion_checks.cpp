@@ -10,7 +10,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "Surfaces in motion".
+// Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double creep = 10;    // increase since its lowest, of the asked accuracy
 constexpr double climb = 0.25;  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;

@@ -14,7 +14,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "What will a run take?".
+// Measured choices: docs/decisions/time_and_memory.md, "What will a run take?".
 constexpr double pilot_limit = 6;         // seconds of each pilot run
 constexpr double limit = 15;              // of all of them, and their starts
 constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number

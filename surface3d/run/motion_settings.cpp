@@ -8,7 +8,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "How large is the error of a surface in motion?".
+// Measured choices: docs/decisions/surface_motion.md, "How large is the error of a surface in motion?".
 constexpr int most_pairs = 6;
 constexpr int first_triangles = 180, most_first_triangles = 1000, most_triangles = 40000;
 constexpr double fewer = 1.8;                          // times fewer triangles of the coarser run

@@ -6,7 +6,7 @@
 namespace tubule::surface3d {
 namespace {
 
-// Measured choices: docs/decisions.md, "Surfaces in motion".
+// Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double relaxes_in = 0.2;  // of the time that the shape needs to change
 // H counts as constant if it varies by less than this, or by less than so many times the difference of two recoveries.
 constexpr double same_everywhere = 1e-9, times_noise = 4;

@@ -28,7 +28,7 @@ namespace {
 constexpr double jitter = 0.2;
 constexpr unsigned seed = 1;
 
-// For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions.md, "Time and memory".
+// For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions/time_and_memory.md.
 constexpr double bytes_per_cell_entry = 45;
 
 // What a step solves for: velocity, H and K, and a pressure.

@@ -233,7 +233,7 @@ TEST(Outputs, rowsFitTheirNames) {
     EXPECT_NEAR(o["mode_4"].front(), 0.1, 1e-5);
 }
 
-// docs/decisions.md: the speed of the parameter may vary by a factor of 1000 along the profile.
+// docs/decisions/curves.md: the speed of the parameter may vary by a factor of 1000 along the profile.
 TEST(CurveGuards, aParameterStretchedTooFar) {
     Snapshot s{};
     s.neck.radius = HUGE_VAL, s.o.symbol = 1, s.o.g_max = 2;

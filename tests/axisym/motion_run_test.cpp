@@ -166,7 +166,7 @@ TEST(CurveRun, wavesOfATubeFollowTheAmplitudeEquations) {
 TEST(CurveRun, lawsOfConservation) {
     for (const char* model : {"gradient-flow", "overdamped", "stokes", "fluid"})
         for (const char* parametrisation : {"even", "material"}) {
-            // Waves of a fluid on an even parameter need many elements (docs/decisions.md).
+            // Waves of a fluid on an even parameter need many elements (docs/decisions/curves.md).
             const bool even = std::string(parametrisation) == "even";
             const double asked = even ? 1e-3 : 1e-5;
             std::vector<std::string> sets{std::string("model.kind=") + model, "model.volume=fixed",

@@ -60,7 +60,7 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
 
 TEST(MotionSettings, TheCoarserRunIsLooserButNotTooLoose) {
     // Both runs must differ by more than the finer one is off, and the coarser one still be on its way to the solution
-    // (docs/decisions.md): above 4e-4 it is no looser than it has to be.
+    // (docs/decisions/surface_motion.md): above 4e-4 it is no looser than it has to be.
     const Case c = begin(wavy, {"discretisation.order=4"}).c;
     for (const double finer : {1e-7, 1e-6, 5e-5, 1e-4, 1e-3, 1e-2}) {
         const double looser = coarser(c, {.elements = 320, .tolerance = finer}, Role::other_order, 1).tolerance;
