@@ -280,6 +280,16 @@ class Pictures(InFolder):
             self.assertIn(words, texts)
         self.assertFalse([text for text in texts if "energy_40" in text or "E\u2084\u2080" in text])  # zero: no line
 
+    def test_labels_as_given(self):
+        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06))]
+        texts = self.drawn(*files, "--label=coarse", "--label=fine")
+        for words in ("coarse", "fine"):
+            self.assertEqual(texts.count(words), 2, words)
+        self.assertFalse([text for text in texts if text.startswith("k\u2084\u2082 =")])
+        done = self.plot(*files, "--label=coarse", "-o", self.folder / "q.svg")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--label: 1 labels, but 2 results", done.stderr)
+
     def test_one_result_has_its_title_and_default_names(self):
         done = self.plot(write(self.folder / "one.hdf"))
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -630,7 +640,7 @@ class WorkPrecisionFluid(InFolder):
         done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         texts = svg_texts(self.folder / "w.svg")
-        for words in ("fluid, with inertia", "Stokes flow", "material, order 5", "even, order 5", "accuracy asked for"):
+        for words in ("fluid, with inertia", "Stokes flow", "material, order 5", "even, order 5", "requested accuracy"):
             self.assertIn(words, texts)
 
     def test_only_runs_that_none_beats_are_drawn(self):

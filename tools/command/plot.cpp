@@ -24,7 +24,7 @@ namespace tubule {
 namespace {
 
 struct PlotOptions {
-    std::vector<std::string> results, outputs, colours;
+    std::vector<std::string> results, outputs, colours, labels;
     std::vector<double> times;
     std::string kind = "all", plane = "z=0";
 };
@@ -43,6 +43,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
     if (!options.colours.empty()) arguments.push_back(fmt::format("--colour={}", fmt::join(options.colours, ",")));
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
+    for (const std::string& label : options.labels) arguments.push_back("--label=" + label);
     for_each_bending_term([&](std::size_t, const auto& term) {
         arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
     });
@@ -95,6 +96,10 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"u_n", "H", "K", "p"}));
+    command
+        ->add_option("--label", options->labels,
+                     "label of a result, one for each, in their order (default: what differs in their cases)")
+        ->allow_extra_args(false);
     command->add_option("--plane", options->plane, "of the cuts through surfaces: x, y or z = number")
         ->check(
             [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })

@@ -41,6 +41,7 @@ def arguments():
     parser.add_argument("--colour", default="", help="quantities to colour surfaces by: u_n,H,K,p")
     parser.add_argument("--plane", default="z=0", help="plane of the cuts")
     parser.add_argument("--kind", choices=NOTHING, default="all")
+    parser.add_argument("--label", action="append", default=[], help="of each result, instead of what its case differs by")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
 
@@ -102,6 +103,10 @@ def draw(paths, outputs, options):
     results = [read_result(path) for path in paths]
     names = [as_label(os.path.splitext(os.path.basename(path))[0]) for path in paths]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
+    if options.label:
+        if len(options.label) != len(results):
+            raise BadInput(f"--label: {len(options.label)} labels, but {len(results)} results")
+        labels = [[as_label(label)] for label in options.label]
     panels = Page(results, labels, options).panels()
     if not panels:
         raise BadInput(f"{', '.join(paths)}: {NOTHING[options.kind]} to draw")

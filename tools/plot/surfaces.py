@@ -145,6 +145,8 @@ class SurfacePanel:
         elif lone:  # in the middle of the page
             ends = self.centres[0] - pitch[0] / 2, self.centres[-1] + pitch[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(ends)) / 2
+        else:  # in the middle of what is right of the labels
+            self.centres += (room_x + GAP * len(widths) - sum(pitch) - slack * len(widths)) / 2
         self.right = self.centres[-1] + self.scale * widths[-1] / 2
         self.left = min(left, self.centres[0] - self.scale * widths[0] / 2) - 0.12
 

@@ -140,6 +140,8 @@ class ProfilePanel:
         if lone:
             occupied = self.centres[0] - self.scale * widths[0] / 2, self.centres[-1] + self.scale * widths[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
+        else:  # in the middle of what is right of the labels
+            self.centres += (room_x + gap * len(columns) - sum(pitch) - slack * len(columns)) / 2
         self.right = self.centres[-1] + self.scale * widths[-1] / 2 + self.MARGIN
         self._choose_colours()
 
