@@ -98,7 +98,7 @@ def work_precision(chart, jobs, runs, truth, front, named, outputs, error_of):
         axes.set_ylim(bottom=min(axes.get_ylim()[0], truth.known_to / 2))
         bottom = axes.get_ylim()[0]
         axes.axhspan(bottom, truth.known_to, color="0.93", zorder=0)
-        axes.annotate("the reference is no better known", (1, truth.known_to), (-3, 2), ha="right", va="bottom",
+        axes.annotate("within the error of the reference", (1, truth.known_to), (-3, 2), ha="right", va="bottom",
                       xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=SMALL,
                       color="0.35")  # fmt: skip
         axes.set_ylim(bottom=bottom)

@@ -121,7 +121,7 @@ class EnergyPanel:
         handles = self._legend_entries()
         longest = max(len(line) for handle in handles for line in handle.get_label().split("\n"))
         legend_width = 0.5 + 0.06 * longest
-        left, right = 0.5, width - legend_width - 0.1
+        left, right = 0.6, width - legend_width - 0.1
         initial = min((t for t in self.times if t >= self.settled), default=self.settled) * 1.03
         early = initial < 0.3 * self.end
         decades = self.settled < 0.01 * self.end

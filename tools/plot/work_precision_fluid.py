@@ -40,7 +40,7 @@ def draw_model(axes, runs, styles):
     # Nothing is known below the error of the reference.
     runs = [run._replace(error=max(run.error, reference.error)) for run in runs if run is not reference]
     axes.axhspan(reference.error * 1e-6, reference.error, color="0.93", zorder=0)
-    axes.annotate("the reference is no better known", (1, reference.error), (-8, -3), ha="right", va="top",
+    axes.annotate("within the error of the reference", (1, reference.error), (-8, -3), ha="right", va="top",
                   xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=6.5, color="0.35")
     for series, look in styles.items():
         every = [run for run in runs if run.series == series]
@@ -81,8 +81,8 @@ def draw(path, outputs):
         if left < 0.5:
             axes.set_ylabel("largest error of the energy, relative to E_ref")
     handles = [Line2D([], [], label=name, **styles[name]) for name in names]
-    handles.append(Line2D([], [], label="accuracy asked for", **STAR))
-    handles.append(Line2D([], [], label="estimate by the run itself", mfc="white", **STAR))
+    handles.append(Line2D([], [], label="requested accuracy", **STAR))
+    handles.append(Line2D([], [], label="error that the run states", mfc="white", **STAR))
     figure.legend(handles=handles, loc="lower center", ncol=4)
     style.save(figure, outputs)
 
