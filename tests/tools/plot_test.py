@@ -290,6 +290,14 @@ class Pictures(InFolder):
         self.assertEqual(done.returncode, 2)
         self.assertIn("--label: 1 labels, but 2 results", done.stderr)
 
+    def test_series_against_time_or_another_series(self):
+        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06))]
+        texts = self.drawn(*files, "--series=energy,energy_20", "--logy", "--from=0.1", "--to=0.5", "--label=a", "--label=b")
+        for words in ("a", "b", "energy", "energy_20", "time t"):
+            self.assertIn(words, texts)
+        self.assertNotIn("t\u2081 = 0.01", texts)  # no shapes
+        self.assertIn("energy_20", self.drawn(files[0], "--series=energy", "--x=energy_20"))
+
     def test_one_result_has_its_title_and_default_names(self):
         done = self.plot(write(self.folder / "one.hdf"))
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -495,6 +503,11 @@ class Refusals(InFolder):
     def test_arguments(self):
         file = write(self.folder / "a.hdf")
         self.refused("is not a list of numbers", file, "--times", "0,x")
+        self.refused("has no series r_mni; it has energy", file, "--series", "r_mni")
+        self.refused("no row has a time in the range; it goes from 0 to 1", file, "--series", "energy", "--from", "2")
+        self.refused("energy_40 is nowhere positive in the range, as --logy needs it", file, "--series=energy_40", "--logy")
+        self.refused("--x, --from, --to and --logy belong to --series", file, "--logy")
+        self.refused("is no scan, to which --confirmed belongs", file, "--confirmed", "points.json")
         self.refused("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3")
         self.refused("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg")
         self.refused("does not exist", file, "-o", self.folder / "none/x.png")

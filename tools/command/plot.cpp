@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -24,9 +25,11 @@ namespace tubule {
 namespace {
 
 struct PlotOptions {
-    std::vector<std::string> results, outputs, colours, labels;
+    std::vector<std::string> results, outputs, colours, labels, series;
     std::vector<double> times;
-    std::string kind = "all", plane = "z=0";
+    std::string kind = "all", plane = "z=0", x = "time", confirmed;
+    std::optional<double> from, to;
+    bool logy = false;
 };
 
 bool is_plane(const std::string& text) {
@@ -43,6 +46,12 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
     if (!options.colours.empty()) arguments.push_back(fmt::format("--colour={}", fmt::join(options.colours, ",")));
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
+    if (!options.series.empty()) arguments.push_back(fmt::format("--series={}", fmt::join(options.series, ",")));
+    arguments.push_back("--x=" + options.x);
+    if (options.from) arguments.push_back(fmt::format("--from={}", *options.from));
+    if (options.to) arguments.push_back(fmt::format("--to={}", *options.to));
+    if (options.logy) arguments.push_back("--logy");
+    if (!options.confirmed.empty()) arguments.push_back("--confirmed=" + options.confirmed);
     for (const std::string& label : options.labels) arguments.push_back("--label=" + label);
     for_each_bending_term([&](std::size_t, const auto& term) {
         arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
@@ -67,6 +76,20 @@ int plot(const PlotOptions& options) {
         return 4;
     }
     return become("plot", arguments);
+}
+
+void add_series_options(CLI::App& command, PlotOptions& options) {
+    command
+        .add_option("--series", options.series,
+                    "series to draw instead of all else, such as r_min,r_max; `tubule show --csv` lists them")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+    command.add_option("--x", options.x, "with --series: the series they are drawn against")->capture_default_str();
+    command.add_option("--from", options.from, "with --series: draw from this value of --x")->check(refuse_infinite);
+    command.add_option("--to", options.to, "with --series: draw up to this value of --x")->check(refuse_infinite);
+    command.add_flag("--logy", options.logy, "with --series: logarithmic axis");
+    command.add_option("--confirmed", options.confirmed,
+                       "of a scan: the output of `tubule confirm --json`, whose points are marked on the map");
 }
 
 }  // namespace
@@ -104,6 +127,7 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->check(
             [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
+    add_series_options(*command, *options);
     end_help(*command, {"tubule plot figure.hdf -o figure.svg"}, {{0}, {2}, {4, "the picture could not be drawn"}},
              {"pictures"});
     command->callback([options, &exit_status] { exit_status = plot(*options); });

@@ -19,6 +19,7 @@ from energy import EnergyPanel  # noqa: E402
 from labels import as_label, row_labels  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from results import BadInput, read_result  # noqa: E402
+from series import Choice, SeriesPanel  # noqa: E402
 from surfaces import SurfacePanel, choose_colours  # noqa: E402
 from tubes import TubePanel, choose_columns  # noqa: E402
 
@@ -42,6 +43,12 @@ def arguments():
     parser.add_argument("--plane", default="z=0", help="plane of the cuts")
     parser.add_argument("--kind", choices=NOTHING, default="all")
     parser.add_argument("--label", action="append", default=[], help="of each result, instead of what its case differs by")
+    parser.add_argument("--series", default="", help="series to draw, and nothing else")
+    parser.add_argument("--x", default="time", help="the series they are drawn against")
+    parser.add_argument("--from", type=float, dest="low", help="from this value of it")
+    parser.add_argument("--to", type=float, dest="high", help="up to this one")
+    parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
+    parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
 
@@ -95,6 +102,8 @@ class Page:
         return [self.results[i] for i in shown], [self.labels[i] for i in shown]
 
     def panels(self):
+        if self.options.series:
+            return [SeriesPanel(self.results, self.labels, self.options.series)]
         return [*self.profiles(), *self.surfaces(), *self.series()]
 
 
@@ -146,17 +155,23 @@ def read_arguments(options):
         options.plane = plane[1], float(plane[2])
     except (TypeError, ValueError):
         raise ValueError(f"--plane: '{options.plane}' is not x, y or z = number, such as z=0") from None
+    names = [name for name in options.series.split(",") if name]
+    if not names and (options.low is not None or options.high is not None or options.logy or options.x != "time"):
+        raise ValueError("--x, --from, --to and --logy belong to --series")
+    options.series = Choice(names, options.x, options.low, options.high, options.logy) if names else None
     options.terms = dict(term.split("=", 1) for term in options.term)
 
 
 def draw_any(options, outputs):
     """A scan, or runs."""
     if not any(scan.is_scan(path) for path in options.results):
+        if options.confirmed:
+            raise BadInput(f"{options.results[0]}: is no scan, to which --confirmed belongs")
         draw(options.results, outputs, options)
         return
-    if len(options.results) > 1 or options.times or options.colour or options.kind != "all":
-        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour and --kind")
-    scan.draw(options.results[0], outputs)
+    if len(options.results) > 1 or options.times or options.colour or options.kind != "all" or options.series:
+        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind and --series")
+    scan.draw(options.results[0], outputs, options.confirmed)
 
 
 def main():

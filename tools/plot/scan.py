@@ -1,5 +1,6 @@
 """Maps of scans: the outcome of each point, the boundaries between outcomes, and closed forms."""
 
+import json
 import re
 
 import h5py
@@ -28,6 +29,12 @@ COLOURS = {
     "self-intersection": "#b5651d",
     "failed": "#ff00ff",
     "undecided": "#9aa5ad",
+}
+VERDICTS = {
+    "agrees": {"marker": "o", "color": "black", "markerfacecolor": "white", "markersize": 6, "mew": 1.2},
+    "symmetry-broken": {"marker": "^", "color": "black", "markersize": 6},
+    "other-outcome": {"marker": "X", "color": "black", "markersize": 6},
+    "no-answer": {"marker": "$?$", "color": "black", "markersize": 6},
 }
 THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
@@ -145,7 +152,33 @@ def draw_line(axes, points, names, panel):
     return []
 
 
-def draw(path, outputs):
+def read_confirmed(path, scan):
+    """(number of the point, verdict) for each point of the JSON of `tubule confirm`."""
+    try:
+        with open(path) as file:
+            points = json.load(file)["points"]
+        found = [(int(point["point"]), point["values"]["verdict"]) for point in points]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(f"{path}: is not what `tubule confirm --json` prints") from error
+    if any(number >= scan or number < 0 for number, _ in found):
+        raise BadInput(f"{path}: belongs to another scan, with more points")
+    return found
+
+
+def draw_confirmed(axes, confirmed, shape, panel):
+    """A mark at each point that was run in three dimensions, by what came out."""
+    places = [np.unravel_index(number, shape) for number, _ in confirmed]
+    handles = []
+    for verdict, look in VERDICTS.items():
+        here = [place for place, (_, found) in zip(places, confirmed) if found == verdict]
+        if here:
+            x, y = (axis.values[list(index)] for axis, index in zip(axes, zip(*here)))
+            panel.plot(x, y, linestyle="", clip_on=False, zorder=4, **look)
+            handles.append(Line2D([], [], linestyle="", label=f"3D: {verdict} ({len(here)})", **look))
+    return handles
+
+
+def draw(path, outputs, confirmed=None):
     axes, points, names, title, boundary, crossings, thresholds = read(path)
     if len(axes) > 2:
         raise BadInput(f"{path}: a picture has one or two axes, this scan {len(axes)}: {', '.join(a.key for a in axes)}")
@@ -155,6 +188,11 @@ def draw(path, outputs):
     panel = figure.add_axes([0.09, 0.11, 0.62, 0.8])
     if len(axes) == 2:
         handles = draw_map(axes, points, names, boundary, crossings, thresholds, panel)
+        if confirmed:
+            shape = points["outcome"].shape
+            handles += draw_confirmed(axes, read_confirmed(confirmed, points["outcome"].size), shape, panel)
+    elif confirmed:
+        raise BadInput(f"{path}: has one axis; --confirmed marks points of a map")
     else:
         handles = draw_line(axes, points, names, panel)
     if axes[0].logarithmic:
