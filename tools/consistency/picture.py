@@ -4,6 +4,7 @@ import style  # from tools/plot, on the path since runs.py
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
 HEIGHT = 3.6  # inches
+COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7")  # of Okabe and Ito; then dashed
 PANELS = (
     ("energy at rest", "-at-rest", lambda row: row.quantity == "energy"),
     ("rates of small waves", "rates-", lambda row: bool(row.found)),
@@ -22,8 +23,8 @@ def draw(tables, path):
                     name = scene.name.removesuffix("-at-rest").removeprefix("rates-")
                     lines.append((f"{name} {row.quantity}" if part == "rates-" else name, row))
         for i, (label, row) in enumerate(lines):
-            colour = style.line_colours(len(lines))[i]
-            axes.loglog(row.meshes, [row.difference(t) for t in row.meshes], color=colour, label=label,
+            colour, dashes = COLOURS[i % len(COLOURS)], ("-", "--")[i // len(COLOURS) % 2]
+            axes.loglog(row.meshes, [row.difference(t) for t in row.meshes], color=colour, label=label, ls=dashes,
                         marker=style.MARKERS[i % len(style.MARKERS)])  # fmt: skip
         axes.loglog([100, 400], [1e-3, 1e-3 / 16], color="0.6", lw=0.6, ls=":")  # fourth order in the mesh width
         axes.set(title=title, xlabel="triangles")
