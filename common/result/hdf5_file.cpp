@@ -151,14 +151,18 @@ void require_parts(hid_t file) {
             throw std::runtime_error(fmt::format("not a Tubule result: the attribute {} is missing", part));
 }
 
+CaseText get_case(hid_t file) {
+    const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
+    return {get_case_text(text), get_texts(open_attribute(text, "set"), "set")};
+}
+
 Contents get_contents(hid_t file) {
     Contents contents;
     contents.id = get_attribute<std::uint64_t>(open_attribute(file, "id"), H5T_NATIVE_UINT64, "id");
     contents.sequence = get_attribute<std::uint64_t>(open_attribute(file, "sequence"), H5T_NATIVE_UINT64, "sequence");
     contents.about_begun =
         get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
-    const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
-    contents.case_text = {get_case_text(text), get_texts(open_attribute(text, "set"), "set")};
+    contents.case_text = get_case(file);
     const auto about = open_group(file, "about");
     for (const std::string& name : attribute_names(about))
         contents.about.emplace_back(name, get_value(open_attribute(about, name), name));
@@ -242,6 +246,10 @@ Contents read_hdf5(std::vector<std::byte> bytes) {
     const auto image = open_image(bytes);
     require_parts(image);
     return get_contents(image);
+}
+
+CaseText read_hdf5_case(const std::filesystem::path& file) {
+    return with_result(file, get_case);
 }
 
 void require_result(const std::filesystem::path& file) {

@@ -16,8 +16,9 @@ std::vector<std::byte> hdf5_image(const Contents& contents);
 // The bytes of a file in which VTK finds that frame of `file`, a path relative to the folder of the one to be written.
 std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
 
-// Both throw std::runtime_error naming the file, and what is missing if it is HDF5 but not a result.
+// All throw std::runtime_error naming the file, and what is missing if it is HDF5 but not a result.
 Contents read_hdf5(const std::filesystem::path& file);
+CaseText read_hdf5_case(const std::filesystem::path& file);
 Contents read_hdf5(std::vector<std::byte> bytes);        // of the HDF5 part of a file, which is good
 void require_result(const std::filesystem::path& file);  // looks for the parts without reading them
 

@@ -49,6 +49,11 @@ void check_text(const std::string& text, const std::string& where) {
         throw std::invalid_argument(fmt::format("{} contains a zero byte", where));
 }
 
+void check_case(const CaseText& c) {
+    check_text(c.text, "the case");
+    for (const std::string& set : c.sets) check_text(set, "--set");
+}
+
 void check_about(const About& about) {
     std::set<std::string> taken;
     for (const auto& [name, value] : about) {
@@ -260,8 +265,7 @@ ResultWriter::~ResultWriter() = default;
 
 ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const About& about,
                                   const std::vector<std::string>& series) {
-    check_text(c.text, "the case");
-    for (const std::string& set : c.sets) check_text(set, "--set");
+    check_case(c);
     check_about(about);
     check_series(series);
     const auto path = resolved(file);
@@ -277,7 +281,9 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     return ResultWriter(std::move(impl));
 }
 
-ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void(const Record&)>& check) {
+ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void(const Record&)>& check,
+                                  const std::optional<CaseText>& now) {
+    if (now) check_case(*now);
     const auto path = resolved(file);
     require_result(path);  // refuse a file that is not a result before changing anything
     auto impl = std::make_unique<Impl>(path);
@@ -288,6 +294,7 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
     } catch (const std::runtime_error& e) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
+    if (now) impl->contents.case_text = *now;
     const auto start = Clock::now();
     impl->rewound = hdf5_image(impl->contents);
     impl->cost = Clock::now() - start;
@@ -388,6 +395,10 @@ Result read_result(const fs::path& file) {
     result.frames = std::move(contents.frames);
     result.checkpoint = std::move(contents.checkpoint);
     return result;
+}
+
+CaseText read_case_text(const fs::path& file) {
+    return read_hdf5_case(file);
 }
 
 namespace {

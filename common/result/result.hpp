@@ -77,10 +77,11 @@ public:
                                const std::vector<std::string>& series);
     // Resumes a result from its newest restart record (checkpoint or last frame, whichever is later);
     // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
-    // restart_record() gives it. The file changes with the next record. Throws std::runtime_error if there is none, and
-    // whatever `check` throws of it, with the file as it was.
+    // restart_record() gives it. The file changes with the next record; its case becomes `now`, if that is given.
+    // Throws std::runtime_error if there is none, and whatever `check` throws of it, with the file as it was.
     static ResultWriter resume(
-        const std::filesystem::path& file, const std::function<void(const Record&)>& check = [](const Record&) {});
+        const std::filesystem::path& file, const std::function<void(const Record&)>& check = [](const Record&) {},
+        const std::optional<CaseText>& now = std::nullopt);
     ResultWriter(ResultWriter&&) noexcept;
     ResultWriter& operator=(ResultWriter&&) noexcept;
     ~ResultWriter();
@@ -115,6 +116,9 @@ struct Result {
 // Reads a result; if a journal lies beside it (the run was killed, or is still going on), its complete
 // records are included. Throws std::runtime_error naming the file when it is not a result.
 Result read_result(const std::filesystem::path& file);
+
+// The case alone, without rows and frames: quick for large results, too. Throws as read_result.
+CaseText read_case_text(const std::filesystem::path& file);
 
 // What is good of a result, whatever has happened to the file (not to its journal, which is included as far as it is
 // good). HDF5 sees none of what is damaged.

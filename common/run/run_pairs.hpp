@@ -14,7 +14,8 @@ namespace tubule {
 struct EndedRun {
     EnergyTrace trace;
     StopReport stop;
-    double least_symbol = 0;  // of a curve: how near its flow came to being ill-posed, theory.md (2.14)
+    double least_symbol = 0;         // of a curve: how near its flow came to being ill-posed, theory.md (2.14)
+    double end = 0, stationary = 0;  // time.end and time.stationary that it had; 0: none
 };
 
 // Which run of a pair a record belongs to (its number restart_role; 0: the run that is reported), and what it needs of
@@ -50,7 +51,7 @@ public:
 class RunPairs : public EstimatedRuns {
 public:
     // `restart`: the record from which the runs go on, or none. If that is of a reported run whose coarser run ended
-    // for a reason that no longer applies, the coarser one is run again.
+    // for a reason that no longer applies, such as a time.end that is later now, the coarser one is run again.
     RunPairs(PairedRuns& runs, const Case& c, RunObserver& watch, double begin_time, const Record* restart);
 
     RunSummary& next() override;
@@ -59,10 +60,12 @@ public:
 
 private:
     RunSummary& unfinished(RunSummary& coarser) const;
+    void keep_coarser();
 
     PairedRuns& runs_;
     RunObserver& watch_;
-    double begin_time_;
+    TimeSpan time_;
+    double begin_time_;                              // or that of the reported run which goes on
     bool resumes_ = false, reported_began_ = false;  // a run; the one to be reported
     int number_ = 0;                                 // of the run under way
     std::optional<EndedRun> coarser_;

@@ -167,7 +167,9 @@ void MotionError::resume(const Record& record, int triangles) {
     coarser_ = make(settings.role, settings);
     coarser_->run->resume({std::move(*own), saved.cells});
     coarser_->run->trace = saved.trace;
-    if (saved.stop >= 0) coarser_->run->end({static_cast<Stop>(saved.stop), saved.stop_time, "", ""});
+    const auto stop = static_cast<Stop>(saved.stop);
+    const bool goes_on = saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));
+    if (!goes_on) coarser_->run->end({stop, saved.stop_time, "", ""});
 }
 
 void check_error_restart(const Case& c, const Record& record) {

@@ -79,7 +79,7 @@ class FourTerms(unittest.TestCase):
 
     def result_of(self, case):
         result = self.folder / "result.hdf"
-        done = run(FOUR_TERMS, "run", case, "-o", result, "--quiet")
+        done = run(FOUR_TERMS, "run", case, "-o", result, "--quiet", "--overwrite")
         self.assertEqual(done.returncode, 0, done.stderr)
         return h5py.File(result, "r")
 
@@ -175,7 +175,7 @@ class FourTerms(unittest.TestCase):
         self.assertIn("k\u2082\u2082H\u00b2K", picture.read_text())  # k_{22}H^2K in real sub- and superscripts
 
     def test_derivatives_are_consistent(self):
-        done = run(FOUR_TERMS, "run", "--check-derivatives", self.perturbed, "-o", self.folder / "result.hdf")
+        done = run(FOUR_TERMS, "run", "--check-derivatives", "--overwrite", self.perturbed, "-o", self.folder / "result.hdf")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         slope = "right, Taylor slope (2\\.0|1\\.9)"
         self.assertRegex(done.stdout, f"k22\\ngradient: {slope}.*\\nHessian : {slope}")

@@ -49,7 +49,7 @@ class Runs:
         times = f"time.output=[{','.join(map(str, TIMES))}]"
         sets = [f"model.kind={model}", f"time.end={TIMES[-1]}", times, *sets]
         options = [part for value in sets for part in ("--set", value)]
-        process = subprocess.Popen([self.tubule, "run", "--quiet", CASE, *options, "-o", result], stdout=sys.stderr)
+        process = subprocess.Popen([self.tubule, "run", "--quiet", "--overwrite", CASE, *options, "-o", result], stdout=sys.stderr)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         if process.returncode != 0:

@@ -38,14 +38,14 @@ class Stops(unittest.TestCase):
         for name in ("stationary", "pinch_off", "resolution_lost", "time_limit"):
             case = CASES / f"{name}.toml"
             with self.subTest(case=name), tempfile.TemporaryDirectory() as folder:
-                command = [PROGRAM, "run", case, "--quiet", "-o", Path(folder, "case.hdf")]
+                command = [PROGRAM, "run", case, "--quiet", "--overwrite", "-o", Path(folder, "case.hdf")]
                 self.assertEqual(subprocess.run(command, capture_output=True).returncode, STATUS[expected_stop(case)])
 
 
 class OneCase(unittest.TestCase):
     def test_words_and_result_agree(self):
         stop = expected_stop(CASES)
-        command = [PROGRAM, "run", CASES, "--expect", "-o", RESULT]
+        command = [PROGRAM, "run", CASES, "--expect", "--overwrite", "-o", RESULT]
         done = subprocess.run(command, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn(f"{CASES}: {stop} at t = ", done.stdout)

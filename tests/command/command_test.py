@@ -69,7 +69,7 @@ class Run(ProgramTest):
             self.assertEqual(list(file["case"].attrs["set"]), ["energy.k42=0.4", "time.output=[]"])
             self.assertEqual(len(file["frames"]), 2)
         changed = series(self.result)["energy_42"][0]
-        self.tubule("run", self.case)
+        self.tubule("run", self.case, "--overwrite")
         # k42 is a factor of its term; the meshes of both runs hold the start within the requested accuracy, 1e-6 E_ref.
         self.assertAlmostEqual(changed, 4 * series(self.result)["energy_42"][0], delta=2e-4)
 
@@ -93,7 +93,7 @@ class Run(ProgramTest):
 
     def test_a_result_is_replaced(self):
         self.tubule("run", self.case)
-        self.tubule("run", self.case, "--set", "time.end=0.1")
+        self.tubule("run", self.case, "--set", "time.end=0.1", "--overwrite")
         self.assertEqual(series(self.result)["time"][-1], 0.1)
 
     def test_check_derivatives(self):

@@ -42,7 +42,7 @@ class FailedStart(ProgramTest):
         self.tubule("run", self.case)
         before = self.result.read_bytes()
         for key in EXTREME:
-            out = self.failing("run", self.case, "--set", key)
+            out = self.failing("run", self.case, "--overwrite", "--set", key)
             self.assertIn("solver-failed at t = 0: the numbers of the case are too large or too small", out)
             self.assertIn("to compute with: " + key.replace("=", " = "), out)
             self.assertIn("case.hdf is left as it was", out)
@@ -73,7 +73,7 @@ class FailedStart(ProgramTest):
         self.tubule("run", self.case)
         self.write("case.hdf.journal", "TUBULEJ1 and the rows of a run that was killed")
         before = self.result.read_bytes()
-        self.failing("run", self.case, "--set", EXTREME[0])
+        self.failing("run", self.case, "--overwrite", "--set", EXTREME[0])
         self.assertEqual(self.result.read_bytes(), before)
         self.assertIn("rows of a run", (self.folder / "case.hdf.journal").read_text())
 

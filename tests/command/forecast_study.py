@@ -68,7 +68,7 @@ class ForecastStudy(ProgramTest):
             path = self.write("case.toml", case(rng))
             words = self.tubule("check", path)[1]
             expected = seconds(words)
-            with self.start("run", path, "--quiet", "-o", "case.hdf") as process:
+            with self.start("run", path, "--quiet", "--overwrite", "-o", "case.hdf") as process:
                 process.communicate()
             about = json.loads(self.tubule("show", "case.hdf", "--json")[0])["about"]
             actual, steps = max(about["wall_seconds"], 1.0), re.search(r"about ([\d.e+]+) steps", words)

@@ -59,7 +59,7 @@ time = {end = 0.1}
 class Honesty(ProgramTest):
     def run_case(self, text, *sets, statuses=(0,)):
         path = self.write("case.toml", text)
-        with self.start("run", path, "--quiet", "-o", self.result, *(f"--set={x}" for x in sets)) as process:
+        with self.start("run", path, "--quiet", "--overwrite", "-o", self.result, *(f"--set={x}" for x in sets)) as process:
             said = process.communicate()
         self.assertIn(process.returncode, statuses, said)
         return about(self.result), series(self.result)

@@ -93,7 +93,7 @@ class Outcomes(ScanTest):
         for i, j in ((0, 0), (5, 0), (5, 2), (3, 3), (5, 5)):
             sets = [f"--set={AMPLITUDE}={axes[0][i]}", f"--set={K42}={axes[1][j]}"]
             run = self.folder / "run.hdf"
-            with self.start("run", "case.toml", *sets, "-o", run) as process:
+            with self.start("run", "case.toml", *sets, "--overwrite", "-o", run) as process:
                 process.communicate()
             self.assertIn(process.returncode, (0, 3))
             with h5py.File(run) as file:

@@ -117,7 +117,7 @@ def one(rng, box):
     sets = [*sets, f"--set=time.limit={LIMIT}"]
     if box.run("check", "--quick", case.name, *sets, statuses=(0, 2)).status == 2:
         return "without time.limit"
-    ran = box.run("run", case.name, *sets, "-o", "case.hdf")
+    ran = box.run("run", case.name, *sets, "--overwrite", "-o", "case.hdf")
     if ran.status == 2:
         raise Finding("run-refuses", f"check accepts, run does not: {ran.err[:500]}")
     if ran.seconds > 20 + 2 * LIMIT:

@@ -160,7 +160,7 @@ def one(rng, box):
     box.write(f"mesh.{ending}", contents)
     further = rng.choice(("", "", ", weld = 1e-6", ", weld = 10.0", ", smoothing = 2"))
     box.write("case.toml", CASE.format(ending, further, rng.choice((2, 3, 4))))
-    done = box.run("run", "case.toml", "--quiet", limit=30)
+    done = box.run("run", "case.toml", "--quiet", "--overwrite", limit=30)
     if done.status == 2:
         if not re.search(rf"mesh\.{ending}|case\.toml:\d+:\d+: ", done.err):
             raise Finding("no-place", f"refused without naming file or case: {done.err[:500]!r}")

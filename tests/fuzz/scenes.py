@@ -141,7 +141,7 @@ class Run:
         result = box.folder / "case.hdf"
         result.unlink(missing_ok=True)
         used = processor_seconds()
-        words = box.run("run", "case.toml", "--quiet", *(f"--set={x}" for x in (f"time.limit={limit}", *sets)), limit=20 * limit)
+        words = box.run("run", "case.toml", "--quiet", "--overwrite", *(f"--set={x}" for x in (f"time.limit={limit}", *sets)), limit=20 * limit)
         self.seconds = processor_seconds() - used
         self.warned, self.stop, self.stated, self.energy = bool(words.err.strip()), "no result", math.inf, {}
         if not result.exists():

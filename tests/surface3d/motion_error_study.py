@@ -61,7 +61,7 @@ def scene(seed):
 
 
 def run(tubule, folder, name, *sets):
-    command = [tubule, "run", "--quiet", "case.toml", "-o", name]
+    command = [tubule, "run", "--quiet", "--overwrite", "case.toml", "-o", name]
     for key in sets:
         command += ["--set", key]
     subprocess.run(command, cwd=folder, capture_output=True)

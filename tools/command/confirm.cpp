@@ -223,6 +223,7 @@ int run_in_3d(Point& p, const fs::path& folder) {
     const fs::path toml = folder / fmt::format("point_{:06}.toml", p.pick.point),
                    hdf = fs::path(toml).replace_extension(".hdf");
     RunOptions run{.cases = {toml.string()}, .sets = {}, .output = hdf.string()};
+    run.overwrite = true;
     run.resume = holds(hdf, p.surface_case);
     run.quiet = run.silent = true;
     std::ofstream(toml, std::ios::binary) << p.surface_case;

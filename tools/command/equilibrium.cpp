@@ -75,6 +75,7 @@ void add_equilibrium(CLI::App& app, int& exit_status) {
     command->add_option("CASE", o->cases, "case files with a table [equilibrium]")->required();
     command->add_option("--set", o->sets, "override a key, such as --set equilibrium.modes=5")->allow_extra_args(false);
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
+    command->add_flag("--overwrite", o->overwrite, "replace the result of another case");
     command->add_flag("--quiet", o->quiet, "no table; words only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     end_help(*command, {"tubule equilibrium cases/equilibrium_capsule.toml -o capsule.hdf"},

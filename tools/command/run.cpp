@@ -15,9 +15,12 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 #include "common/result/durable_io.hpp"
+#include "common/result/record.hpp"
 #include "common/result/result.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/run/run_pairs.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/progress.hpp"
@@ -25,6 +28,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/continuation.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
 #include "tools/run/forecast.hpp"
@@ -62,16 +66,26 @@ namespace {
 // Hands a run's rows and frames to the result file.
 class Recorder : public RunObserver {
 public:
-    Recorder(const Case& c, ResultWriter& writer, bool quiet, double begin)
-        : case_(c), writer_(writer), quiet_(quiet), progress_(begin, c.time.end, {.quiet = quiet}) {}
+    // `from`: the state that the run resumes from, or none.
+    Recorder(const Case& c, ResultWriter& writer, bool quiet, const Record* from)
+        : case_(c),
+          writer_(writer),
+          quiet_(quiet),
+          keeps_state_(from && !is_of_coarser_run(*from)),
+          progress_(from ? from->time : 0, c.time.end, {.quiet = quiet}) {}
     void row(std::span<const double> values) override {
         writer_.row(values);
         reached_ = values.front();
     }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
-    void checkpoint(const Record& state) override { writer_.checkpoint(state); }
-    void discard() override { writer_.discard(); }
+    void checkpoint(const Record& state) override {
+        if (!keeps_state_ || !is_of_coarser_run(state)) writer_.checkpoint(state);
+    }
+    void discard() override {
+        keeps_state_ = false;
+        writer_.discard();
+    }
     void next_run(int number, int of) override { progress_.next_run(number, of); }
     void progress(double time, double energy, double step) override { progress_(time, energy, step); }
     bool interrupted() override { return tubule::interrupted(); }
@@ -87,6 +101,7 @@ private:
     const Case& case_;
     ResultWriter& writer_;
     bool quiet_;
+    bool keeps_state_;  // no coarser run that is made again beside this one may replace it
     Progress progress_;
     std::optional<double> reached_;
 };
@@ -105,30 +120,8 @@ About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
     return about;
 }
 
-// Why a result's run ended; nothing if it is unfinished.
-std::optional<Stop> stop_of(const Result& result) {
-    for (const auto& [name, value] : result.about)
-        if (name == "stop") return stop_from_name(std::get<std::string>(value));
-    return std::nullopt;
-}
-
 bool has_rows(const std::filesystem::path& file) {
     return std::filesystem::exists(file) && !read_result(file).series.at("time").empty();
-}
-
-// Whether both are the same case but for comments and time.limit.
-bool same_run(const Case& c, const CaseText& other) {
-    if (other.text == c.text && other.sets == c.sets) return true;
-    const auto meaning = [&](const CaseText& text) {
-        Case read = parse_case(text.text, text.sets, c.path);
-        read.time.limit.reset();
-        return effective_toml(read);
-    };
-    try {
-        return meaning(other) == meaning({c.text, c.sets});
-    } catch (const CaseError&) {
-        return false;  // written by a version with other keys
-    }
 }
 
 // Expectations that a complete result does not meet, one line each.
@@ -196,22 +189,20 @@ struct Opened {
 };
 
 Opened create(const Case& c, const Engine& engine, const std::filesystem::path& file) {
-    return {ResultWriter::create(file, {c.text, c.sets}, about_start(), engine.series_names()), std::nullopt,
-            std::nullopt};
+    About about = about_start();
+    about.emplace_back("case_path", valid_utf8(std::filesystem::absolute(c.path).string()));
+    return {ResultWriter::create(file, {c.text, c.sets}, about, engine.series_names()), std::nullopt, std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
 std::optional<Opened> resume(const Case& c, const Engine& engine, const std::filesystem::path& file) {
     Result old = read_result(file);
-    if (!same_run(c, old.case_text))
-        throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another case or other --set",
-                                    file.string(), c.path));
-    const auto stop = stop_of(old);
-    if (c.equilibrium && (!stop || can_go_on(*stop)))
+    if (!goes_on(c, old, file)) return std::nullopt;
+    if (c.equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
-    if (stop && *stop != Stop::time_limit && *stop != Stop::interrupted) return std::nullopt;
     if (old.frames.empty() && !old.checkpoint) return create(c, engine, file);
-    ResultWriter writer = ResultWriter::resume(file, [&](const Record& record) { engine.check_restart(record); });
+    ResultWriter writer = ResultWriter::resume(
+        file, [&](const Record& record) { engine.check_restart(record); }, CaseText{c.text, c.sets});
     const Record& record = writer.restart_record();
     Restart restart{record};
     if (record.mesh) restart.cells = old.meshes.at(*record.mesh);
@@ -259,8 +250,14 @@ Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Record
     }
 }
 
-int run_case(Case c, const RunOptions& options) {
-    const std::filesystem::path file = result_path(options, c);
+// A frame at a time that lies behind cannot be written any more.
+void tell_missed_outputs(const Case& c, const Result& result, double from) {
+    if (const auto missed = missed_outputs(c, result, from); !missed.empty())
+        say(stderr, "{}: time.output {} is not written: the run goes on from t = {:.6g}\n", c.path,
+            fmt::join(missed, ", "), from);
+}
+
+int run_case(Case c, const std::filesystem::path& file, const RunOptions& options) {
     if (options.check_derivatives && !derivatives_pass(c)) {
         say(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
         return exit_code(Stop::solver_failed);
@@ -280,11 +277,12 @@ int run_case(Case c, const RunOptions& options) {
     if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
+    if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
     watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     Ended ended;
     {
         Recorder recorder(c, result->writer, options.quiet || c.equilibrium,
-                          result->restart ? result->restart->record.time : 0);
+                          result->restart ? &result->restart->record : nullptr);
         ended = run_to_its_end(c, *engine, *result, recorder);
     }
     const RunSummary& summary = ended.summary;
@@ -313,29 +311,73 @@ void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& fil
                         c.path, file.string()));
 }
 
+// A result of another case may be needed: only --overwrite replaces it.
+void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& file) {
+    if (!is_hdf5(file)) return;
+    std::string other;
+    try {
+        other = other_case(c, read_case_text(file));
+        if (other.empty() || !has_rows(file)) return;
+    } catch (const std::runtime_error&) {
+        return;  // no result, or a damaged one: the writer decides
+    }
+    throw CaseError(
+        fmt::format("{}: holds the result of another case than {}: {}\n--overwrite replaces it, -o FILE keeps both",
+                    file.string(), c.path, other));
+}
+
+struct Job {
+    Case c;
+    std::filesystem::path file;
+};
+
+// To go on with a result: its case and itself.
+Job job_of_result(const std::string& path, const std::vector<std::string>& sets, const RunOptions& options) {
+    if (!options.resume)
+        throw CaseError(fmt::format("{}: is a result: --resume goes on with it; to run it anew, give its case", path));
+    if (!options.output.empty())
+        throw CaseError(fmt::format("-o must be absent: {} itself goes on; copy it to keep it as it is", path));
+    try {
+        return {case_of_result(read_result(path), path, sets), path};
+    } catch (const CaseError&) {
+        throw;
+    } catch (const std::runtime_error& error) {
+        throw CaseError(explanation(error));
+    }
+}
+
+Job job_of(const std::string& path, const RunOptions& options) {
+    std::vector<std::string> sets = options.sets;
+    if (options.until) sets.push_back(fmt::format("time.end={}", *options.until));
+    if (is_hdf5(path)) return job_of_result(path, sets, options);
+    Case c = read_case(path, sets);
+    const auto file = result_path(options, c);
+    check_output(file);
+    refuse_to_replace_the_start(c, file);
+    if (!options.resume && !options.overwrite) refuse_to_replace_another_case(c, file);
+    return {std::move(c), file};
+}
+
 }  // namespace
 
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
         throw CaseError("-o names one result file, but there are several cases");
-    std::vector<Case> cases;  // all are read before any is run: bad input leaves nothing half done
+    std::vector<Job> jobs;  // all are read before any is run: bad input leaves nothing half done
     std::set<std::filesystem::path> files;
     for (const std::string& path : options.cases) {
-        cases.push_back(read_case(path, options.sets));
-        if (options.check_derivatives && !derivatives_can_be_checked(cases.back()))
+        jobs.push_back(job_of(path, options));
+        if (options.check_derivatives && !derivatives_can_be_checked(jobs.back().c))
             throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
-        const auto file = result_path(options, cases.back());
-        check_output(file);
-        refuse_to_replace_the_start(cases.back(), file);
-        if (!files.insert(file).second)
-            throw CaseError(fmt::format("{}: two of the cases would write {}", path, file.string()));
+        if (!files.insert(jobs.back().file).second)
+            throw CaseError(fmt::format("{}: two of the cases would write {}", path, jobs.back().file.string()));
     }
     catch_interrupts();
     int status = 0;
-    for (const Case& c : cases) {
+    for (const auto& [c, file] : jobs) {
         int one = 0;
         try {
-            one = run_case(c, options);
+            one = run_case(c, file, options);
         } catch (const CaseError&) {
             throw;
         } catch (const Paused& pause) {  // before there was a result to write to
@@ -354,20 +396,26 @@ int run_cases(const RunOptions& options) {
 void add_run(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("run", "Run cases, each into a result file");
     const auto o = std::make_shared<RunOptions>();
-    command->add_option("CASE", o->cases, "case files")->required();
+    command->add_option("CASE", o->cases, "case files; with --resume also results, which know their case")->required();
     command->add_option("--set", o->sets, "override a key, such as --set energy.k42=0.06")->allow_extra_args(false);
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
-    command->add_flag("--resume", o->resume, "continue a result that was interrupted, killed or out of time");
+    command->add_flag(
+        "--resume", o->resume,
+        "continue a result that was interrupted, killed or out of time, or extend it to a later time.end");
+    command->add_option("--until", o->until, "the time at which the run ends, as --set time.end=T")
+        ->check(CLI::Validator(refuse_infinite, ""));
+    command->add_flag("--overwrite", o->overwrite, "replace the result of another case");
     command->add_flag("--quiet", o->quiet, "no progress; output only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,
                       "first check the derivatives of the energy at the start");
-    end_help(*command,
-             {"tubule run cases/figure_k42_006.toml -o figure.hdf",
-              "tubule run cases/figure_k42_006.toml --set energy.k42=0.1 --set time.end=0.5 -o other.hdf",
-              "tubule run cases/figure_k42_006.toml -o figure.hdf --resume"},
-             {{0}, {1, "--expect: something did not come out as expected"}, {2}, {3}, {4}, {5}, {130}},
-             {"case_files", "results"});
+    end_help(
+        *command,
+        {"tubule run cases/figure_k42_006.toml -o figure.hdf",
+         "tubule run cases/figure_k42_006.toml --set energy.k42=0.1 --set time.end=0.5 -o other.hdf",
+         "tubule run cases/figure_k42_006.toml -o figure.hdf --resume", "tubule run figure.hdf --resume --until 2"},
+        {{0}, {1, "--expect: something did not come out as expected"}, {2}, {3}, {4}, {5}, {130}},
+        {"case_files", "results"});
     command->callback([o, &exit_status] { exit_status = run_cases(*o); });
 }
 

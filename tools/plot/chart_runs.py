@@ -102,7 +102,7 @@ class Program:
 
     def start(self, job, number):
         result = self.folder / f"run_{number}.hdf"
-        command = [self.path, "run", "--quiet", job.case, *set_options(job), "-o", result]
+        command = [self.path, "run", "--quiet", "--overwrite", job.case, *set_options(job), "-o", result]
         log = open(result.with_suffix(".log"), "wb")
         process = subprocess.Popen(
             list(map(str, command)),

@@ -1,0 +1,190 @@
+#include "tools/run/continuation.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string_view>
+
+#include "common/case/read.hpp"
+#include "common/case/text.hpp"
+#include "common/case/toml_input.hpp"
+#include "common/run/run.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr std::size_t most_named = 5;  // differences in a message
+const std::string absent = "absent";
+
+std::string value_text(const toml::node& node) {
+    if (const auto* value = node.as_string()) return toml_string(value->get());
+    if (const auto* value = node.as_integer()) return fmt::format("{}", value->get());
+    if (const auto* value = node.as_floating_point()) return fmt::format("{}", value->get());
+    if (const auto* value = node.as_boolean()) return fmt::format("{}", value->get());
+    std::vector<std::string> items;
+    if (const auto* list = node.as_array())
+        for (const toml::node& item : *list) items.push_back(value_text(item));
+    return fmt::format("[{}]", fmt::join(items, ", "));
+}
+
+bool holds_tables(const toml::node& node) {
+    const auto* list = node.as_array();
+    return list && !list->empty() && list->front().is_table();
+}
+
+// All values under their full keys, as in --set.
+void flatten(const toml::node& node, const std::string& key, std::map<std::string, std::string>& out) {
+    const auto below = [&](const std::string& name) { return key.empty() ? name : key + "." + name; };
+    if (const auto* table = node.as_table()) {
+        for (const auto& [name, value] : *table) flatten(value, below(std::string(name.str())), out);
+    } else if (holds_tables(node)) {
+        for (std::size_t i = 0; i < node.as_array()->size(); ++i)
+            flatten(*node.as_array()->get(i), below(std::to_string(i)), out);
+    } else {
+        out[key] = value_text(node);
+    }
+}
+
+// When a run ends and what it writes, not what it computes.
+bool may_change(const Difference& d) {
+    return d.key == "time.end" || d.key == "time.output" || d.key == "time.stationary";
+}
+
+std::string key_of(const std::string& set) {
+    return set.substr(0, set.find('='));
+}
+
+std::string unreadable(const CaseError& error) {
+    return fmt::format("its case cannot be read by this version: {}", error.what());
+}
+
+// Folder and name of the case file, from which its paths are read. Older results do not tell: then its own.
+std::string path_of_case(const Result& result, const std::filesystem::path& file) {
+    for (const auto& [name, value] : result.about)
+        if (const auto* text = std::get_if<std::string>(&value); text && name == "case_path") return *text;
+    return file.string();
+}
+
+}  // namespace
+
+std::map<std::string, std::string> values_of(const Case& c) {
+    std::map<std::string, std::string> out;
+    flatten(parse_toml(effective_toml(c), c.path), "", out);
+    std::erase_if(out, [](const auto& entry) {
+        const std::string& key = entry.first;
+        return key.starts_with("about.") || key.starts_with("expect.") || key == "time.limit";
+    });
+    return out;
+}
+
+std::vector<Difference> differences(const Case& there, const Case& here) {
+    const auto old = values_of(there), now = values_of(here);
+    std::vector<Difference> out;
+    for (const auto& [key, value] : old) {
+        const auto other = now.find(key);
+        if (other == now.end())
+            out.push_back({key, value, absent});
+        else if (other->second != value)
+            out.push_back({key, value, other->second});
+    }
+    for (const auto& [key, value] : now)
+        if (!old.contains(key)) out.push_back({key, absent, value});
+    return out;
+}
+
+std::string words(const std::vector<Difference>& differences) {
+    std::vector<std::string> parts;
+    for (const Difference& d : differences) {
+        if (parts.size() == most_named) {
+            parts.push_back(fmt::format("and {} more", differences.size() - most_named));
+            break;
+        }
+        parts.push_back(fmt::format("{} is {} there, {} here", d.key, d.there, d.here));
+    }
+    return fmt::format("{}", fmt::join(parts, "; "));
+}
+
+bool is_hdf5(const std::filesystem::path& file) {
+    static constexpr std::array<char, 8> signature{'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(file, none)) return false;
+    std::array<char, 8> begin{};
+    std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
+    return begin == signature;
+}
+
+Case case_of_result(const Result& result, const std::filesystem::path& file, const std::vector<std::string>& sets) {
+    std::set<std::string> replaced;
+    for (const std::string& set : sets) replaced.insert(key_of(set));
+    std::vector<std::string> all = result.case_text.sets;
+    std::erase_if(all, [&](const std::string& set) { return replaced.contains(key_of(set)); });
+    all.insert(all.end(), sets.begin(), sets.end());
+    return parse_case(result.case_text.text, all, path_of_case(result, file));
+}
+
+std::optional<Stop> stop_of(const Result& result) {
+    for (const auto& [name, value] : result.about)
+        if (name == "stop") return stop_from_name(std::get<std::string>(value));
+    return std::nullopt;
+}
+
+bool goes_on(const Case& c, const Result& result, const std::filesystem::path& file) {
+    const auto refuse = [&](const std::string& why) {
+        throw CaseError(fmt::format("{}: cannot be resumed with {}: {}", file.string(), c.path, why));
+    };
+    Case before;
+    try {
+        before = parse_case(result.case_text.text, result.case_text.sets, c.path);
+    } catch (const CaseError& error) {
+        refuse(unreadable(error));
+    }
+    if (c.moves() && !before.moves()) refuse("nothing moves in its case, so time.end must be absent");
+    std::vector<Difference> fixed = differences(before, c);
+    std::erase_if(fixed, may_change);
+    if (!fixed.empty())
+        refuse(
+            fmt::format("it belongs to another case or other --set: {}\nonly time.end, time.output, time.stationary "
+                        "and time.limit may change",
+                        words(fixed)));
+    const auto stop = stop_of(result);
+    const bool unfinished = !stop || can_go_on(*stop);
+    if (!c.moves()) return unfinished;
+    const std::vector<double>& times = result.series.at("time");
+    const double reached = times.empty() ? 0 : times.back();
+    if (c.time.end < reached * (1 - 1e-12))
+        refuse(fmt::format("time.end must be later than t = {:.6g}, which the result has reached, not {}", reached,
+                           c.time.end));
+    if (unfinished) return true;
+    const bool longer = c.time.end > before.time.end;
+    if (*stop == Stop::finished) return longer;
+    if (*stop == Stop::stationary) return longer || c.time.stationary != before.time.stationary;
+    if (longer)
+        refuse(
+            fmt::format("its run ended at t = {:.6g} with {}: a later time.end changes nothing", reached, name(*stop)));
+    return false;
+}
+
+std::vector<double> missed_outputs(const Case& c, const Result& result, double from) {
+    std::vector<double> out;
+    for (const double t : c.time.output) {
+        const auto there = [&](const Record& frame) { return frame.time == t; };
+        if (t > 0 && t <= from && std::ranges::none_of(result.frames, there)) out.push_back(t);
+    }
+    return out;
+}
+
+std::string other_case(const Case& c, const CaseText& of_result) {
+    if (of_result.text == c.text && of_result.sets == c.sets) return {};
+    try {
+        return words(differences(parse_case(of_result.text, of_result.sets, c.path), c));
+    } catch (const CaseError& error) {
+        return unreadable(error);
+    }
+}
+
+}  // namespace tubule
