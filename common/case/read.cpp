@@ -26,13 +26,13 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
     c.path = path;
     c.text = text;
     c.sets = sets;
-    try {
-        Reader::read(root, "", path + ":1:1", [&](Reader& k) { keys(k, c); });
-    } catch (const CaseError& error) {
-        // Several keys may cause the error, among them an override.
-        const std::string message = error.what();
-        if (sets.empty() || message.starts_with("--set ")) throw;
-        throw CaseError(fmt::format("{} (with --set {})", message, fmt::join(sets, " --set ")));
+    Complaints complaints;
+    Reader::read(root, "", path + ":1:1", complaints, [&](Reader& k) { keys(k, c); });
+    if (complaints.any()) {
+        for (Complaint& one : complaints.found)  // several keys may cause it, among them an override
+            if (!sets.empty() && !one.place.starts_with("--set "))
+                one.what += fmt::format(" (with --set {})", fmt::join(sets, " --set "));
+        throw CaseErrors(std::move(complaints.found));
     }
     note_places(root, "", c.places);
     if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;

@@ -4,7 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "common/case/overrides.hpp"
 #include "common/case/read.hpp"
@@ -13,6 +16,8 @@
 namespace tubule {
 
 namespace {
+
+constexpr double most_in_range = 1e5;
 
 std::string shown(const toml::node& node) {
     if (const auto* value = node.as_string()) return "the string " + toml_string(value->get());
@@ -34,15 +39,41 @@ bool within(double x, const Range& range) {
 
 [[noreturn]] void refuse_value(const std::string& where, const std::string& path, const std::string& what,
                                const toml::node& node) {
-    throw CaseError(fmt::format("{}: {} must be {}, not {}", where, path, what, shown(node)));
+    throw CaseErrors({{where, path, fmt::format("{} must be {}, not {}", path, what, shown(node)), ""}});
 }
 
-std::string meant(const std::string& word, const std::vector<std::string>& names) {
-    const auto name = near_miss(word, names);
-    return name ? fmt::format("; did you mean '{}'?", *name) : "";
+std::string meant(const std::string& suggestion) {
+    return suggestion.empty() ? "" : fmt::format("; did you mean '{}'?", suggestion);
+}
+
+// Of "lo:hi:n", n >= 2 numbers from lo to hi; nothing if the text has not that form.
+std::optional<std::vector<double>> evenly_spaced(const std::string& text) {
+    const std::vector<std::string> parts = split(text, ':');
+    std::vector<double> given;
+    for (const std::string& part : parts) {
+        double value = 0;
+        const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+        if (error != std::errc{} || end != part.data() + part.size() || !std::isfinite(value)) return std::nullopt;
+        given.push_back(value);
+    }
+    if (given.size() != 3 || !(given[1] > given[0]) || given[2] != std::floor(given[2])) return std::nullopt;
+    if (given[2] < 2 || given[2] > most_in_range) return std::nullopt;
+    std::vector<double> out;
+    const int n = static_cast<int>(given[2]);
+    for (int i = 0; i < n; ++i) out.push_back(given[0] + (given[1] - given[0]) * i / (n - 1));
+    out.back() = given[1];
+    return out;
+}
+
+std::string lines_of(const std::vector<Complaint>& all) {
+    std::string out;
+    for (const Complaint& c : all) out += fmt::format("{}{}: {}", out.empty() ? "" : "\n", c.place, c.what);
+    return out;
 }
 
 }  // namespace
+
+CaseErrors::CaseErrors(std::vector<Complaint> all) : CaseError(lines_of(all)), complaints(std::move(all)) {}
 
 std::string Reader::where(const toml::node& node) const {
     return place(node.source());
@@ -52,27 +83,47 @@ std::string Reader::path_of(const std::string& key) const {
     return path_.empty() || key.empty() ? path_ + key : path_ + "." + key;
 }
 
-const toml::node* Reader::find(const std::string& key, const std::string& what, bool needed) {
+const toml::node* Reader::find(const std::string& key, const std::string& what, bool needed, bool in_doubt) {
     if (pass_ == Pass::names) {
         names_.push_back(key);
         return nullptr;
     }
     const toml::node* node = table_.get(key);
-    if (!node && needed) throw CaseError(fmt::format("{}: missing key {}: {}", where_, path_of(key), what));
-    return node;
+    if (node || !needed) return node;
+    if (was_meant(key)) {
+        complaints_.keys_in_doubt = complaints_.keys_in_doubt || in_doubt;
+        return nullptr;
+    }
+    collect(
+        [&] {
+            throw CaseErrors({{where_, path_of(key), fmt::format("missing key {}: {}", path_of(key), what), ""}});
+        },
+        in_doubt);
+    return nullptr;
 }
 
-void Reader::refuse_unknown() const {
+// Whether another word stands where this key was meant: it is not missing.
+bool Reader::was_meant(const std::string& key) const {
+    return std::find(meant_.begin(), meant_.end(), key) != meant_.end();
+}
+
+void Reader::refuse_unknown() {
+    const bool in_doubt = complaints_.keys_in_doubt;
     for (const auto& [key, node] : table_) {
         const std::string name(key.str());
         if (std::find(names_.begin(), names_.end(), name) != names_.end() || (accepts_ && accepts_(name))) continue;
-        const std::string suggestion = meant(name, names_);
-        throw CaseError(fmt::format("{}: unknown key {}{} Allowed here: {}", place(key.source()), path_of(name),
-                                    suggestion.empty() ? "." : suggestion, fmt::join(names_, ", ")));
+        const std::string suggestion = near_miss(name, names_).value_or("");
+        if (in_doubt && suggestion.empty()) continue;
+        meant_.push_back(suggestion);
+        const std::string words = meant(suggestion);
+        complaints_.found.push_back({place(key.source()), path_of(name),
+                                     fmt::format("unknown key {}{} Allowed here: {}", path_of(name),
+                                                 words.empty() ? "." : words, fmt::join(names_, ", ")),
+                                     suggestion});
     }
 }
 
-void Reader::refuse(const std::string& key, const std::string& complaint) const {
+void Reader::refuse(const std::string& key, const std::string& complaint) {
     std::string place_of_key = where_;
     const toml::node* at = &table_;
     for (const std::string& name : split(key, '.')) {
@@ -80,23 +131,27 @@ void Reader::refuse(const std::string& key, const std::string& complaint) const 
         if (!at) break;
         place_of_key = where(*at);
     }
-    throw CaseError(fmt::format("{}: {} {}", place_of_key, path_of(key), complaint));
+    complaints_.found.push_back({place_of_key, path_of(key), fmt::format("{} {}", path_of(key), complaint), ""});
 }
 
 void Reader::flag(const std::string& key, bool& target) {
     const std::string what = "true or false";
     const toml::node* node = find(key, what, false);
     if (!node) return;
-    if (!node->is_boolean()) refuse_value(where(*node), path_of(key), what, *node);
-    target = node->as_boolean()->get();
+    collect([&] {
+        if (!node->is_boolean()) refuse_value(where(*node), path_of(key), what, *node);
+        target = node->as_boolean()->get();
+    });
 }
 
 void Reader::text(const std::string& key, std::string& target, bool needed) {
     const std::string what = "a string";
     const toml::node* node = find(key, what, needed);
     if (!node) return;
-    if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
-    target = node->as_string()->get();
+    collect([&] {
+        if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
+        target = node->as_string()->get();
+    });
 }
 
 void Reader::increasing(const std::string& key, std::vector<double>& target, const Range& range, bool needed) {
@@ -104,31 +159,53 @@ void Reader::increasing(const std::string& key, std::vector<double>& target, con
     const toml::node* node = find(key, what, needed);
     if (!node) return;
     target.clear();
-    for (const toml::node& item : as_list(*node, path_of(key), what)) {
-        const std::string path = fmt::format("{}.{}", path_of(key), target.size());
-        const double x = number_in(item, path, range);
-        if (!target.empty() && x <= target.back())
-            throw CaseError(fmt::format("{}: {} must be larger than the {} before it, not {}: {} is {}", where(item),
-                                        path, target.back(), x, path_of(key), what));
-        target.push_back(x);
-    }
+    collect([&] {
+        if (node->is_string()) {
+            const auto values = evenly_spaced(node->as_string()->get());
+            const bool allowed = values && std::ranges::all_of(*values, [&](double x) { return allows(x, range); });
+            if (!allowed)
+                refuse_value(where(*node), path_of(key), what + " or a range \"lo:hi:n\", " + expected("each", range),
+                             *node);
+            target = *values;
+            return;
+        }
+        for (const toml::node& item : as_list(*node, path_of(key), what)) {
+            const std::string path = fmt::format("{}.{}", path_of(key), target.size());
+            const double x = number_in(item, path, range);
+            if (!target.empty() && x <= target.back())
+                throw CaseErrors({{where(item), path,
+                                   fmt::format("{} must be larger than the {} before it, not {}: {} is {}", path,
+                                               target.back(), x, path_of(key), what),
+                                   ""}});
+            target.push_back(x);
+        }
+    });
+}
+
+// A bound that comes from another key is none if that key may be wrong.
+bool Reader::allows(double x, Range range) const {
+    if (!range.note.empty() && complaints_.any()) range.to = std::numeric_limits<double>::infinity();
+    return within(x, range);
 }
 
 void Reader::ramp(const std::string& key, Ramp& target) {
     const std::string what = "a number, or {time = [...], value = [...]}";
     const toml::node* node = find(key, what, false);
     if (!node) return;
-    if (node->is_number())
-        target = number_in(*node, path_of(key), {});
-    else if (node->is_table())
-        ramp_in(*node->as_table(), key, target);
-    else
-        refuse_value(where(*node), path_of(key), what, *node);
+    collect([&] {
+        if (node->is_number())
+            target = number_in(*node, path_of(key), {});
+        else if (node->is_table())
+            ramp_in(*node->as_table(), key, target);
+        else
+            refuse_value(where(*node), path_of(key), what, *node);
+    });
 }
 
-void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& target) const {
+void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& target) {
     std::vector<double> times, values;
-    read(table, path_of(key), where(table), [&](Reader& k) {
+    const std::size_t complaints = complaints_.found.size();
+    read(table, path_of(key), where(table), complaints_, [&](Reader& k) {
         k.increasing("time", times, {.from = 0}, required);
         k.numbers("value", values, required);
         k.check("value", [&] {
@@ -137,7 +214,7 @@ void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& tar
                                                    : "";
         });
     });
-    target = Ramp(times, values);
+    if (complaints_.found.size() == complaints) target = Ramp(times, values);
 }
 
 void Reader::numbers(const std::string& key, std::vector<double>& target, bool needed) {
@@ -145,21 +222,23 @@ void Reader::numbers(const std::string& key, std::vector<double>& target, bool n
     const toml::node* node = find(key, what, needed);
     if (!node) return;
     target.clear();
-    for (const toml::node& item : as_list(*node, path_of(key), what))
-        target.push_back(number_in(item, fmt::format("{}.{}", path_of(key), target.size()), {}));
+    collect([&] {
+        for (const toml::node& item : as_list(*node, path_of(key), what))
+            target.push_back(number_in(item, fmt::format("{}.{}", path_of(key), target.size()), {}));
+    });
 }
 
 double Reader::number_in(const toml::node& node, const std::string& path, const Range& range) const {
     if (node.is_number()) {
         const double x =
             node.is_integer() ? static_cast<double>(node.as_integer()->get()) : node.as_floating_point()->get();
-        if (within(x, range)) return x;
+        if (allows(x, range)) return x;
     }
     refuse_value(where(node), path, expected("a number", range), node);
 }
 
 int Reader::integer_in(const toml::node& node, const std::string& path, const Range& range) const {
-    if (node.is_integer() && within(static_cast<double>(node.as_integer()->get()), range))
+    if (node.is_integer() && allows(static_cast<double>(node.as_integer()->get()), range))
         return static_cast<int>(node.as_integer()->get());
     refuse_value(where(node), path, expected("an integer", range), node);
 }
@@ -169,9 +248,13 @@ std::size_t Reader::one_of(const toml::node& node, const std::string& path,
     if (!node.is_string()) refuse_value(where(node), path, expected(names), node);
     const std::string& name = node.as_string()->get();
     const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end())
-        throw CaseError(fmt::format("{}: {} must be {}, not {}{}", where(node), path, expected(names),
-                                    toml_string(name), meant(name, names)));
+    if (found == names.end()) {
+        const std::string suggestion = near_miss(name, names).value_or("");
+        throw CaseErrors(
+            {{where(node), path,
+              fmt::format("{} must be {}, not {}{}", path, expected(names), toml_string(name), meant(suggestion)),
+              suggestion}});
+    }
     return static_cast<std::size_t>(found - names.begin());
 }
 

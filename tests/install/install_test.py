@@ -34,6 +34,10 @@ class Install(unittest.TestCase):
         run(CMAKE, "--build", build)
         self.assertIn("energy", run(build / "uses_tubule"))
 
+    def test_schemas_are_installed(self):
+        found = {path.name for path in (self.prefix / "share/tubule/schemas").iterdir()}
+        self.assertEqual(found, {path.name for path in (Path(__file__).parents[2] / "docs/schemas").iterdir()})
+
     def test_installed_cases_find_their_meshes(self):
         cases = self.prefix / "share/tubule/cases"
         run(self.prefix / "bin/tubule", "run", cases / "surface_file.toml", "--expect", cwd=self.folder)

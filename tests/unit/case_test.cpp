@@ -11,6 +11,7 @@
 #include <fstream>
 #include <numbers>
 
+#include "common/case/complaints.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "tests/support/message_of.hpp"
@@ -693,8 +694,10 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
     EXPECT_EQ(refused("accuracy.r_min=0.8").substr(0, 79),
               "--set accuracy.r_min=0.8: accuracy.r_min must be below the smallest radius of t");
     for (const std::string tier : {"axisym", "surface3d"})
-        EXPECT_EQ(refusal(with("tier = \"axisym\"", "tier = \"" + tier + "\"") + "[auto]\nmodes = 3\n"),
-                  "case.toml:28:1: auto must be absent: only valid with tier = \"auto\"");
+        EXPECT_EQ(refusal(with("tier = \"axisym\"", "tier = \"" + tier + "\"") + "[auto]\nmodes = 3\n",
+                          {"discretisation.order=3"}),
+                  "case.toml:28:1: auto must be absent: only valid with tier = \"auto\" (with --set "
+                  "discretisation.order=3)");
 }
 
 TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
@@ -764,6 +767,56 @@ TEST(Tube, RadiusIsDifferentiable) {
     EXPECT_DOUBLE_EQ(radius_at(tube, z), 1.6 + 0.2 * std::cos(q * z + 0.4));  // the formula of the shape
     // Complex step, exact to rounding: r0(z + i h) = r0 + i h r0'.
     EXPECT_DOUBLE_EQ(radius_at(tube, std::complex<double>(z, h)).imag() / h, -0.2 * q * std::sin(q * z + 0.4));
+}
+
+TEST(CaseErrors, allAreReportedAtOnce) {
+    EXPECT_EQ(
+        refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
+        "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, H0\n"
+        "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, mode "
+        "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"
+        "--set accuracy.energy=often: accuracy.energy must be a number > 1e-12 and <= 0.1, not the string "
+        "\"often\"\n"
+        "--set time.end=-1: time.end must be a number > 0, not -1");
+}
+
+TEST(CaseRanges, OutputTimesEvenlySpaced) {
+    EXPECT_EQ(parse_case(good, {"time.output=0.2:1.4:4"}, "case.toml").time.output,
+              (std::vector<double>{0.2, 0.2 + (1.4 - 0.2) * 1 / 3, 0.2 + (1.4 - 0.2) * 2 / 3, 1.4}));
+    const std::string form =
+        "time.output must be a list of increasing numbers or a range \"lo:hi:n\", each >= 0 and "
+        "<= 1.4 (time.end), not the string ";
+    for (const std::string bad : {"0:2:3", "0:1", "1:0:3", "0:1:1", "0:1:2.5", "0:1:1e9", "-1:1:3", "a:1:2"})
+        EXPECT_EQ(refusal(good, {"time.output=" + bad}), "--set time.output=" + bad + ": " + form + "\"" + bad + "\"");
+}
+
+// What only follows from another wrong key is no complaint of its own.
+TEST(CaseErrors, consequencesAreNotReported) {
+    const std::string flow = with("gradient-flow", "fluidd");
+    EXPECT_EQ(refusal(flow, {"velocity.initial=rotation", "velocity.omega=1", "model.Re=1"}).substr(0, 52),
+              "case.toml:8:8: model.kind must be one of \"gradient-f");
+    EXPECT_EQ(refusal(flow, {"velocity.initial=rotation", "velocity.omega=1", "model.Re=1"}).find('\n'),
+              std::string::npos);
+    // Neither are the outputs too late, nor is anything missing.
+    for (const char* set : {"time.end=often", "tier=axsym", "shape.kind=tub", "shape.radius=x"})
+        EXPECT_EQ(refusal(good, {set}).find('\n'), std::string::npos) << refusal(good, {set});
+    EXPECT_EQ(refusal(with("[time]", "[tmie]")).find("missing"), std::string::npos);
+    EXPECT_EQ(refusal(""), "case.toml:1:1: missing key tier: one of \"axisym\", \"surface3d\", \"auto\"");
+}
+
+TEST(CaseErrors, complaintsHaveTheirParts) {
+    try {
+        parse_case(with("radius", "raduis"), {"model.kind=fluidd"}, "case.toml");
+        FAIL();
+    } catch (const CaseErrors& error) {
+        ASSERT_EQ(error.complaints.size(), 2u);
+        EXPECT_EQ(error.complaints[0].place, "--set model.kind=fluidd");
+        EXPECT_EQ(error.complaints[0].key, "model.kind");
+        EXPECT_EQ(error.complaints[0].suggestion, "fluid");
+        EXPECT_EQ(error.complaints[1].place, "case.toml:11:1");
+        EXPECT_EQ(error.complaints[1].key, "shape.raduis");
+        EXPECT_EQ(error.complaints[1].suggestion, "radius");
+    }
 }
 
 TEST(Tube, NarrowestPlaceLiesBetweenSamples) {

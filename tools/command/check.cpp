@@ -1,18 +1,25 @@
 // tubule check CASE... : reads and validates cases, and prints them with overrides applied and defaults written out.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
+#include <regex>
 #include <string>
 #include <vector>
 
+#include "common/case/complaints.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/solve/message.hpp"
+#include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/json.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
 
 namespace tubule {
@@ -21,7 +28,7 @@ namespace {
 
 struct CheckOptions {
     std::vector<std::string> cases, sets;
-    bool quick = false;
+    bool quick = false, json = false;
 };
 
 // On one line, in UTF-8: the output must be a case whatever its file is called.
@@ -32,30 +39,119 @@ std::string shown_path(const std::string& path) {
     return shown;
 }
 
-// For people: the answer itself is the case, the same at each call.
-void tell_expected(const Case& c) {
-    std::string told;
+// Keys that the case leaves to the program, and what it takes for them: defaults that depend on other keys.
+std::vector<std::string> chosen(const Case& c) {
+    std::vector<std::string> out;
+    if (c.tier != Tier::surface3d) return out;
+    if (!c.surface.order) out.push_back(fmt::format("discretisation.order = {}", element_order(c)));
+    if (!c.moves()) return out;
+    if (!c.surface.scheme)
+        out.push_back(fmt::format("discretisation.scheme = \"{}\"", entry(surface3d::time_scheme(c)).name));
+    if (!c.surface.time_tolerance && !c.surface.step)
+        out.emplace_back("discretisation.time_tolerance follows from accuracy.energy");
+    return out;
+}
+
+// What is known of a case: all that is wrong with it, or what it will take.
+struct Checked {
+    std::string path;
+    std::vector<Complaint> complaints;
+    std::string toml;                  // resolved
+    std::vector<std::string> chosen;   // in words
+    std::optional<Forecast> expected;  // with --quick nothing
+    std::string unknown;               // why nothing is expected
+    bool valid() const { return complaints.empty(); }
+};
+
+// Files that the case names are read as well.
+Checked checked(const std::string& path, const CheckOptions& options) {
+    Checked out;
+    out.path = path;
     try {
-        told = words(forecast(c));
+        const Case c = read_case(path, options.sets);
+        out.toml = effective_toml(c);
+        out.chosen = chosen(c);
+        engine_for(c);
+        if (!options.quick) out.expected = forecast(c);
+    } catch (const CaseErrors& error) {
+        out.complaints = error.complaints;
+    } catch (const CaseError& error) {
+        out.complaints = {{"", "", error.what(), ""}};
     } catch (const std::exception& error) {
-        told = "unknown: " + explanation(error);
+        out.unknown = explanation(error);
     }
-    say(stderr, "{}: expected: {}\n", shown_path(c.path), told);
+    return out;
+}
+
+void tell(const Checked& c, bool quick) {
+    if (!c.valid()) {
+        for (const Complaint& one : c.complaints)
+            say(stderr, "{}{}{}\n", one.place, one.place.empty() ? "" : ": ", one.what);
+        return;
+    }
+    std::string answer = fmt::format("# OK {}\n{}", shown_path(c.path), c.toml);
+    for (const std::string& words : c.chosen) add(answer, "\n# by default: {}", words);
+    print_answer(answer + "\n");
+    // For people: the answer itself is the case, the same at each call.
+    if (c.expected)
+        say(stderr, "{}: expected: {}\n", shown_path(c.path), words(*c.expected));
+    else if (!quick)
+        say(stderr, "{}: expected: unknown: {}\n", shown_path(c.path), c.unknown);
+}
+
+// ---- JSON
+
+std::string or_null(const std::string& text) {
+    return text.empty() ? "null" : json(valid_utf8(text));
+}
+
+std::string or_null(const std::optional<double>& number) {
+    return number ? json(*number) : "null";
+}
+
+// "file:line:column" as such, where it has that form.
+std::string place_json(const std::string& place) {
+    static const std::regex form("([^]*):([0-9]+):([0-9]+)");
+    std::smatch part;
+    if (place.starts_with("--set ") || !std::regex_match(place, part, form))
+        return "\"file\": null, \"line\": null, \"column\": null";
+    return fmt::format("\"file\": {}, \"line\": {}, \"column\": {}", json(valid_utf8(part[1].str())), part[2].str(),
+                       part[3].str());
+}
+
+std::string json_of(const Complaint& c) {
+    return fmt::format("{{\"place\": {}, {}, \"key\": {}, \"message\": {}, \"suggestion\": {}}}", or_null(c.place),
+                       place_json(c.place), or_null(c.key), json(valid_utf8(c.what)), or_null(c.suggestion));
+}
+
+std::string json_of(const Checked& c) {
+    std::vector<std::string> errors;
+    for (const Complaint& one : c.complaints) errors.push_back(json_of(one));
+    std::string expected = "null";
+    if (c.expected)
+        expected = fmt::format("{{\"resolution\": {}, \"steps\": {}, \"seconds\": {}, \"bytes\": {}}}",
+                               json(c.expected->resolution), or_null(c.expected->steps), or_null(c.expected->seconds),
+                               json(c.expected->bytes));
+    return fmt::format(
+        "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"chosen\": {}, \"expected\": {}, "
+        "\"unknown\": {}}}",
+        json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""),
+        json(c.chosen), expected, or_null(c.unknown));
 }
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
 int check(const CheckOptions& options) {
     int status = 0;
+    std::vector<std::string> parts;
     for (const std::string& path : options.cases) {
-        try {
-            const Case c = read_case(path, options.sets);
-            print_answer(fmt::format("# OK {}\n{}\n", shown_path(path), effective_toml(c)));
-            if (!options.quick) tell_expected(c);
-        } catch (const CaseError& error) {
-            say(stderr, "{}\n", error.what());
-            status = 2;
-        }
+        const Checked c = checked(path, options);
+        if (!c.valid()) status = 2;
+        if (options.json)
+            parts.push_back(json_of(c));
+        else
+            tell(c, options.quick);
     }
+    if (options.json) print_answer(fmt::format("{{\"cases\": [\n{}\n]}}\n", fmt::join(parts, ",\n")));
     return status;
 }
 
@@ -68,8 +164,11 @@ void add_check(CLI::App& app, int& exit_status) {
     command->add_option("CASE", options->cases, "case files")->required();
     command->add_option("--set", options->sets, "override a key, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
+    command->add_flag("--json", options->json, "as JSON, errors included: docs/schemas/check.json");
     command->add_flag("--quick", options->quick, "run nothing to tell steps, time and memory");
-    end_help(*command, {"tubule check cases/peanut.toml", "tubule check cases/peanut.toml --set accuracy.energy=1e-6"},
+    end_help(*command,
+             {"tubule check cases/peanut.toml", "tubule check cases/peanut.toml --set accuracy.energy=1e-6",
+              "tubule check cases/peanut.toml --json --quick"},
              {{0, "all cases are valid"}, {2}}, {"case_files"});
     command->callback([options, &exit_status] { exit_status = check(*options); });
 }
