@@ -5,12 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "common/case/read.hpp"
 #include "common/energy/bending.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/message.hpp"
@@ -25,7 +27,8 @@ namespace tubule {
 namespace {
 
 struct PlotOptions {
-    std::vector<std::string> results, outputs, colours, labels, series;
+    std::vector<std::string> results, outputs, colours, labels, series, slices;
+    std::string quantity;  // of scans
     std::vector<double> times;
     std::string kind = "all", plane = "z=0", x = "time", confirmed;
     std::optional<double> from, to;
@@ -45,6 +48,8 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     arguments.push_back("--plane=" + options.plane);
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
     if (!options.colours.empty()) arguments.push_back(fmt::format("--colour={}", fmt::join(options.colours, ",")));
+    if (!options.quantity.empty()) arguments.push_back("--quantity=" + options.quantity);
+    for (const std::string& slice : options.slices) arguments.push_back("--slice=" + slice);
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
     if (!options.series.empty()) arguments.push_back(fmt::format("--series={}", fmt::join(options.series, ",")));
     arguments.push_back("--x=" + options.x);
@@ -61,7 +66,16 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     return arguments;
 }
 
+// "--times 0 0.1 10" gives one time, and results of strange names.
+void refuse_times_as_results(const PlotOptions& options) {
+    for (const std::string& result : options.results)
+        if (!options.times.empty() && number_of(result) && !std::filesystem::exists(result))
+            throw CaseError(fmt::format("--times: several times are separated by commas, without spaces: --times {},{}",
+                                        options.times.back(), result));
+}
+
 int plot(const PlotOptions& options) {
+    refuse_times_as_results(options);
     try {
         for (const std::string& result : options.results) is_scan(result) ? repair_scan(result) : repair_result(result);
     } catch (const std::runtime_error& error) {
@@ -108,6 +122,7 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->add_option("--times", options->times, "times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
         ->check(refuse_infinite)
         ->delimiter(',')
+        ->type_name("T1,T2,...")
         ->allow_extra_args(false);
     command->add_option("--kind", options->kind, "what to draw: profiles, surface, cuts, energy, balance, all")
         ->check(CLI::IsMember({"profiles", "surface", "cuts", "energy", "balance", "all"}))
@@ -127,9 +142,19 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->check(
             [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
+    command->add_option(
+        "--quantity", options->quantity,
+        "of a scan: what its map shows: outcome (default), energy, r_min, volume, steps ... (all columns "
+        "of show --csv)");
+    command
+        ->add_option("--slice", options->slices,
+                     "of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
+        ->allow_extra_args(false);
     add_series_options(*command, *options);
-    end_help(*command, {"tubule plot figure.hdf -o figure.svg"}, {{0}, {2}, {4, "the picture could not be drawn"}},
-             {"pictures"});
+    end_help(*command,
+             {"tubule plot figure.hdf -o figure.svg",
+              "tubule plot k42.hdf --quantity energy --slice shape.radius=1 -o energy.png"},
+             {{0}, {2}, {4, "the picture could not be drawn"}}, {"pictures"});
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }
 

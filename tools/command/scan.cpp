@@ -17,6 +17,7 @@
 #include "tools/command/help.hpp"
 #include "tools/command/text.hpp"
 #include "tools/scan/dispatcher.hpp"
+#include "tools/scan/extension.hpp"
 #include "tools/scan/ranks.hpp"
 
 namespace tubule {
@@ -26,13 +27,15 @@ namespace {
 struct ScanOptions {
     ScanChoices choices;
     std::string output;
+    std::vector<std::string> merge;  // results
     std::optional<int> jobs;
-    bool resume = false, quiet = false;
+    bool resume = false, extend = false, quiet = false;
 };
 
 // That of a case gets another name than its run.
 std::filesystem::path scan_path(const ScanOptions& options, const Scan& scan) {
     if (!options.output.empty()) return options.output;
+    if (is_scan(options.choices.file)) return options.choices.file;
     const std::filesystem::path stem = std::filesystem::path(scan.path).stem();
     return stem.string() + (scan.text.empty() ? "_scan.hdf" : ".hdf");
 }
@@ -45,6 +48,56 @@ ScanWriter open_result(const Scan& scan, const std::filesystem::path& file, bool
     } catch (const std::runtime_error& error) {
         throw CaseError(explanation(error));
     }
+}
+
+// A scan by its result has its case and all choices in it: only values can be added.
+void refuse_other_choices(const ScanOptions& options) {
+    const ScanChoices& c = options.choices;
+    const auto absent = [&](bool given, const char* option) {
+        if (given)
+            throw CaseError(
+                fmt::format("{}: is the result of a scan: {} must be absent, as it has its own", c.file, option));
+    };
+    absent(!c.sets.empty(), "--set");
+    absent(!c.points.empty(), "--points");
+    absent(!c.boundary.empty(), "--boundary");
+    absent(c.seeds.has_value(), "--seeds");
+    absent(c.refine.has_value(), "--refine");
+    absent(c.to_the_end, "--to-the-end");
+    if (options.resume && (options.extend || !options.merge.empty() || !options.output.empty()))
+        throw CaseError(
+            fmt::format("{}: --resume goes on with it as it is: --extend, --merge and -o must be absent", c.file));
+    if (!options.resume && !options.extend && options.merge.empty())
+        throw CaseError(
+            fmt::format("{}: is the result of a scan: --resume goes on with it, --extend --over key=values "
+                        "and --merge RESULT add to it; to scan anew, give the case",
+                        c.file));
+    if (options.extend == c.over.empty() && !options.resume)
+        throw CaseError(fmt::format("{}: {}", c.file,
+                                    options.extend ? "--extend needs --over key=values" : "--over needs --extend"));
+    if (options.resume && !c.over.empty()) throw CaseError(c.file + ": --over needs --extend");
+}
+
+ScanWriter grown_result(const ScanOptions& options) {
+    refuse_other_choices(options);
+    try {
+        ScanResult result = read_scan_result(options.choices.file);
+        if (options.resume) return ScanWriter::resume(options.choices.file, result.scan);
+        if (options.extend) result = with_known(extended(result, options.choices.over));
+        for (const std::string& other : options.merge) result = with_known(merged(result, read_scan_result(other)));
+        return ScanWriter::extend(scan_path(options, result.scan), result, about_start());
+    } catch (const std::runtime_error& error) {
+        throw CaseError(explanation(error));
+    }
+}
+
+ScanWriter new_result(const ScanOptions& options) {
+    if (options.extend || !options.merge.empty())
+        throw CaseError(fmt::format("{}: --extend and --merge need the result of a scan", options.choices.file));
+    const Scan scan = read_scan(options.choices);
+    const auto file = scan_path(options, scan);
+    check_output(file);
+    return open_result(scan, file, options.resume);
 }
 
 void report(const ScanResult& result, const std::filesystem::path& file, bool interrupted, const ScanEffort& effort,
@@ -64,14 +117,14 @@ void report(const ScanResult& result, const std::filesystem::path& file, bool in
 
 int scan_by(const ScanOptions& options, Ranks* ranks) {
     const auto started = std::chrono::steady_clock::now();
-    const Scan scan = read_scan(options.choices);
-    const auto file = scan_path(options, scan);
-    check_output(file);
+    if (!options.output.empty()) check_output(options.output);
     if (ranks && options.jobs)
         throw CaseError("--jobs must be absent under mpirun: each rank runs one point at a time");
     const int jobs = options.jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
     if (jobs < 1) throw CaseError(fmt::format("--jobs must be 1 or more, not {}", jobs));
-    ScanWriter writer = open_result(scan, file, options.resume);
+    ScanWriter writer = is_scan(options.choices.file) ? grown_result(options) : new_result(options);
+    const Scan scan = writer.result().scan;
+    const auto file = scan_path(options, scan);
     if (writer.complete()) {
         if (ranks) ranks->dismiss();
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", scan.path, file.string());
@@ -128,7 +181,11 @@ void add_scan(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("scan", "Find what becomes of a case over lists, ranges and grids of its keys");
     const auto o = std::make_shared<ScanOptions>();
-    command->add_option("FILE", o->choices.file, "a scan file, or a case file with --over or --points")->required();
+    command
+        ->add_option("FILE", o->choices.file,
+                     "a scan file, a case file with --over or --points, or the result of a scan with --resume, "
+                     "--extend or --merge")
+        ->required();
     command
         ->add_option("--over", o->choices.over,
                      "a key and its values: energy.k42=0,0.1,0.2 or lo:hi:n or lo:hi:n:log; several make a grid")
@@ -144,11 +201,16 @@ void add_scan(CLI::App& app, int& exit_status) {
                       "run each point to time.end even where its outcome is known before");
     command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");
     command->add_flag("--resume", o->resume, "continue a scan that was interrupted or killed");
+    command->add_flag("--extend", o->extend,
+                      "add the values of --over to the result FILE of a scan; points that are known are not run again");
+    command->add_option("--merge", o->merge, "add the points of another scan of the same case to the result FILE")
+        ->allow_extra_args(false);
     command->add_option("--jobs", o->jobs, "threads, at most one a point (default: one a processor)");
     command->add_flag("--quiet", o->quiet, "no output except errors");
     end_help(*command,
              {"tubule scan cases/decay.toml --over energy.k42=0:0.2:3 -o k42.hdf",
-              "tubule scan cases/decay.toml --over energy.k42=0:0.2:3 -o k42.hdf --resume"},
+              "tubule scan cases/decay.toml --over energy.k42=0:0.2:3 -o k42.hdf --resume",
+              "tubule scan k42.hdf --extend --over energy.k42=0.05,0.15 --over shape.radius=1,1.2"},
              {{0}, {2}, {4, "a point could not be saved; --resume continues"}, {130}}, {"scans"});
     command->callback([o, &exit_status] { exit_status = scan(*o); });
 }

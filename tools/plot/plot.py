@@ -49,6 +49,8 @@ def arguments():
     parser.add_argument("--to", type=float, dest="high", help="up to this one")
     parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
     parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
+    parser.add_argument("--quantity", default="", help="of a scan: what its map shows")
+    parser.add_argument("--slice", action="append", default=[], help="of a scan: KEY=VALUE of an axis that is cut")
     parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
     return parser.parse_args()
 
@@ -165,13 +167,14 @@ def read_arguments(options):
 def draw_any(options, outputs):
     """A scan, or runs."""
     if not any(scan.is_scan(path) for path in options.results):
-        if options.confirmed:
-            raise BadInput(f"{options.results[0]}: is no scan, to which --confirmed belongs")
+        for option in ("confirmed", "quantity", "slice"):
+            if getattr(options, option):
+                raise BadInput(f"{options.results[0]}: is no scan, to which --{option} belongs")
         draw(options.results, outputs, options)
         return
     if len(options.results) > 1 or options.times or options.colour or options.kind != "all" or options.series:
         raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind and --series")
-    scan.draw(options.results[0], outputs, options.confirmed)
+    scan.draw(options.results[0], outputs, options.quantity, options.slice, options.confirmed)
 
 
 def main():

@@ -36,6 +36,22 @@ VERDICTS = {
     "other-outcome": {"marker": "X", "color": "black", "markersize": 6},
     "no-answer": {"marker": "$?$", "color": "black", "markersize": 6},
 }
+# What can be drawn of points, and how it is called.
+QUANTITIES = {
+    "outcome": "outcome",
+    "energy": "energy where the run stopped",
+    "time": "time where the run stopped",
+    "energy_error": "estimated error of the energy / " + formula("E_{ref}"),
+    "E_ref": formula("E_{ref}"),
+    "r_min": "smallest radius",
+    "r_max": "largest radius",
+    "area": "area",
+    "volume": "volume",
+    "steps": "steps",
+    "elements": "elements",
+    "wall_seconds": "wall time in s",
+    "cpu_seconds": "CPU time in s",
+}
 THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
     "energy.H0": "spontaneous curvature " + formula("H_0"),
@@ -58,6 +74,17 @@ class Axis:
     def label(self):
         modulus = re.fullmatch(r"energy\.k(\d+)", self.key)
         return formula(f"k_{{{modulus[1]}}}") if modulus else NAMES.get(self.key, self.key)
+
+    def place(self, value):
+        """Of a value on the axis, given as text; None if it has no such value."""
+        if value in self.texts:
+            return self.texts.index(value)
+        try:
+            number = float(value)
+        except ValueError:
+            return None
+        near = np.flatnonzero(np.isclose(self.values, number, rtol=1e-9, atol=0)) if self.is_numeric else []
+        return int(near[0]) if len(near) else None
 
     def borders(self):
         """Midpoints between the values, and as far beyond the first and last."""
@@ -97,6 +124,54 @@ def read(path):
     return axes, points, names, title, boundary, crossings, thresholds
 
 
+def positions(path, axes, slices):
+    """Of each axis that is cut, the place of its value: {axis number: place}."""
+    places = {}
+    for text in slices:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise BadInput(f"--slice {text}: must have the form key=value")
+        numbers = [i for i, axis in enumerate(axes) if axis.key == key]
+        if not numbers:
+            raise BadInput(f"--slice {text}: {path} varies {', '.join(axis.key for axis in axes)}")
+        place = axes[numbers[0]].place(value)
+        if place is None:
+            raise BadInput(f"--slice {text}: {key} has the values {', '.join(axes[numbers[0]].texts)}")
+        places[numbers[0]] = place
+    return places
+
+
+class Slice:
+    """The part of a scan that is drawn: two axes or one, the others at one value each."""
+
+    def __init__(self, path, scan, slices):
+        axes, points, self.names, self.title, boundary, crossings, thresholds = scan
+        cut = positions(path, axes, slices)
+        kept = [i for i in range(len(axes)) if i not in cut]
+        if len(kept) > 2:
+            more = " ".join(f"--slice {axes[i].key}={axes[i].texts[0]}" for i in kept[2:])
+            raise BadInput(f"{path}: a picture has one or two axes, this scan {len(kept)} axes: "
+                           f"{', '.join(axes[i].key for i in kept)}: cut it, as by {more}")  # fmt: skip
+        if not kept:
+            raise BadInput(f"{path}: a picture has one or two axes: cut fewer")
+        shape = points["outcome"].shape
+        self.axes = [axes[i] for i in kept]
+        self.points = {name: data[tuple(cut.get(i, slice(None)) for i in range(len(axes)))] for name, data in points.items()}
+        self.thresholds = [] if cut else thresholds
+        self.boundary, self.crossings = [], []
+        for number, ends in enumerate(boundary):
+            places = [np.unravel_index(end, shape) for end in ends]
+            if any(place[i] != at for place in places for i, at in cut.items()):
+                continue
+            inside = self.points["outcome"].shape
+            self.boundary.append([np.ravel_multi_index([place[i] for i in kept], inside) for place in places])
+            if len(crossings):
+                self.crossings.append(crossings[number])
+        if cut:
+            where = ", ".join(f"{axes[i].key} = {axes[i].texts[place]}" for i, place in sorted(cut.items()))
+            self.title = f"{self.title}: {where}" if self.title else where
+
+
 def border_lines(axes, boundary, shape):
     """The sides that the cells of neighbouring points share, for each pair that differs."""
     x, y = axes[0].borders(), axes[1].borders()
@@ -119,19 +194,33 @@ def refined(axes, boundary, crossings, shape):
     return np.transpose(places)
 
 
-def draw_map(axes, points, names, boundary, crossings, thresholds, panel):
-    outcomes = points["outcome"].astype(float)
-    shown = np.ma.masked_equal(outcomes, 0)
-    colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in names])
-    norm = BoundaryNorm(np.arange(-0.5, len(names)), len(names))
-    panel.pcolormesh(axes[0].borders(), axes[1].borders(), shown.T, cmap=colours, norm=norm, rasterized=True)
-    panel.add_collection(LineCollection(border_lines(axes, boundary, outcomes.shape), colors="black", linewidths=0.8))
+def draw_outcomes(part, panel):
+    colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names])
+    norm = BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))
+    shown = np.ma.masked_equal(part.points["outcome"].astype(float), 0)
+    panel.pcolormesh(part.axes[0].borders(), part.axes[1].borders(), shown.T, cmap=colours, norm=norm, rasterized=True)
+
+
+def draw_values(part, quantity, panel):
+    shown = np.ma.masked_invalid(part.points[quantity])
+    mesh = panel.pcolormesh(part.axes[0].borders(), part.axes[1].borders(), shown.T, cmap="viridis", rasterized=True)
+    bar = panel.figure.add_axes([0.74, 0.11, 0.02, 0.8])
+    panel.figure.colorbar(mesh, cax=bar, label=QUANTITIES[quantity])
+
+
+def draw_map(part, quantity, panel):
+    axes, shape = part.axes, part.points["outcome"].shape
+    if quantity == "outcome":
+        draw_outcomes(part, panel)
+    else:
+        draw_values(part, quantity, panel)
+    panel.add_collection(LineCollection(border_lines(axes, part.boundary, shape), colors="black", linewidths=0.8))
     handles = []
-    if len(crossings):
-        x, y = refined(axes, boundary, crossings, outcomes.shape)
+    if len(part.crossings):
+        x, y = refined(axes, part.boundary, part.crossings, shape)
         panel.plot(x, y, ".", color="black", markersize=3)
         handles.append(Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="refined"))
-    for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, thresholds):
+    for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, part.thresholds):
         panel.contour(axes[0].values[first], axes[1].values[second], values.T, [0], colors="#c0392b",
                       linestyles=[dashes], linewidths=1.2)
         handles.append(Line2D([], [], color="#c0392b", linestyle=dashes, label=label))
@@ -142,13 +231,13 @@ def draw_map(axes, points, names, boundary, crossings, thresholds, panel):
     return handles
 
 
-def draw_line(axes, points, names, panel):
-    for k, name in enumerate(names):
-        here = points["outcome"] == k
+def draw_line(part, quantity, panel):
+    for k, name in enumerate(part.names):
+        here = part.points["outcome"] == k
         if k > 0 and here.any():
-            panel.plot(axes[0].values[here], points["energy"][here], "o", color=COLOURS.get(name), markeredgecolor="0.3",
-                       markeredgewidth=0.4)
-    panel.set(xlabel=axes[0].label, ylabel="energy where the run stopped")
+            panel.plot(part.axes[0].values[here], part.points[quantity][here], "o", color=COLOURS.get(name),
+                       markeredgecolor="0.3", markeredgewidth=0.4)
+    panel.set(xlabel=part.axes[0].label, ylabel=QUANTITIES[quantity])
     return []
 
 
@@ -178,32 +267,35 @@ def draw_confirmed(axes, confirmed, shape, panel):
     return handles
 
 
-def draw(path, outputs, confirmed=None):
-    axes, points, names, title, boundary, crossings, thresholds = read(path)
-    if len(axes) > 2:
-        raise BadInput(f"{path}: a picture has one or two axes, this scan {len(axes)}: {', '.join(a.key for a in axes)}")
-    if not points["outcome"].any():
+def draw(path, outputs, quantity="", slices=(), confirmed=None):
+    part = Slice(path, read(path), slices)
+    if not part.points["outcome"].any():
         raise BadInput(f"{path}: no point is finished yet")
+    if quantity and quantity not in QUANTITIES:
+        raise BadInput(f"--quantity {quantity}: must be one of {', '.join(QUANTITIES)}")
+    is_map = len(part.axes) == 2
+    of_outcomes = not is_map or quantity in ("", "outcome")
     figure = Figure(figsize=(style.WIDTH, HEIGHT))
     panel = figure.add_axes([0.09, 0.11, 0.62, 0.8])
-    if len(axes) == 2:
-        handles = draw_map(axes, points, names, boundary, crossings, thresholds, panel)
+    if confirmed and (not is_map or slices):
+        raise BadInput(f"{path}: --confirmed marks points of a scan of two axes, without --slice")
+    if is_map:
+        handles = draw_map(part, quantity or "outcome", panel)
         if confirmed:
-            shape = points["outcome"].shape
-            handles += draw_confirmed(axes, read_confirmed(confirmed, points["outcome"].size), shape, panel)
-    elif confirmed:
-        raise BadInput(f"{path}: has one axis; --confirmed marks points of a map")
+            shape = part.points["outcome"].shape
+            handles += draw_confirmed(part.axes, read_confirmed(confirmed, part.points["outcome"].size), shape, panel)
     else:
-        handles = draw_line(axes, points, names, panel)
-    if axes[0].logarithmic:
+        handles = draw_line(part, quantity if quantity not in ("", "outcome") else "energy", panel)
+    if part.axes[0].logarithmic:
         panel.set_xscale("log")
-    axes[0].mark(panel.xaxis)
-    panel.set_title(as_label(title))
+    part.axes[0].mark(panel.xaxis)
+    panel.set_title(as_label(part.title))
     patches = [
         Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
-        for k, name in enumerate(names)
-        if k > 0 and (count := int((points["outcome"] == k).sum()))
+        for k, name in enumerate(part.names)
+        if of_outcomes and k > 0 and (count := int((part.points["outcome"] == k).sum()))
     ]
-    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(0.72, 0.92))
+    left = 0.72 if of_outcomes else 0.84
+    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(left, 0.92))
     style.save(figure, outputs)
     plt.close("all")

@@ -45,13 +45,6 @@ std::vector<std::string> split_list(const std::string& text) {
     return parts;
 }
 
-std::optional<double> number_of(const std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
-
 // lo:hi:n or lo:hi:n:log as values; nothing if it has not that form.
 std::optional<Axis> parse_range(const std::string& text, const std::string& source) {
     const std::vector<std::string> parts = split(text, ':');
@@ -208,6 +201,13 @@ void check_points(const Scan& scan) {
 
 }  // namespace
 
+std::optional<double> number_of(const std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
 std::size_t Scan::size() const {
     std::size_t n = 1;
     for (const Axis& axis : axes) n *= axis.size();
@@ -334,6 +334,13 @@ void refuse_no_points_and_too_many(const Scan& scan) {
 
 }  // namespace
 
+void check_scan(const Scan& scan) {
+    refuse_no_points_and_too_many(scan);
+    refuse_doubled_keys(scan);
+    refuse_words_between(scan);
+    check_points(scan);
+}
+
 Scan read_scan(const ScanChoices& choices) {
     Scan scan;
     scan.path = choices.file;
@@ -358,7 +365,7 @@ Scan read_scan(const ScanChoices& choices) {
     scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
-    refuse_no_points_and_too_many(scan);
+    refuse_no_points_and_too_many(scan);  // before anything is done for each of them
 
     const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;
     const auto seeds = choices.seeds ? choices.seeds : file.seeds;
@@ -373,9 +380,7 @@ Scan read_scan(const ScanChoices& choices) {
                                     seeds ? "seeds" : "refine"));
     }
     scan.to_the_end = choices.to_the_end || file.to_the_end;
-    refuse_doubled_keys(scan);
-    refuse_words_between(scan);
-    check_points(scan);
+    check_scan(scan);
     return scan;
 }
 

@@ -56,8 +56,14 @@ struct ScanChoices {
     bool to_the_end = false;
 };
 
+// Throws CaseError if there are no points or too many, a key varies twice, or a value of an axis is not valid.
+void check_scan(const Scan& scan);
+
 // Reads and checks it all, every value of every axis on its own included. Throws CaseError.
 Scan read_scan(const ScanChoices& choices);
+
+// A value of an axis as a number, if it is one.
+std::optional<double> number_of(const std::string& value);
 
 // "energy.k42=0:0.2:5" and so on as an axis. Throws CaseError.
 Axis parse_axis(const std::string& over);

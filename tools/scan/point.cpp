@@ -195,6 +195,13 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
     return p;
 }
 
+PointResult unknown_point(std::size_t point) {
+    PointResult p;
+    p.point = point;
+    p.measures.fill(unknown);
+    return p;
+}
+
 PointResult refused_point(const std::string& message) {
     PointResult p;
     p.outcome = Outcome::failed;

@@ -52,6 +52,9 @@ int stop_word(Stop reason);
 // Stop::interrupted and no result; other failures are outcomes, never thrown.
 PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted);
 
+// A point that was not run.
+PointResult unknown_point(std::size_t point);
+
 // The result of a point whose keys are not a valid case.
 PointResult refused_point(const std::string& message);
 

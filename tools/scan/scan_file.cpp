@@ -16,6 +16,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/journal.hpp"
+#include "tools/scan/extension.hpp"
 #include "tools/scan/theory.hpp"
 
 namespace tubule {
@@ -418,11 +419,14 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
     c.result.scan = scan;
     c.result.about = about;
     c.result.points.resize(scan.size());
-    for (std::size_t i = 0; i < c.result.points.size(); ++i) {
-        c.result.points[i].point = i;
-        c.result.points[i].measures.fill(std::numeric_limits<double>::quiet_NaN());
-    }
+    for (std::size_t i = 0; i < c.result.points.size(); ++i) c.result.points[i] = unknown_point(i);
     return ScanWriter(std::move(impl));
+}
+
+ScanWriter ScanWriter::extend(const fs::path& file, const ScanResult& known, const About& about) {
+    ScanWriter writer = create(file, known.scan, about);
+    writer.impl_->stored.result.points = known.points;
+    return writer;
 }
 
 ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
@@ -474,6 +478,7 @@ void ScanWriter::finish(const About& more) {
         else
             about.emplace_back(key, value);
     }
+    drop_unwanted(impl_->stored.result);
     impl_->stored.thresholds = threshold_maps(impl_->stored.result.scan);
     durable::replace(impl_->file, image_of(impl_->stored));
     impl_->journal.remove();

@@ -33,6 +33,8 @@ class ScanWriter {
 public:
     // Begins anew; an old scan of that name is replaced at the first point.
     static ScanWriter create(const std::filesystem::path& file, const Scan& scan, const About& about);
+    // Begins with points that are known: replaces whatever scan is there, the one that they come from included.
+    static ScanWriter extend(const std::filesystem::path& file, const ScanResult& known, const About& about);
     // Goes on with the points of an unfinished scan. Throws CaseError if the file belongs to another one.
     static ScanWriter resume(const std::filesystem::path& file, const Scan& scan);
     ScanWriter(ScanWriter&&) noexcept;

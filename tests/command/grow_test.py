@@ -1,0 +1,250 @@
+#!/usr/bin/python3
+"""Scans that grow: by values, ranges and axes, by another scan; pictures of any quantity and of slices.
+
+grow_test.py TUBULE [MPIRUN]. Expected is a scan made at once: its points, bit for bit, but for the times they took.
+"""
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import h5py
+import numpy as np
+from matplotlib.image import imread
+
+MPIRUN = sys.argv[2] if len(sys.argv) > 2 else None
+
+from program import PROGRAM, ProgramTest, about
+
+AMPLITUDE, K42, RADIUS = "shape.mode.0.amplitude", "energy.k42", "shape.radius"
+
+CASE = """tier = "axisym"
+[energy]
+k20 = 0.2
+H0 = -2.0
+k42 = 1e-3
+[shape]
+kind = "tube"
+radius = 1.0
+length = 2.0
+[[shape.mode]]
+amplitude = 0.3
+n = 1
+[accuracy]
+r_min = 0.05
+[discretisation]
+parametrisation = "graph"
+[time]
+end = 20.0
+stationary = 1e-6
+"""
+
+
+def contents(result):
+    """All that a scan says of its points, but for times."""
+    with h5py.File(result) as file:
+        found = {f"points/{n}": d[()] for n, d in file["points"].items() if not n.endswith("_seconds")}
+        for axis, group in file["axes"].items():
+            found[f"axes/{axis}"] = group["values"][()]
+            found[f"keys/{axis}"] = np.array(list(group.attrs["keys"]))
+        for name in ("boundary", "crossing", "between/point", "between/outcome"):
+            if name in file:
+                found[name] = file[name][()]
+    return found
+
+
+class GrowTest(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.write("case.toml", CASE)
+        self.result = self.folder / "scan.hdf"
+        self.whole = self.folder / "whole.hdf"
+
+    def scan(self, *arguments, status=0):
+        return self.tubule("scan", *arguments, status=status)
+
+    def assert_as_made_at_once(self, *over, more=()):
+        self.scan("case.toml", *(f"--over={o}" for o in over), *more, "-o", "whole.hdf")
+        one, other = contents(self.result), contents(self.whole)
+        self.assertEqual(one.keys(), other.keys())
+        for name, data in other.items():
+            self.assertEqual(one[name].shape, data.shape, name)
+            equal = np.array_equal(one[name], data, equal_nan=data.dtype.kind == "f")
+            self.assertTrue(equal, name)
+
+
+class Extended(GrowTest):
+    def test_by_values_and_a_range(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
+        out = self.scan("scan.hdf", "--extend", f"--over={AMPLITUDE}=0.3:0.5:3")[0]
+        self.assertIn("3 of 3 points", out)
+        self.assertIn("1 run now", out)  # 0.4; the others were known
+        self.scan("scan.hdf", "--extend", f"--over={AMPLITUDE}=0.2,0.45")
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.2,0.3,0.4,0.45,0.5")
+
+    def test_by_two_axes(self):
+        """Those that are known had the values of the case: 1e-3, and a radius of 1."""
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
+        out = self.scan("scan.hdf", "--extend", f"--over={K42}=1e-5,1e-2", f"--over={RADIUS}=1,1.1")[0]
+        self.assertIn("12 of 12 points", out)
+        self.assertIn("10 run now", out)
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-3,1e-2", f"{RADIUS}=1,1.1")
+
+    def test_by_an_axis_of_which_the_scan_had_one_value_set(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--set={K42}=1e-2", "-o", "scan.hdf")
+        self.scan("scan.hdf", "--extend", f"--over={K42}=1e-5")
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-2")
+
+    def test_into_another_file(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "small.hdf")
+        before = (self.folder / "small.hdf").read_bytes()
+        self.scan("small.hdf", "--extend", f"--over={AMPLITUDE}=0.4", "-o", "scan.hdf")
+        self.assertEqual((self.folder / "small.hdf").read_bytes(), before)
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.4,0.5")
+
+    def test_a_boundary(self):
+        """Points that are known but away from the boundary are left out: the scan made at once does not have them."""
+        boundary = ("--boundary", "pinched", "--seeds", "2", "--refine", "3")
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3:0.5:5", f"--over={K42}=1e-5,1e-3,1e-2", *boundary, "-o", "scan.hdf")
+        self.scan("scan.hdf", "--extend", f"--over={AMPLITUDE}=0.3:0.5:9", f"--over={K42}=1e-4")
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3:0.5:9", f"{K42}=1e-5,1e-4,1e-3,1e-2", more=boundary)
+
+    def test_killed_it_goes_on_by_its_result(self):
+        slow = ("--set=time.end=0.5", "--set=discretisation.elements=60", "--set=discretisation.time_tolerance=1e-12",
+                "--set=discretisation.time_order=2", "--to-the-end")  # fmt: skip
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.1,0.12", *slow, "-o", "scan.hdf")
+        known = contents(self.result)["points/energy"]
+        for number in (signal.SIGKILL, signal.SIGINT):
+            grow = ("--extend", f"--over={AMPLITUDE}=0.1:0.12:9") if number == signal.SIGKILL else ("--resume",)
+            process = self.start("scan", "scan.hdf", *grow, "--jobs", "1", "--quiet")
+            self.addCleanup(process.kill)
+            lines = 0
+            while lines < (2 if number == signal.SIGKILL else 4) + 2:
+                self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+                time.sleep(0.02)
+                lines = len(self.tubule("show", "scan.hdf", "--csv")[0].splitlines())
+            process.send_signal(number)
+            process.communicate()
+        csv = self.tubule("show", "scan.hdf", "--csv")[0].splitlines()
+        self.assertGreaterEqual(len(csv), 1 + 4)
+        self.scan("scan.hdf", "--resume")
+        self.assertEqual(about(self.result)["stop"], "finished")
+        self.assertEqual(list(contents(self.result)["points/energy"][[0, -1]]), list(known))
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.1:0.12:9", more=slow)
+
+    @unittest.skipUnless(MPIRUN, "built without MPI")
+    def test_on_any_number_of_ranks(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
+        for ranks, over in ((3, f"{AMPLITUDE}=0.4"), (2, f"{K42}=1e-5,1e-2")):
+            command = [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "scan", "scan.hdf",
+                       "--extend", f"--over={over}"]  # fmt: skip
+            done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.4,0.5", f"{K42}=1e-5,1e-3,1e-2")
+
+
+class Merged(GrowTest):
+    def test_parts_of_one_axis(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.35", f"--over={K42}=1e-5,1e-2", "-o", "scan.hdf")
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.35,0.5", f"--over={K42}=1e-5,1e-2", "-o", "other.hdf")
+        self.assertIn("0 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.35,0.5", f"{K42}=1e-5,1e-2")
+
+    def test_what_a_set_tells_apart_becomes_an_axis(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--set={K42}=1e-2", "-o", "other.hdf")
+        self.assertIn("0 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-3,1e-2")
+
+    def test_what_neither_has_is_run(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3", f"--over={K42}=1e-5", "-o", "scan.hdf")
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.5", f"--over={K42}=1e-2", "-o", "other.hdf")
+        self.assertIn("2 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
+        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-2")
+
+    def test_other_cases_are_refused(self):
+        self.write("other.toml", CASE.replace("20.0", "19.0"))
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3", "-o", "scan.hdf")
+        self.scan("other.toml", f"--over={AMPLITUDE}=0.5", "-o", "other.hdf")
+        self.assertIn("scans of different cases", self.refused("scan", "scan.hdf", "--merge", "other.hdf"))
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3", "--to-the-end", "-o", "end.hdf")
+        self.assertIn("--to-the-end", self.refused("scan", "scan.hdf", "--merge", "end.hdf"))
+        self.assertIn("nowhere.hdf", self.refused("scan", "scan.hdf", "--merge", "nowhere.hdf"))
+
+
+class Refused(GrowTest):
+    def setUp(self):
+        super().setUp()
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3", "-o", "scan.hdf")
+        self.before = self.result.read_bytes()
+
+    def tearDown(self):
+        self.assertEqual(self.result.read_bytes(), self.before)
+
+    def test_options(self):
+        over = f"--over={AMPLITUDE}=0.4"
+        for words, arguments in (
+            ("--resume goes on with it", ("scan.hdf",)),
+            ("--over needs --extend", ("scan.hdf", "--merge", "scan.hdf", over)),
+            ("--extend needs --over", ("scan.hdf", "--extend")),
+            ("--set must be absent", ("scan.hdf", "--extend", over, "--set", "energy.k20=1")),
+            ("--to-the-end must be absent", ("scan.hdf", "--extend", over, "--to-the-end")),
+            ("--resume goes on with it as it is", ("scan.hdf", "--extend", over, "--resume")),
+            ("need the result of a scan", ("case.toml", "--extend", over)),
+        ):
+            self.assertIn(words, self.refused("scan", *arguments), arguments)
+
+    def test_values(self):
+        self.assertIn("unknown key energy.k43", self.refused("scan", "scan.hdf", "--extend", "--over=energy.k43=1"))
+        self.assertIn("shape.radius", self.refused("scan", "scan.hdf", "--extend", "--over=shape.radius=-1"))
+        # The case chooses no number of elements, so it is not known which one its points belong to.
+        err = self.refused("scan", "scan.hdf", "--extend", "--over=discretisation.elements=40")
+        self.assertIn("its points have no value of discretisation.elements", err)
+
+
+class Pictures(GrowTest):
+    def setUp(self):
+        super().setUp()
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--over={K42}=1e-5,1e-3,1e-2", f"--over={RADIUS}=1,1.1",
+                  "-o", "scan.hdf")  # fmt: skip
+
+    def pixels(self, *arguments):
+        self.tubule("plot", "scan.hdf", "-o", "map.png", *arguments)
+        return imread(self.folder / "map.png")
+
+    def test_slices(self):
+        err = self.refused("plot", "scan.hdf", "-o", "map.png")
+        self.assertIn("3 axes", err)
+        self.assertIn(f"--slice {RADIUS}=1", err)
+        one, other = self.pixels("--slice", f"{RADIUS}=1"), self.pixels("--slice", f"{RADIUS}=1.1")
+        self.assertEqual(one.shape, other.shape)
+        self.assertGreater(abs(one - other).max(), 0.1)
+        line = self.pixels("--slice", f"{RADIUS}=1", "--slice", f"{K42}=1e-3")
+        self.assertGreater(abs(line - one).max(), 0.1)
+
+    def test_a_slice_is_as_a_scan_of_its_own(self):
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--over={K42}=1e-5,1e-3,1e-2", "-o", "whole.hdf")
+        of_slice = self.pixels("--slice", f"{RADIUS}=1")
+        self.tubule("plot", "whole.hdf", "-o", "own.png")
+        own = imread(self.folder / "own.png")
+        rows = slice(own.shape[0] // 8, None)  # below the title, which names the slice
+        np.testing.assert_array_equal(of_slice[rows], own[rows])
+
+    def test_any_quantity(self):
+        energy = self.pixels("--slice", f"{RADIUS}=1", "--quantity", "energy")
+        volume = self.pixels("--slice", f"{RADIUS}=1", "--quantity", "volume")
+        self.assertGreater(abs(energy - volume).max(), 0.1)
+        self.pixels("--slice", f"{RADIUS}=1", "--slice", f"{K42}=1e-3", "--quantity", "r_min")
+
+    def test_refusals(self):
+        self.assertIn("r_min", self.refused("plot", "scan.hdf", "--slice", f"{RADIUS}=1", "--quantity", "rmin"))
+        self.assertIn("1, 1.1", self.refused("plot", "scan.hdf", "--slice", f"{RADIUS}=2"))
+        self.assertIn(AMPLITUDE, self.refused("plot", "scan.hdf", "--slice", "energy.k20=1"))
+        self.assertIn("key=value", self.refused("plot", "scan.hdf", "--slice", "energy.k20"))
+        self.tubule("run", "case.toml", "--set", "time.end=0.01")
+        self.assertIn("--quantity", self.refused("plot", "case.hdf", "--quantity", "energy"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

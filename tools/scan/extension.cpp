@@ -1,0 +1,211 @@
+#include "tools/scan/extension.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "common/case/read.hpp"
+#include "tools/run/continuation.hpp"
+
+namespace tubule {
+namespace {
+
+std::string key_of(const std::string& set) {
+    return set.substr(0, set.find('='));
+}
+
+const Axis* axis_of(const Scan& scan, const std::vector<std::string>& keys) {
+    const auto same = std::ranges::find_if(scan.axes, [&](const Axis& axis) { return axis.keys == keys; });
+    return same == scan.axes.end() ? nullptr : &*same;
+}
+
+// Words are compared as such, numbers by their value.
+bool same_value(const std::string& a, const std::string& b) {
+    const auto x = number_of(a), y = number_of(b);
+    return x && y ? *x == *y : a == b;
+}
+
+std::optional<std::size_t> index_of(const Axis& axis, const std::vector<std::string>& setting) {
+    for (std::size_t i = 0; i < axis.size(); ++i)
+        if (std::ranges::equal(axis.values[i], setting, same_value)) return i;
+    return std::nullopt;
+}
+
+bool increases(const Axis& axis) {
+    double last = -std::numeric_limits<double>::infinity();
+    for (const auto& setting : axis.values) {
+        const auto value = number_of(setting.front());
+        if (setting.size() != 1 || !value || *value <= last) return false;
+        last = *value;
+    }
+    return true;
+}
+
+Axis joined(const Axis& a, const Axis& b) {
+    Axis out = a;
+    for (const auto& setting : b.values)
+        if (!index_of(out, setting)) out.values.push_back(setting);
+    const auto value = [](const auto& setting) { return number_of(setting.front()).value(); };
+    if (increases(a) && increases(b)) std::ranges::sort(out.values, {}, value);
+    out.logarithmic = a.logarithmic && b.logarithmic;
+    return out;
+}
+
+// Of a key that the scan does not vary: what all its points have.
+std::string value_in(const Scan& scan, const std::string& key) {
+    for (auto set = scan.sets.rbegin(); set != scan.sets.rend(); ++set)
+        if (key_of(*set) == key) return set->substr(key.size() + 1);
+    const auto values = values_of(scan.case_of(0));
+    const auto found = values.find(key);
+    if (found == values.end())
+        throw CaseError(fmt::format("{}: its points have no value of {}, so it cannot become an axis", scan.path, key));
+    return found->second;
+}
+
+// With one more axis, of one value.
+void vary(Scan& scan, const std::string& key) {
+    Axis axis{.keys = {key}, .values = {{value_in(scan, key)}}};
+    std::erase_if(scan.sets, [&](const std::string& set) { return key_of(set) == key; });
+    scan.axes.push_back(std::move(axis));
+}
+
+// Of an axis of the wider scan: which axis of the other one it is, and where its values are.
+struct Source {
+    std::optional<std::size_t> axis;
+    std::vector<std::size_t> places;  // of one value where that scan does not vary it
+};
+
+Source source_of(const Axis& axis, const Scan& scan) {
+    Source out;
+    const Axis* own = axis_of(scan, axis.keys);
+    const Axis fixed{.keys = axis.keys, .values = {{own ? "" : value_in(scan, axis.keys.front())}}};
+    if (own) out.axis = static_cast<std::size_t>(own - scan.axes.data());
+    for (const auto& setting : (own ? *own : fixed).values) out.places.push_back(index_of(axis, setting).value());
+    return out;
+}
+
+// The points of a scan, as far as they are known, with their numbers in one over the same keys and more values.
+void take_points(Extension& extension, const ScanResult& result) {
+    std::vector<Source> sources;
+    for (const Axis& axis : extension.scan.axes) sources.push_back(source_of(axis, result.scan));
+    for (const PointResult& p : result.points) {
+        if (p.outcome == Outcome::not_run) continue;
+        const auto at = result.scan.place(p.point);
+        std::size_t number = 0;
+        for (std::size_t a = 0; a < sources.size(); ++a)
+            number =
+                number * extension.scan.axes[a].size() + sources[a].places[sources[a].axis ? at[*sources[a].axis] : 0];
+        extension.known.push_back(p);
+        extension.known.back().point = number;
+    }
+}
+
+// Keys of which one of the scans says something by --set that the other does not.
+std::set<std::string> told_apart(const Scan& a, const Scan& b) {
+    std::set<std::string> keys;
+    for (const auto& [one, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+        for (const std::string& set : one->sets)
+            if (std::ranges::find(other->sets, set) == other->sets.end()) keys.insert(key_of(set));
+    return keys;
+}
+
+void refuse_different(const Scan& a, const Scan& b) {
+    const auto refuse = [&](const std::string& what) {
+        throw CaseError(fmt::format("{} and {} cannot be merged: {}", a.path, b.path, what));
+    };
+    if (a.case_text != b.case_text) refuse("they are scans of different cases");
+    if (a.to_the_end != b.to_the_end) refuse("only one of them runs its points to the end (--to-the-end)");
+    const auto choice = [](const Scan& s) {
+        return s.boundary ? std::tuple(true, s.boundary->around, s.boundary->seeds, s.boundary->refine)
+                          : std::tuple(false, std::optional<Outcome>(), 0, 0);
+    };
+    if (choice(a) != choice(b)) refuse("they differ in --boundary, --seeds or --refine");
+}
+
+// A key that no case has is named as such, not as one without a value.
+void refuse_no_key(Scan scan, const Axis& axis) {
+    std::erase_if(scan.sets, [&](const std::string& set) { return key_of(set) == axis.keys.front(); });
+    scan.sets.push_back(axis.keys.front() + "=" + axis.values.front().front());
+    scan.case_of(0);
+}
+
+// Axes that the scan lacks, of one value each.
+void add_axes_of(Scan& scan, const Scan& other) {
+    for (const Axis& axis : other.axes) {
+        if (axis_of(scan, axis.keys)) continue;
+        if (axis.keys.size() > 1)
+            throw CaseError(
+                fmt::format("{}: a table of other keys cannot be merged: {}", other.path, fmt::join(axis.keys, ", ")));
+        vary(scan, axis.keys.front());
+    }
+}
+
+}  // namespace
+
+ScanResult with_known(const Extension& extension) {
+    ScanResult out{.scan = extension.scan, .about = {}, .points = {}, .between = {}};
+    for (std::size_t i = 0; i < out.scan.size(); ++i) out.points.push_back(unknown_point(i));
+    for (const PointResult& p : extension.known) out.points[p.point] = p;
+    return out;
+}
+
+Extension extended(const ScanResult& result, const std::vector<std::string>& over) {
+    Extension out{result.scan, {}};
+    for (const std::string& text : over) {
+        const Axis more = parse_axis(text);
+        if (!axis_of(out.scan, more.keys)) {
+            refuse_no_key(out.scan, more);
+            vary(out.scan, more.keys.front());
+        }
+        const auto same = std::ranges::find_if(out.scan.axes, [&](const Axis& axis) { return axis.keys == more.keys; });
+        *same = joined(*same, more);
+    }
+    check_scan(out.scan);
+    take_points(out, result);
+    return out;
+}
+
+Extension merged(const ScanResult& a, const ScanResult& b) {
+    refuse_different(a.scan, b.scan);
+    Extension out{a.scan, {}};
+    Scan other = b.scan;
+    for (const std::string& key : told_apart(a.scan, b.scan))
+        for (Scan* scan : {&out.scan, &other})
+            if (!axis_of(*scan, {key})) vary(*scan, key);
+    add_axes_of(out.scan, other);
+    add_axes_of(other, out.scan);
+    for (Axis& axis : out.scan.axes) axis = joined(axis, *axis_of(other, axis.keys));
+    check_scan(out.scan);
+    take_points(out, a);
+    take_points(out, b);
+    return out;
+}
+
+void drop_unwanted(ScanResult& result) {
+    const auto& boundary = result.scan.boundary;
+    if (!boundary) return;
+    Plan plan(result.shape(), boundary->seeds, boundary->around, boundary->refine);
+    std::set<std::size_t> wanted;
+    while (const auto point = plan.next()) {
+        const bool on_grid = *point < result.points.size();
+        const auto between = result.between.find(*point);
+        const Outcome outcome = on_grid                           ? result.points[*point].outcome
+                                : between != result.between.end() ? between->second
+                                                                  : Outcome::not_run;
+        if (outcome == Outcome::not_run) return;  // unfinished: all that is known may be of use
+        wanted.insert(*point);
+        plan.done(*point, outcome);
+    }
+    for (PointResult& p : result.points)
+        if (!wanted.contains(p.point)) p = unknown_point(p.point);
+    std::erase_if(result.between, [&](const auto& entry) { return !wanted.contains(entry.first); });
+}
+
+}  // namespace tubule
