@@ -211,6 +211,25 @@ class Show(ProgramTest):
         self.assertRegex(out, r"title +A quick one")
         self.assertRegex(out, r"stop +finished")
 
+    def test_into_a_file(self):
+        for words in (("--csv",), ("--json",), ()):
+            self.assertEqual(self.tubule("show", self.result, *words, "-o", "out.txt"), ("", ""))
+            self.assertEqual((self.folder / "out.txt").read_text(), self.tubule("show", self.result, *words)[0])
+        before = self.result.read_bytes()
+        self.assertIn("is HDF5", self.refused("show", self.result, "--csv", "-o", self.result))
+        self.assertEqual(self.result.read_bytes(), before)
+        self.assertIn("nowhere/out.csv: cannot be written", self.refused("show", self.result, "-o", "nowhere/out.csv"))
+
+    def test_times_need_commas(self):
+        err = self.refused("plot", "--times", "0", "0.1", "case.hdf")
+        self.assertIn("several times are separated by commas, without spaces: --times 0,0.1", err)
+
+    def test_output_times_as_a_range(self):
+        self.tubule("run", self.case, "--set", "time.output=0.05:0.15:3", "-o", "range.hdf")
+        with h5py.File(self.folder / "range.hdf") as file:
+            times = [file["frames"][name].attrs["time"] for name in sorted(file["frames"])]
+        np.testing.assert_allclose(times, [0, 0.05, 0.1, 0.15, 0.2], rtol=1e-14)
+
     def test_csv_is_the_series_to_the_last_bit(self):
         header, rows = self.shown(self.result)
         values = series(self.result)

@@ -23,6 +23,7 @@ class Equilibrium(ProgramTest):
     def test_one_shape(self):
         case = self.write("cell.toml", CASE)
         out, _ = self.tubule("equilibrium", case)
+        self.assertIn("cell.toml: finished: ", out)  # at no time: nothing moves
         header, row = out.splitlines()[-2:]
         self.assertEqual(header.split(), ["energy", "tension", "pressure", "height", "r_max", "neg", "growth", "of", "m"])
         self.assertAlmostEqual(float(row.split()[0]), ENERGIES[0], delta=1e-6)

@@ -32,7 +32,7 @@ About about_start();
 struct RunOptions {
     std::vector<std::string> cases, sets;
     std::string output;
-    std::optional<double> until;  // as time.end
+    std::optional<double> until = {};  // as time.end
     bool resume = false, overwrite = false, quiet = false, expect = false, check_derivatives = false;
     bool silent = false;  // quiet, and no words on stdout even if the run ends early
     // Called with each result that was written, which is none where a run fails at its start and an earlier result

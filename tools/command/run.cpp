@@ -155,7 +155,8 @@ int compare(const Case& c, const std::filesystem::path& file) {
 }
 
 void report(const Case& c, const RunSummary& s, const std::string& file, double seconds) {
-    say(stdout, "{}: {} at t = {:.6g}: {}\n", c.path, name(s.stop.reason), s.stop.time, s.stop.message);
+    const std::string when = c.moves() ? fmt::format(" at t = {:.6g}", s.stop.time) : "";
+    say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
     if (!s.stop.advice.empty()) say(stdout, "    {}\n", s.stop.advice);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
     if (s.reference_energy > 0 && s.error_is_known())

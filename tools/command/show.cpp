@@ -4,6 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -22,6 +25,7 @@
 #include "tools/command/show_scan.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/continuation.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
@@ -30,7 +34,7 @@ namespace {
 
 struct ShowOptions {
     std::string file;
-    std::string rescue;
+    std::string output, rescue;
     bool csv = false, json = false, verify = false;
     std::optional<long> frame;
 };
@@ -276,11 +280,22 @@ int verify(const ShowOptions& options) {
     return found.has_checksums && found.damage.empty() ? 0 : 1;
 }
 
+// A result is never replaced: it is what this reads.
+void write_file(const std::string& path, std::string_view text) {
+    if (is_hdf5(path)) throw std::runtime_error(path + ": is HDF5, maybe a result: choose another file with -o");
+    std::ofstream out(path, std::ios::binary);
+    out << text << std::flush;
+    if (!out) throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+}
+
 int show(const ShowOptions& options) {
     try {
         if (options.verify || !options.rescue.empty()) return verify(options);
         const Text out = shown(options);
-        print_answer({out.data(), out.size()});
+        if (options.output.empty())
+            print_answer({out.data(), out.size()});
+        else
+            write_file(options.output, {out.data(), out.size()});
         return 0;
     } catch (const OutputError&) {
         throw;
@@ -309,6 +324,7 @@ void add_show(CLI::App& app, int& exit_status) {
                    "only look whether the file is as it was written, and which rows and frames are good: exit status 1 "
                    "if it is damaged")
         ->excludes(csv);
+    command->add_option("-o,--output", options->output, "write it to this file instead of stdout");
     command->add_option("--rescue", options->rescue, "write what is good of a damaged result to this new file");
     end_help(*command,
              {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1", "tubule show figure.hdf --verify"},
