@@ -56,6 +56,9 @@ THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
     "energy.H0": "spontaneous curvature " + formula("H_0"),
     "shape.length": "length L",
+    "model.tension": "tension " + formula("\\sigma"),
+    "model.pressure": "pressure " + formula("P"),
+    "model.force": "axial force " + formula("N"),
     "shape.radius": "radius",
     "shape.mode.0.amplitude": "amplitude A",
 }
