@@ -293,5 +293,23 @@ TEST(Ensembles, rampsDoWorkThatTheIdentityKnows) {
     }
 }
 
+// From a frame between two kinks, with a free period: the same end, work and balance.
+TEST(Ensembles, rampsGoOnWhereARunIsResumed) {
+    const Model pulled{.keeps_volume = true, .free_period = true, .force = Ramp({0.01, 0.03, 0.05}, {3, 6, 4})};
+    Case c = case_of(all_terms, Tube{1, 4, {{0.1, 1}}}, pulled, 0.1);
+    c.time.output = {0.02};
+    const Outcome whole = run_case(c);
+    expect_balanced(whole, c);
+    ASSERT_EQ(whole.log.frames.size(), 3u);
+    const Outcome resumed = run_case(c, &whole.log.frames[1]);
+    expect_balanced(resumed, c);
+    const double allowed = 4 * c.accuracy.energy * whole.summary.reference_energy;
+    EXPECT_NEAR(resumed.last("free_energy"), whole.last("free_energy"), allowed);
+    EXPECT_NEAR(resumed.last("work"), whole.last("work"), allowed);
+    EXPECT_NEAR(resumed.last("height"), whole.last("height"), 1e-4);
+    EXPECT_NE(whole.last("height"), 4);
+    EXPECT_EQ(resumed.at("force", 0.03), 6);
+}
+
 }  // namespace
 }  // namespace tubule::axisym

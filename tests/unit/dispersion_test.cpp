@@ -372,9 +372,9 @@ TEST(Ensembles, tubesAndSpheresRestWhereFIsStationary) {
     EXPECT_NEAR(F(R), 0, 1e-12);  // it is linear in L
     MotionLaw pulled = law_of(ModelKind::stokes);
     pulled.free_period = true, pulled.force = N;
-    EXPECT_NEAR(*tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
+    EXPECT_NEAR(*theory::tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
     pulled.keeps_volume = false, pulled.pressure = P;
-    EXPECT_NEAR(*tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
+    EXPECT_NEAR(*theory::tension_of(pulled, tube.energy, R), tube.tension, 1e-12);
 
     const UniformSphere sphere{tube.energy, R, tube.tension};
     const double p = pressure_at_rest(sphere);
@@ -389,11 +389,11 @@ TEST(Ensembles, tellTheTensionAndWhereARadiusGoes) {
     const UniformTube tube = some_tube();
     MotionLaw law = law_of(ModelKind::gradient_flow);
     law.tension = 0.7;
-    EXPECT_EQ(tension_of(law, tube.energy, tube.radius), 0.7);
+    EXPECT_EQ(theory::tension_of(law, tube.energy, tube.radius), 0.7);
     law.keeps_area = true, law.tension = 0, law.pressure = 0.2;
-    EXPECT_NEAR(*tension_of(law, tube.energy, tube.radius), tension_of_free_volume(tube.energy, 0.8) + 0.8 * 0.2,
-                1e-14);
-    EXPECT_FALSE(tension_of(law_of(ModelKind::fluid), tube.energy, tube.radius));
+    EXPECT_NEAR(*theory::tension_of(law, tube.energy, tube.radius),
+                tension_of_free_volume(tube.energy, 0.8) + 0.8 * 0.2, 1e-14);
+    EXPECT_FALSE(theory::tension_of(law_of(ModelKind::fluid), tube.energy, tube.radius));
     // pressure R^3 - tension R^2 + k20 = 0, by bisection elsewhere; the same for whatever resists.
     for (const ModelKind kind : {ModelKind::gradient_flow, ModelKind::stokes}) {
         MotionLaw swelling = law_of(kind);
