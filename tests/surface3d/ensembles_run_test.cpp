@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "tests/surface3d/run_case.hpp"
 
@@ -168,6 +169,24 @@ TEST(EnsembleRuns, APulledTubeGoesOn) {
         for (const char* name : {"free_energy", "work", "identity_defect", "energy_error", "height"})
             EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
     }
+}
+
+TEST(EnsembleRuns, AFreePeriodGoesOnWithANewMesh) {
+    // theory.md (3.17), (3.19) of a straight tube with k20 alone and a fixed area: R_t = 2 k20/R^3 - force/(2 pi R^2).
+    // Its triangles become wide and short, and a new mesh is made on the way.
+    const Outcome o = run_case(
+        "[energy]\nk20 = 0.5\n[model]\narea = \"fixed\"\nperiod = \"free\"\nforce = 1.8\n[shape]\nkind = \"tube\"\n"
+        "radius = 1\nlength = 6\n[discretisation]\nelements = 120\n[accuracy]\nenergy = 1e-2\n[time]\nend = 60\n");
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const auto elements = o.series("elements");
+    EXPECT_NE(elements.front(), elements.back());
+    double R = 1;
+    const int steps = 60000;
+    const auto rate = [](double r) { return 1 / (r * r * r) - 1.8 / (2 * std::numbers::pi * r * r); };
+    for (int i = 0; i < steps; ++i) R += 60.0 / steps * rate(R + 30.0 / steps * rate(R));
+    EXPECT_NEAR(o.last("r_max"), R, 2e-3 * R);
+    EXPECT_NEAR(o.last("height"), 6 / R, 4e-3 * 6 / R);
+    EXPECT_NEAR(o.last("area") / o.series("area").front(), 1, 1e-8);
 }
 
 std::string refusal(const std::vector<std::string>& sets) {
