@@ -40,10 +40,15 @@ class Continued(ProgramTest):
         before = len(self.shown(self.result)[1]) if self.result.exists() else 0
         process = self.start("run", *what, "--quiet", *arguments)
         self.addCleanup(process.kill)
-        while not self.result.exists() or len(self.shown(self.result)[1]) < before + rows:
+        while True:  # inspected while it is stopped, or it would be at its end before that
+            time.sleep(0.005)
             self.assertIsNone(process.poll(), "the run ended before it could be interrupted")
-            time.sleep(0.002)
+            process.send_signal(signal.SIGSTOP)
+            if self.result.exists() and len(self.shown(self.result)[1]) >= before + rows:
+                break
+            process.send_signal(signal.SIGCONT)
         process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGCONT)
         process.communicate()
         self.assertEqual(process.returncode, 130)
 
@@ -134,6 +139,16 @@ class Extended(Continued):
         for name in ("energy", "kinetic_energy", "identity_defect"):
             self.assertAlmostEqual(ends[name][-1], whole[name][-1], delta=1e-6 * asked)
         self.assertEqual(self.frame_times(), [0, 0.02, 0.03, 0.045, 0.06])
+
+    def test_tier_auto(self):
+        self.write("case.toml", QUICK.replace("axisym", "auto").replace("1e-6", "1e-4"))
+        self.tubule("run", "case.toml", "--until", "0.4", "-o", "whole.hdf")
+        self.tubule("run", "case.toml")
+        self.tubule("run", "case.hdf", "--resume", "--until", "0.4")
+        ends, whole = series(self.result), series(self.folder / "whole.hdf")
+        self.assertEqual(about(self.result)["choice"], "axisym")
+        self.assertEqual(ends["time"][-1], 0.4)
+        self.assertAlmostEqual(ends["energy"][-1], whole["energy"][-1], delta=1e-4 * E_REF)
 
     def test_a_stationary_result(self):
         self.write("case.toml", RESTING)
