@@ -119,12 +119,16 @@ class Extended(GrowTest):
             grow = ("--extend", f"--over={AMPLITUDE}=0.1:0.12:9") if number == signal.SIGKILL else ("--resume",)
             process = self.start("scan", "scan.hdf", *grow, "--jobs", "1", "--quiet")
             self.addCleanup(process.kill)
-            lines = 0
-            while lines < (2 if number == signal.SIGKILL else 4) + 2:
-                self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+            while True:  # inspected while it is stopped
                 time.sleep(0.02)
+                self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+                process.send_signal(signal.SIGSTOP)
                 lines = len(self.tubule("show", "scan.hdf", "--csv")[0].splitlines())
+                if lines >= (2 if number == signal.SIGKILL else 4) + 2:
+                    break
+                process.send_signal(signal.SIGCONT)
             process.send_signal(number)
+            process.send_signal(signal.SIGCONT)
             process.communicate()
         csv = self.tubule("show", "scan.hdf", "--csv")[0].splitlines()
         self.assertGreaterEqual(len(csv), 1 + 4)
