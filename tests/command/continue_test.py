@@ -202,6 +202,15 @@ class Refused(Continued):
         self.assertIn("with pinch-off: a later time.end changes nothing", err)
         self.assertIn("complete", self.tubule("run", "pinched.hdf", "--resume")[0])
 
+    def test_a_case_of_another_version(self):
+        with h5py.File(self.result, "r+") as file:
+            file["case"][()] = QUICK.replace("k42", "k43")
+        self.before = self.result.read_bytes()
+        words = "its case cannot be read by this version: "
+        self.assertRegex(self.refused("run", "case.toml", "--resume"), words + ".*unknown key energy.k43")
+        self.assertRegex(self.refused("run", "case.toml"), "another case than case.toml: " + words)
+        self.assertIn("unknown key energy.k43", self.refused("run", "case.hdf", "--resume"))
+
     def test_nothing_moves(self):
         surface = SURFACE.split("[time]")[0].replace("[model]\nkind = \"fluid\"\n", "").replace("step = 1e-3\n", "")
         self.write("rest.toml", surface)
