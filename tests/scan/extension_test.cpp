@@ -90,6 +90,12 @@ TEST(Extension, Refuses) {
     b.scan.case_text += "\n";
     EXPECT_EQ(message_of([&] { merged(a, b); }),
               "case.toml and case.toml cannot be merged: they are scans of different cases");
+    b = a, b.scan.axes = {parse_table("energy.k42,energy.H0\n0,1\n", "table.csv")};
+    EXPECT_EQ(message_of([&] { merged(a, b); }),
+              "case.toml: a table of other keys cannot be merged: energy.k42, energy.H0");
+    b = a, b.scan.to_the_end = true;
+    EXPECT_EQ(message_of([&] { merged(a, b); }),
+              "case.toml and case.toml cannot be merged: only one of them runs its points to the end (--to-the-end)");
     b = a, b.scan.boundary.emplace();
     EXPECT_EQ(message_of([&] { merged(a, b); }),
               "case.toml and case.toml cannot be merged: they differ in --boundary, --seeds or --refine");
