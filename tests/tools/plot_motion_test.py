@@ -208,6 +208,18 @@ class Pages(InFolder):
         self.assertNotIn("what energy_error is", texts)  # all of it zero
         self.assertFalse([text for text in texts if "curvature" in text])
 
+    def test_velocities_are_relative_to_the_run_or_the_shape(self):
+        path = write(self.folder / "a.hdf")
+        for words, *options in (("of the run",), ("of the shape", "--scale", "shape")):
+            texts = self.drawn(path, "--kind", "surface", *options)
+            self.assertTrue([text for text in texts if words in text], options)
+        motion = surfaces.Motion(results.read_result(path))
+        slow = min(motion.surfaces[1:], key=motion.u_n)
+        self.assertEqual(motion.scale(motion.u_n, slow), motion.u_n(slow))
+        motion.by_run = True
+        self.assertEqual(motion.scale(motion.u_n, slow), max(map(motion.u_n, motion.surfaces)))
+        self.assertGreater(motion.scale(motion.u_n, slow), motion.u_n(slow))
+
     def test_colours_and_kinds(self):
         file = write(self.folder / "a.hdf")
         texts = self.drawn(file, "--kind", "surface", "--colour", "H,K,p", "--times", "0,2")

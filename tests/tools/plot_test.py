@@ -371,13 +371,13 @@ class Curves(InFolder):
     def test_arrows_go_with_the_velocity_and_are_as_long(self):
         section = curves.Section(results.Frame(0.0, **ball(0.0, 401)), 1.0)  # half a turn: pi inches
         angle = np.pi - section.places  # 0 at the last point
-        found = curves.arrows(section, -3 * np.sin(2 * angle))
+        found = curves.arrows(section, -3 * np.sin(2 * angle), 3)
         self.assertGreater(len(found), 10)
         for places in found:
             # By the formula: -sin(2 a) of the largest.
             expected = -curves.LONGEST_ARROW * np.sin(2 * (np.pi - places[4]))
             self.assertAlmostEqual(places[-1] - places[0], expected, delta=2e-3)
-        slow = curves.arrows(section, np.where(section.places < 0.3, 1.0, 0.01))
+        slow = curves.arrows(section, np.where(section.places < 0.3, 1.0, 0.01), 1)
         self.assertLess(max(places[-1] for places in slow), 0.4)  # too short to see elsewhere
 
     def test_a_flowing_cell_and_its_kinetic_energy(self):

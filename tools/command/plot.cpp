@@ -30,7 +30,7 @@ struct PlotOptions {
     std::vector<std::string> results, outputs, colours, labels, series, slices;
     std::string quantity;  // of scans
     std::vector<double> times;
-    std::string kind = "all", plane = "z=0", x = "time", confirmed;
+    std::string kind = "all", plane = "z=0", x = "time", scale = "run", confirmed;
     std::optional<double> from, to;
     bool logy = false;
 };
@@ -53,6 +53,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
     if (!options.series.empty()) arguments.push_back(fmt::format("--series={}", fmt::join(options.series, ",")));
     arguments.push_back("--x=" + options.x);
+    arguments.push_back("--scale=" + options.scale);
     if (options.from) arguments.push_back(fmt::format("--from={}", *options.from));
     if (options.to) arguments.push_back(fmt::format("--to={}", *options.to));
     if (options.logy) arguments.push_back("--logy");
@@ -134,6 +135,11 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"u_n", "H", "K", "p"}));
+    command
+        ->add_option("--scale", options->scale,
+                     "velocities are drawn relative to the largest one of the run, or of each shape")
+        ->check(CLI::IsMember({"run", "shape"}))
+        ->capture_default_str();
     command
         ->add_option("--label", options->labels,
                      "label of a result, one for each, in their order (default: what differs in their cases)")

@@ -42,11 +42,11 @@ class Section:
         return np.interp(places, self.places, x), np.interp(places, self.places, y)
 
 
-def arrows(section, u_t):
-    """Positions along the profile from tail to head of each visible arrow."""
+def arrows(section, u_t, largest):
+    """Positions along the profile from tail to head of each visible arrow; one of the `largest` speed is the longest."""
     count = max(3, round(section.length / ARROW_SPACING))
     middles = (np.arange(count) + 0.5) * section.length / count
-    lengths = LONGEST_ARROW * np.interp(middles, section.places, u_t) / np.abs(u_t).max()
+    lengths = LONGEST_ARROW * np.interp(middles, section.places, u_t) / largest
     seen = np.abs(lengths) >= SHORTEST_ARROW
     return [
         np.clip(np.linspace(middle - length / 2, middle + length / 2, 9), 0, section.length)
@@ -58,6 +58,14 @@ class CurvePanel(ProfilePanel):
     MARGIN = 0.14
     COLUMN_GAP = 0.1
     MAX_LENGTH = 3.2
+    by_run = False  # velocities relative to the largest ones of their run, else of each shape
+
+    def scale_by_run(self):
+        self.by_run = True
+
+    def _scale(self, name, frame, row):
+        frames = self.results[row].frames if self.by_run else [frame]
+        return max(other.largest(name) for other in frames)
 
     def _choose_colours(self):
         self.velocity = any(frame.u_n is not None for frame in self.frames)
@@ -93,26 +101,26 @@ class CurvePanel(ProfilePanel):
         for side in (-1, 1):
             points = np.column_stack([x + side * section.x, y + section.y])
             axes.plot(*points.T, color="0.1", linewidth=OUTLINE, solid_capstyle="butt", zorder=3)
-            colour = self._colour(section, frame, side, still)
+            colour = self._colour(section, frame, side, 0 if still else self._scale("u_n", frame, row))
             pieces = np.stack([points[:-2], points[1:-1], points[2:]], axis=1)  # overlapping: no gaps between
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
             )
             if frame.u_t is None or still:
                 continue
-            for places in arrows(section, section.at(frame.u_t)):
+            for places in arrows(section, section.at(frame.u_t), self._scale("u_t", frame, row)):
                 way_x, way_y = section.beside(places, ARROW_DISTANCE)
                 way = Path(np.column_stack([x + side * way_x, y + way_y]))
                 axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(places[-1] - places[0]))))
         self._draw_axis(axes, frame, x, y)
 
-    def _colour(self, section, frame, side, still):
+    def _colour(self, section, frame, side, largest):
         if not self.velocity:
             colours, values = (self.H, frame.H) if side < 0 else (self.K, frame.K)
             return colours.rgb(section.at(values))
         if frame.u_n is None:
             return np.full((section.x.size, 3), 0.7)
-        relative = np.zeros(section.x.size) if still else section.at(frame.u_n) / frame.largest("u_n")
+        relative = section.at(frame.u_n) / largest if largest else np.zeros(section.x.size)
         return plt.get_cmap(VELOCITY)(0.5 + relative / 2)[:, :3]
 
     def draw_colour_bars(self, figure, bottom):
@@ -120,9 +128,10 @@ class CurvePanel(ProfilePanel):
             super().draw_colour_bars(figure, bottom)
             return
         flows = any(frame.u_t is not None for frame in self.frames)
+        what = "run" if self.by_run else "shape"
         left, width = (0.06, 0.42) if flows else (0.29, 0.42)
         draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
-                 f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the shape, > 0: outward")  # fmt: skip
+                 f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {what}, > 0: outward")  # fmt: skip
         if flows:
-            words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the shape"
+            words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the {what}"
             draw_arrow_key(figure, left + width + 0.05, bottom, words)

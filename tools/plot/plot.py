@@ -43,6 +43,8 @@ def arguments():
     parser.add_argument("--plane", default="z=0", help="plane of the cuts")
     parser.add_argument("--kind", choices=NOTHING, default="all")
     parser.add_argument("--label", action="append", default=[], help="of each result, instead of what its case differs by")
+    parser.add_argument("--scale", choices=("run", "shape"), default="run",
+                        help="velocities relative to the largest of")  # fmt: skip
     parser.add_argument("--series", default="", help="series to draw, and nothing else")
     parser.add_argument("--x", default="time", help="the series they are drawn against")
     parser.add_argument("--from", type=float, dest="low", help="from this value of it")
@@ -131,6 +133,9 @@ def draw(paths, outputs, options):
     if title:
         figure.text(0.5, top / figure.get_figheight(), ", ".join(labels[0]), ha="center", va="top", fontsize=9)
         top -= title
+    for panel in panels if options.scale == "run" else ():
+        if hasattr(panel, "scale_by_run"):
+            panel.scale_by_run()
     for letter, panel in zip("abcde", panels):
         top -= panel.height
         panel.draw(figure, top)

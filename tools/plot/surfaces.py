@@ -45,10 +45,11 @@ def choose_colours(results, wanted):
 
 
 class Motion:
-    """Speeds of the surfaces of one result, for quantities relative to the largest value on each shape."""
+    """Speeds of the surfaces of one result, for quantities relative to the largest value on each shape, or `by_run`."""
 
     def __init__(self, result):
         self.fastest = max(surface.speed for surface in result.surfaces)
+        self.surfaces, self.by_run = result.surfaces, False
 
     def still(self, surface):
         return surface.speed <= max(flow.STILL * self.fastest, flow.ROUNDING * surface.size)
@@ -63,6 +64,10 @@ class Motion:
             return 0.0
         largest = float(np.linalg.norm(flow.tangential(surface.u, surface.normal), axis=-1).max())
         return largest if largest > flow.NORMAL_ONLY * surface.speed else 0.0
+
+    def scale(self, largest, surface):
+        """What velocities are drawn relative to: u_n or u_t, of the shape or of the run; 0 where the shape has none."""
+        return largest(surface) and (max(map(largest, self.surfaces)) if self.by_run else largest(surface))
 
     def words(self, surface):
         """The caption below the picture."""
@@ -81,7 +86,7 @@ class Quantity:
         values = getattr(surface, self.name)
         if self.name != "u_n":
             return values
-        return values / (motion.u_n(surface) or np.inf)  # at rest: white
+        return values / (motion.scale(motion.u_n, surface) or np.inf)  # at rest: white
 
 
 def quantities(names, results, surfaces):
@@ -161,6 +166,13 @@ class SurfacePanel:
             self.height += caption_room
         self.pictures, self.heights = pictures, heights
 
+    def scale_by_run(self):
+        """Velocities are relative to the largest ones of their run, so that shapes can be compared over time."""
+        for motion in self.motions:
+            motion.by_run = True
+        for quantity in self.quantities:
+            quantity.colours.label = quantity.colours.label.replace("of the shape", "of the run")
+
     def _words(self, column, row):
         """Below the pictures of that row and column."""
         surface = column.cells[row]
@@ -227,7 +239,8 @@ class SurfacePanel:
                 aspect="auto",
                 zorder=2,
             )
-            u_t = self.motions[row].u_t(surface) if quantity.name == "u_n" else 0
+            motion = self.motions[row]
+            u_t = motion.scale(motion.u_t, surface) if quantity.name == "u_n" else 0
             if u_t:
                 per_inch, velocity = DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
                 flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / DPI, per_inch)
@@ -248,5 +261,5 @@ class SurfacePanel:
             draw_bar(figure, bottom, left, width, mappable, label, colours.extend)
         if self.arrows:
             u_t = flow.SYMBOLS["u_t"]
-            words = f"{u_t} along the surface; this\nlong: max |{u_t}| of the shape"
+            words = f"{u_t} along the surface; this\nlong: max |{u_t}| of the {'run' if self.motions[0].by_run else 'shape'}"
             flow.draw_arrow_key(figure, room[-1][0], bottom, words)
