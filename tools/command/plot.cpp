@@ -26,13 +26,19 @@ namespace tubule {
 
 namespace {
 
-struct PlotOptions {
-    std::vector<std::string> results, outputs, colours, labels, series, slices;
-    std::string quantity;  // of scans
-    std::vector<double> times;
-    std::string kind = "all", plane = "z=0", x = "time", scale = "run", confirmed;
+struct SeriesOptions {
+    std::vector<std::string> names;
+    std::string x = "time";
     std::optional<double> from, to;
     bool logy = false;
+};
+
+struct PlotOptions {
+    std::vector<std::string> results, outputs, colours, labels, slices;
+    SeriesOptions series;
+    std::string quantity;  // of scans
+    std::vector<double> times;
+    std::string kind = "all", plane = "z=0", scale = "run", confirmed;
 };
 
 bool is_plane(const std::string& text) {
@@ -51,12 +57,13 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     if (!options.quantity.empty()) arguments.push_back("--quantity=" + options.quantity);
     for (const std::string& slice : options.slices) arguments.push_back("--slice=" + slice);
     for (const std::string& output : options.outputs) arguments.push_back("--output=" + output);
-    if (!options.series.empty()) arguments.push_back(fmt::format("--series={}", fmt::join(options.series, ",")));
-    arguments.push_back("--x=" + options.x);
+    if (!options.series.names.empty())
+        arguments.push_back(fmt::format("--series={}", fmt::join(options.series.names, ",")));
+    arguments.push_back("--x=" + options.series.x);
     arguments.push_back("--scale=" + options.scale);
-    if (options.from) arguments.push_back(fmt::format("--from={}", *options.from));
-    if (options.to) arguments.push_back(fmt::format("--to={}", *options.to));
-    if (options.logy) arguments.push_back("--logy");
+    if (options.series.from) arguments.push_back(fmt::format("--from={}", *options.series.from));
+    if (options.series.to) arguments.push_back(fmt::format("--to={}", *options.series.to));
+    if (options.series.logy) arguments.push_back("--logy");
     if (!options.confirmed.empty()) arguments.push_back("--confirmed=" + options.confirmed);
     for (const std::string& label : options.labels) arguments.push_back("--label=" + label);
     for_each_bending_term([&](std::size_t, const auto& term) {
@@ -95,14 +102,17 @@ int plot(const PlotOptions& options) {
 
 void add_series_options(CLI::App& command, PlotOptions& options) {
     command
-        .add_option("--series", options.series,
+        .add_option("--series", options.series.names,
                     "series to draw instead of all else, such as r_min,r_max; `tubule show --csv` lists them")
         ->delimiter(',')
         ->allow_extra_args(false);
-    command.add_option("--x", options.x, "with --series: the series they are drawn against")->capture_default_str();
-    command.add_option("--from", options.from, "with --series: draw from this value of --x")->check(refuse_infinite);
-    command.add_option("--to", options.to, "with --series: draw up to this value of --x")->check(refuse_infinite);
-    command.add_flag("--logy", options.logy, "with --series: logarithmic axis");
+    command.add_option("--x", options.series.x, "with --series: the series they are drawn against")
+        ->capture_default_str();
+    command.add_option("--from", options.series.from, "with --series: draw from this value of --x")
+        ->check(refuse_infinite);
+    command.add_option("--to", options.series.to, "with --series: draw up to this value of --x")
+        ->check(refuse_infinite);
+    command.add_flag("--logy", options.series.logy, "with --series: logarithmic axis");
     command.add_option("--confirmed", options.confirmed,
                        "of a scan: the output of `tubule confirm --json`, whose points are marked on the map");
 }
