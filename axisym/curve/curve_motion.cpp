@@ -309,10 +309,16 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
         if (const int at = number_of(row); at >= 0) F[at] = stdx::reduce(sums[row]);
     if (!(stdx::hmin(smallest) > 0)) return false;
 
-    const int n = space().shape_size();
-    const Eigen::VectorXd force = gradient_at(force_weights(t, y), y), drift = gradient_at(drift_weights(y), y);
-    Eigen::Map<Eigen::VectorXd>(law_.inextensible ? F + at_.u_r : F, n) += force.head(n);
-    Eigen::Map<Eigen::VectorXd>(F, n) += drift.head(n);
+    // Added where the other forces are: rounding is what keeps weakly damped waves of a fluid alive.
+    const auto add_gradient = [&](const Weights& weights, double* rows) {
+        const int n = space().shape_size();
+        if (at_.rise < 0)
+            forms_.add_gradient(weights, y, rows);
+        else  // whose derivative has no row here
+            Eigen::Map<Eigen::VectorXd>(rows, n) += gradient_at(weights, y).head(n);
+    };
+    add_gradient(force_weights(t, y), law_.inextensible ? F + at_.u_r : F);
+    add_gradient(drift_weights(y), F);
     const double A = stdx::reduce(area) - area0_, V = stdx::reduce(volume) - volume0_;
     if (at_.area >= 0) F[at_.area] = A;
     if (at_.tension >= 0) F[at_.tension] = A;
@@ -321,7 +327,7 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     if (at_.lambda >= 0 && law_.inextensible) F[at_.lambda] = gradient_at({.volume = 1}, y).dot(velocity(y));
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
-    F[at_.stretch] += force.dot(stretched(y)) - law_.force.at(t) * space().length(y);
+    F[at_.stretch] += gradient_at(force_weights(t, y), y).dot(stretched(y)) - law_.force.at(t) * space().length(y);
     return true;
 }
 
