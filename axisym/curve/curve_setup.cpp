@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "axisym/curve/curve_frame.hpp"
+#include "common/run/error_scale.hpp"
 #include "common/run/output_times.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -32,11 +33,15 @@ double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
 }
 
 // E_ref, theory.md (11.1).
-double reference_energy_of(const CurveForms& forms, const MotionLaw& law, const Eigen::VectorXd& x) {
+struct StartEnergy {
+    double energy, magnitude;  // F, and E_ref by the size of its terms
+};
+StartEnergy start_energy(const CurveForms& forms, const MotionLaw& law, const Eigen::VectorXd& x) {
     const CurveObservation o = forms.observe(x);
     const double length = forms.space().length(x.data());
-    return std::max(std::abs(o.energy + loads_at(law, 0).energy(o.area, o.volume, length)),
-                    forms.reference_energy(x) + load_scale(law, o.area, o.volume, length));
+    const double energy = o.energy + loads_at(law, 0).energy(o.area, o.volume, length);
+    return {energy,
+            std::max(std::abs(energy), forms.reference_energy(x) + load_scale(law, o.area, o.volume, length))};
 }
 
 // Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
@@ -94,13 +99,15 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     const CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
     CurveLaw law = law_of(c);
-    reference_energy = reference_energy_of(forms, law, x);
+    const StartEnergy energy = start_energy(forms, law, x);
+    magnitude = energy.magnitude;
+    reference_energy = tubule::reference_energy(c, energy.energy, magnitude);
     const double variation = variation_of_H(*space, x);
     law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
     // Where area and volume are the same condition, one multiplier has no value.
     const bool keeps_both = law.keeps_volume && !law.area_is_free() && !law.free_period;
     if (keeps_both && variation <= same_everywhere) law.keeps_volume = false;
-    motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, reference_energy, start.area), start.area,
+    motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
 }
 
@@ -123,7 +130,7 @@ FlowSystem CurveSetup::system() const {
     system.scale = Eigen::VectorXd::Constant(at.size, 1e12 * length / settings.tolerance);
     system.scale.head(space->size()).setConstant(length);
     if (motion.law().inertia != 0)
-        for (int i = space->size(); i < at.p; ++i) system.scale[i] = std::sqrt(reference_energy / start.area);
+        for (int i = space->size(); i < at.p; ++i) system.scale[i] = std::sqrt(magnitude / start.area);
     return system;
 }
 

@@ -32,7 +32,8 @@ struct CurveSetup {
     CurveSettings settings;
     std::unique_ptr<CurveSpace> space;
     std::unique_ptr<CurveMotion> motion;
-    double reference_energy = 0;
+    double reference_energy = 0;  // what errors are relative to
+    double magnitude = 0;         // of the terms of the energy at the start
     SeriesTable<CurveRow> series;
 
     int elements() const { return space->splines().elements() * space->images(); }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "axisym/graph/graph_start.hpp"
+#include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -63,7 +64,7 @@ FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& c
         const ProfileSpace space = space_of(cell, out.breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(start);
-        out.reference_energy = forms.reference_energy(x);
+        out.reference_energy = reference_energy(c, forms.energy(x), forms.reference_energy(x));
         const double allowed = settings.defect * out.reference_energy;
         if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return out;
         const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);

@@ -42,7 +42,8 @@ enum class Parametrisation {
 };
 
 struct Accuracy {
-    double energy = 1e-4;  // asked error of the energy at all times, relative to E_ref
+    double energy = 1e-4;             // asked error of the energy at all times, relative to E_ref
+    bool relative_to_energy = false;  // E_ref is |E(0)|, else theory.md (11.1)
     bool estimate = true;  // of surfaces in motion: whether the error is estimated, by coarser runs beside the run
     double r_min = 1e-3;   // floor of the neck radius, below which the run stops with pinch-off; 1e-2 in tier surface3d
 };

@@ -133,6 +133,10 @@ void keys(Keys& k, Velocity& velocity, const Model& model) {
 template <class Keys>
 void keys(Keys& k, Accuracy& accuracy, bool moves, Tier tier) {
     k.number("energy", accuracy.energy, {.above = 1e-12, .to = 0.1});
+    if (moves)
+        k.choice("relative_to", accuracy.relative_to_energy, {{"magnitude", false}, {"energy", true}});
+    else
+        k.absent("relative_to", "must be absent: without a table [time] nothing moves");
     if (moves && tier != Tier::axisym)
         k.flag("estimate", accuracy.estimate);
     else
@@ -335,6 +339,9 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
                    ? fmt::format("must not be \"{}\" with equilibrium.modes: growth rates neglect inertia",
                                  name(c.model))
                    : "";
+    });
+    k.check("accuracy.relative_to", [&] {
+        return c.accuracy.relative_to_energy ? "must not be \"energy\" with [equilibrium]: nothing starts" : "";
     });
     k.check("equilibrium.volume", [&]() -> std::string {
         const EquilibriumChoices& e = *c.equilibrium;

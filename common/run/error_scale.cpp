@@ -4,12 +4,26 @@
 
 #include <cmath>
 
+#include "common/case/read.hpp"
+
 namespace tubule {
 namespace {
 
 constexpr double no_change = 1e-9;  // of E_ref: a surface that was at rest
 
+constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it has cancelled away
+
 }  // namespace
+
+double reference_energy(const Case& c, double energy, double by_magnitude) {
+    if (!c.accuracy.relative_to_energy) return by_magnitude;
+    if (std::abs(energy) < least_scale * by_magnitude)
+        throw complaint(c, "accuracy.relative_to",
+                        fmt::format("must not be \"energy\": the energy of the start is {:.2g}, of terms as large as "
+                                    "{:.4g}",
+                                    energy, by_magnitude));
+    return std::abs(energy);
+}
 
 std::string doubt_before(const Case& c, double energy, double E_ref) {
     const double allowed = c.accuracy.energy * E_ref;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/run/error_scale.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -53,7 +55,8 @@ double free_energy(const Case& c, const Observables& o, double period) {
 }
 
 double reference_energy(const Case& c, const Observables& o, double period) {
-    return c.handover ? c.handover->reference_energy : own_scale(c, o, period);
+    if (c.handover) return c.handover->reference_energy;
+    return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
 }
 
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {

@@ -14,7 +14,7 @@ VectorField start_velocity(const Case& c, const StartMesh& start);
 // Energies, area and volume of a start, as its motion sees them.
 Observables observe_start(const Case& c, const StartMesh& start);
 
-// F at the start, and E_ref, theory.md (11.1).
+// F at the start, and E_ref of a run with it. The latter throws CaseError as tubule::reference_energy.
 double free_energy(const Case& c, const Observables& start, double period);
 double reference_energy(const Case& c, const Observables& start, double period);
 

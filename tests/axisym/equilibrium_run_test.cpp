@@ -108,6 +108,9 @@ TEST(EquilibriumCase, refusals) {
            "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.reduced_volume\"", varies);
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"volume\"\n[equilibrium.branch]\nvary = \"equilibrium.area\"", varies);
+    EXPECT_NE(refusal(with("[accuracy]", "[accuracy]\nrelative_to = \"energy\""))
+                  .find("accuracy.relative_to must not be \"energy\" with [equilibrium]: nothing starts"),
+              std::string::npos);
     expect("[accuracy]", "[time]\nend = 1.0\n[accuracy]",
            "11:7: time.end must be absent: nothing moves in a case with [equilibrium]");
     expect("kind = \"capsule\"\nradius = 0.5\nlength = 2.0", "kind = \"torus\"\nradius = 2.0\ntube_radius = 1.0",

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What runs of tier axisym state is so: errors, reasons to stop, energies that only fall.
+"""What runs state, most of them of tier axisym, is so: errors, reasons to stop, energies that only fall.
 
     honesty_test.py TUBULE
 """
@@ -53,6 +53,14 @@ energy = {k20 = 1.0}
 shape = {kind = "capsule", radius = 1.0, length = 2.0}
 accuracy = {energy = 1e-3}
 time = {end = 0.1}
+"""
+
+# Bending away from H = H0 by a small wave only: a small energy of terms that are large and cancel.
+CANCELLING = """tier = "axisym"
+energy = {k20 = 1.0, H0 = -1.0}
+shape = {kind = "tube", radius = 1.0, length = 6.0, mode = [{amplitude = 0.1, n = 1}]}
+accuracy = {energy = 1e-2, relative_to = "energy"}
+time = {end = 0.02}
 """
 
 
@@ -115,6 +123,28 @@ class Honesty(ProgramTest):
                 end, rows = self.run_case(CAPSULE, f"accuracy.energy={asked}", f"model.kind={model}", "time.end=1e-3")
                 error = abs(rows["energy"][0] - exact) / end["E_ref"]
                 self.assertLessEqual(error, end["estimated_error"], (asked, model))
+
+    def test_errors_are_relative_to_the_energy_where_the_case_has_it_so(self):
+        tiers = (("axisym", "gradient-flow"), ("axisym", "overdamped"), ("surface3d", "gradient-flow"))
+        for tier, model in tiers:
+            with self.subTest(tier=tier, model=model):
+                text = CANCELLING.replace("axisym", tier)
+                end, rows = self.run_case(text, f"model.kind={model}")
+                plain, _ = self.run_case(text, f"model.kind={model}", "accuracy.relative_to=magnitude")
+                self.assertAlmostEqual(end["E_ref"] / abs(rows["energy"][0]), 1, delta=1e-3)  # of a first mesh
+                self.assertGreater(plain["E_ref"], 20 * end["E_ref"])
+                self.assertLessEqual(end["estimated_error"], 1e-2)
+                self.assertLess(end["estimated_error"] * end["E_ref"], 1e-2 * plain["E_ref"])
+
+    def test_an_energy_that_vanishes_is_no_scale(self):
+        nothing = CANCELLING.replace("amplitude = 0.1", "amplitude = 0.0")  # H = H0
+        for tier, model in (("axisym", "gradient-flow"), ("axisym", "overdamped"), ("surface3d", "stokes")):
+            with self.subTest(tier=tier, model=model):
+                path = self.write("case.toml", nothing.replace("axisym", tier))
+                with self.start("run", path, "-o", self.result, f"--set=model.kind={model}") as process:
+                    said = process.communicate()[1]
+                self.assertEqual(process.returncode, 2, said)
+                self.assertRegex(said, r'accuracy\.relative_to must not be "energy": the energy of the start is .*, of terms')
 
 
 if __name__ == "__main__":

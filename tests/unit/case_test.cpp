@@ -121,7 +121,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
              "15:1: unknown key shape.mode.0.l; did you mean 'n'? Allowed here: amplitude, n, m, phase"},
         Edit{"energy = 1e-6", "rmin = 1e-6",
              "17:1: unknown key accuracy.rmin; did you mean 'r_min'? Allowed here: "
-             "energy, estimate, r_min"},
+             "energy, relative_to, estimate, r_min"},
         Edit{"order", "oder",
              "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
              "order, smoothness, time_tolerance, time_order, symmetry, parametrisation"},
@@ -297,6 +297,8 @@ TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
         // the default of r_min, too
         Edit{"radius = 1.0", "radius = 0.3005",
              "16:1: accuracy.r_min must be below the smallest radius of the start (0.0005 at z = 1), not 0.001"},
+        Edit{"energy = 1e-6", "relative_to = \"size\"",
+             "17:15: accuracy.relative_to must be one of \"magnitude\", \"energy\", not \"size\""},
         Edit{", rel = 1e-6", "", "24:10: expect.energy needs a tolerance: rel, abs or both"},
         Edit{"value = 1.0", "value = 0",
              "24:10: expect.energy needs abs: a relative tolerance is meaningless for the value 0"},
@@ -711,7 +713,7 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
         "0\npressure = 0\n"
         "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
         "\n[[shape.mode]]\namplitude = 0.3\nn = 1\nm = 0\nphase = 0\n"
-        "\n[accuracy]\nenergy = 1e-06\nr_min = 0.001\n"
+        "\n[accuracy]\nenergy = 1e-06\nrelative_to = \"magnitude\"\nr_min = 0.001\n"
         "\n[discretisation]\norder = 5\ntime_order = 5\nsymmetry = true\n"
         "\n[time]\nend = 1.4\noutput = [0.1, 0.2]\n"
         "\n[expect]\nstop = \"finished\"\nenergy = {value = 1, rel = 1e-06}\nstop_time = {value = 1.4, abs = 0.5}\n"

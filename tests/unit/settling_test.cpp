@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/case/read.hpp"
 #include "common/run/error_scale.hpp"
 
 namespace tubule {
@@ -63,6 +64,14 @@ TEST(Settling, NoFartherThanUntilTheEnd) {
     settling.is_settled(c, 0, dissipation(0.034, 0), area);
     settling.is_settled(c, 0.5, dissipation(0.034, 0.5), area);
     EXPECT_TRUE(settling.is_settled(c, 0.55, dissipation(0.034, 0.55), area));
+}
+
+TEST(ErrorScale, IsTheEnergyOfTheStartWhereTheCaseHasItSo) {
+    Case c;
+    EXPECT_EQ(reference_energy(c, -3, 100), 100);
+    c.accuracy.relative_to_energy = true;
+    EXPECT_EQ(reference_energy(c, -3, 100), 3);
+    EXPECT_THROW(reference_energy(c, -1e-8, 100), CaseError);
 }
 
 TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
