@@ -37,12 +37,13 @@ struct SchemeEntry {
     bool with_inertia = true;    // else no fluid
     bool smooths = false;        // takes discretisation.smoothing
     int order = 2;               // of its errors in the step, at least
+    int most_order = 2;          // and where it can have that of smooth motions
     bool general = true;         // else no gradient flow, no Stokes flow without friction, no terms but k20, k40, k42
 };
 inline constexpr std::array schemes{
     SchemeEntry{.name = "bdf2", .default_without_inertia = true},
     SchemeEntry{.name = "alpha", .default_with_inertia = true},
-    SchemeEntry{.name = "bdf", .with_inertia = false},
+    SchemeEntry{.name = "bdf", .with_inertia = false, .most_order = 4},
     SchemeEntry{.name = "euler", .order = 1},
     SchemeEntry{.name = "paper",
                 .controls_steps = false,

@@ -14,7 +14,7 @@ namespace tubule {
 
 struct Forecast {
     std::string resolution;                // in words
-    std::optional<double> steps, seconds;  // of wall time on this machine as it is now; nothing where it cannot be told
+    std::optional<double> steps, seconds;  // of wall time, of moving surfaces on a quiet machine; none: it is not known
     double bytes = 0;
 };
 

@@ -81,7 +81,6 @@ void MotionAttempt::begin(const Start& from) {
     look();
     out_.note(doubt_before(case_, now_.free_energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
-    trace.add(state_.time, comparable());
     if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, comparable()));
     compare();
     error_now_ = std::max(error_now_, memory_.error);
@@ -249,7 +248,7 @@ void MotionAttempt::make_new_mesh() {
 }
 
 std::optional<StopReport> MotionAttempt::step() {
-    const double kink = next_kink(), left = std::min(outputs_.next(), kink) - state_.time;
+    const double kink = next_kink(), left = std::min({outputs_.next(), kink, until_}) - state_.time;
     const auto tau = [&] { return left / std::ceil(left / memory_.next_step * (1 - 1e-9)); };  // no short last step
     while (const auto refusal = attempt(tau())) {
         ++memory_.count.rejected;
@@ -259,7 +258,6 @@ std::optional<StopReport> MotionAttempt::step() {
         check_pause();
     }
     if (std::abs(state_.time - kink) <= moment_of_time()) state_.time = kink;
-    trace.add(state_.time, comparable());
     compare();
     write_row();
     if (out_.reported()) out_.progress(state_.time, now_.bending.energy, state_.step);
@@ -289,6 +287,14 @@ void MotionAttempt::advance() {
         stop_ = step();
     } catch (const Paused& pause) {
         stop_ = pause_report(pause, state_.time);
+    }
+}
+
+void MotionAttempt::advance_to(double time) {
+    until_ = time;
+    while (!stop_ && is_before(state_.time, time)) {
+        memory_.next_step = time - state_.time;
+        advance();
     }
 }
 

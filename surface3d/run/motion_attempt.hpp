@@ -2,12 +2,12 @@
 // and the reason why it ends.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "common/run/energy_trace.hpp"
 #include "common/run/output_times.hpp"
 #include "common/run/run_output.hpp"
 #include "common/run/settling.hpp"
@@ -22,6 +22,11 @@ namespace tubule::surface3d {
 
 class MotionError;
 
+// Of two times of a run: by more than rounding.
+inline bool is_before(double t, double other) {
+    return t < other * (1 - 1e-12);
+}
+
 class MotionAttempt {
 public:
     // All references must outlive the attempt. `error` tells that of the run; none where it is not to be known.
@@ -33,13 +38,14 @@ public:
     void resume(const Restart& restart);
     void go();
     void advance();
+    void advance_to(double time);  // of a coarser run: in one step, or in several where that is refused
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more
 
     RunSummary summary;
-    EnergyTrace trace;
     const std::optional<StopReport>& stop() const { return stop_; }
     const MotionSettings& settings() const { return memory_.settings; }
     const MotionState& state() const { return state_; }  // no nodes: it could not begin
+    double energy() const { return comparable(); }  // with loads: F
     CurvedMesh mesh() const { return scheme_->surface().mesh(state_); }
     Record saved() const { return state_record(state_, memory_); }
     // Largest errors, absolute: of the energy; of the balance with dissipation.
@@ -108,6 +114,7 @@ private:
     StallDetector stall_;
     Settling settling_;
     std::optional<StopReport> stop_;
+    double until_ = HUGE_VAL;  // no step goes farther
     double error_now_ = 0;
 };
 

@@ -26,13 +26,14 @@ struct Saved {
     int stop = -1;  // it goes on
     double stop_time = 0;
     SurfaceCells cells;
-    EnergyTrace trace;
+    ComparedEnergies of_run;
 };
 template <class Fields, class S>
 void saved_fields(Fields&& f, S& s) {
     f.number("time", s.time), f.number("stop", s.stop), f.number("stop_time", s.stop_time);
     f.number("order", s.cells.order), f.number("period", s.cells.period);
-    EnergyTrace::fields(f, s.trace, "trace");
+    f.number("compared", s.of_run.compared), f.number("since", s.of_run.since), f.number("error", s.of_run.error);
+    f.array("run_times", s.of_run.times), f.array("run_energies", s.of_run.energies, s.of_run.times.size());
 }
 
 // The record of the coarser run in that of the run, if it has one.
@@ -84,7 +85,8 @@ std::unique_ptr<MotionError::Coarser> MotionError::make(Role role, const MotionS
     auto out = std::make_unique<Coarser>(Coarser{case_, {}});
     const int order = element_order(case_);
     if (role == Role::other_order) out->c.surface.order = order > 2 ? order - 1 : 3;
-    if (case_.surface.step) out->c.surface.step = 2 * *case_.surface.step;
+    out->c.surface.step.reset();
+    out->c.time.output.clear();
     out->c.time.stationary.reset();  // it goes as far as the run does
     out->run.emplace(out->c, watch_, clock_, settings, nullptr);
     return out;
@@ -116,26 +118,42 @@ void MotionError::begin(int triangles) {
 }
 
 void MotionError::begin(Role role, double coarser_by) {
-    auto next = make(role, coarser(case_, of_, role, coarser_by));
+    auto next = make(role, coarser(of_, role, coarser_by));
     next->run->begin(start_);
     coarser_ = std::move(next);
+    of_run_.compared = 0;
+}
+
+// At all times that are to be compared. False if the coarser run does not get there.
+bool MotionError::catch_up(double smoothness) {
+    MotionAttempt& run = *coarser_->run;
+    ComparedEnergies& r = of_run_;
+    double largest = 0;
+    for (; r.compared < std::ssize(r.times); ++r.compared) {
+        run.advance_to(r.times[r.compared]);
+        if (run.state().X.size() == 0 || is_before(run.state().time, r.times[r.compared])) return false;
+        largest = std::max(largest, std::abs(run.energy() - r.energies[r.compared]));
+        r.error = largest * error_by_difference(case_, run.settings(), smoothness);
+    }
+    return true;
 }
 
 std::optional<double> MotionError::at(double time, double energy, double smoothness) {
+    const bool last = !is_before(time, case_.time.end);
+    if (of_run_.times.empty() || ++of_run_.since >= steps_at_once || last) {
+        of_run_.times.push_back(time), of_run_.energies.push_back(energy);
+        of_run_.since = 0;
+    }
     try {
-        for (;;) {
-            MotionAttempt& run = *coarser_->run;
-            while (!run.stop() && run.trace.points_after(time) < 2) run.advance();
-            const bool short_of = run.trace.empty() || run.trace.end() < time;
-            if (!short_of || !run.stop() || !lost(*run.stop()) || run.settings().role == Role::other_order) break;
+        while (!catch_up(smoothness)) {
+            const auto& stop = coarser_->run->stop();
+            if (!stop || !lost(*stop) || coarser_->run->settings().role == Role::other_order) return std::nullopt;
             begin(Role::other_order, 1);
         }
     } catch (const Paused&) {
         return std::nullopt;
     }
-    const auto difference = coarser_->run->trace.difference(time, energy);
-    if (!difference) return std::nullopt;
-    return *difference * error_by_difference(case_, of_, coarser_->run->settings(), smoothness);
+    return of_run_.error;
 }
 
 std::optional<StopReport> MotionError::stop() const {
@@ -148,7 +166,7 @@ void MotionError::save(Record& record) const {
     if (!exists) return;
     const MotionAttempt& run = *coarser_->run;
     Record own = run.saved();
-    Saved saved{.time = own.time, .cells = cells_of(run.mesh()), .trace = run.trace};
+    Saved saved{.time = own.time, .cells = cells_of(run.mesh()), .of_run = of_run_};
     if (const auto& stop = run.stop(); stop && !can_go_on(stop->reason))
         saved.stop = static_cast<int>(stop->reason), saved.stop_time = stop->time;
     RecordWriter writer(own);
@@ -166,7 +184,7 @@ void MotionError::resume(const Record& record, int triangles) {
     const MotionSettings settings = motion_restart(*own, time_scheme(case_)).memory.settings;
     coarser_ = make(settings.role, settings);
     coarser_->run->resume({std::move(*own), saved.cells});
-    coarser_->run->trace = saved.trace;
+    of_run_ = saved.of_run;
     const auto stop = static_cast<Stop>(saved.stop);
     const bool goes_on = saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));
     if (!goes_on) coarser_->run->end({stop, saved.stop_time, "", ""});

@@ -4,15 +4,23 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "surface3d/run/motion_attempt.hpp"
 
 namespace tubule::surface3d {
 
-// The coarser run has fewer triangles and larger steps, such that errors in space and in time are larger by about the
-// same factor R, whichever of them it is: the difference of the energies is R - 1 times the error.
-// It is always a little ahead, so that the error is known as the run goes. It has elements of another order where fewer
-// triangles would be too few, are not ours to choose, or lose the surface on the way.
+// The coarser run has fewer triangles and goes over several steps of the run at once, so that errors in space and in
+// time are larger by known factors: the difference of the energies is R - 1 times the error, R being the smaller
+// factor. It follows the run by these few steps. It has elements of another order where fewer triangles would be too
+// few, are not ours to choose, or lose the surface on the way.
+struct ComparedEnergies {
+    std::vector<double> times, energies;  // of the run, at which the coarser one is compared with it
+    int compared = 0;                     // so many of them, as yet
+    int since = 0;                        // steps of the run since the last of these times
+    double error = 0;                     // at the last time compared
+};
+
 class MotionError {
 public:
     // All references must outlive it. `of`: the run whose error it is.
@@ -24,8 +32,9 @@ public:
     void resume(const Record& record, int triangles);
     void save(Record& record) const;
 
-    // Of this energy, absolute; the smoothness is that of MotionMeasures. Nothing where the coarser run has no energy:
-    // it has ended before, or it was told to pause, as the run will be.
+    // Of this energy, which is that after a step, or of the last one that was compared, absolute; the smoothness is
+    // that of MotionMeasures. Nothing where the coarser run has no energy: it has ended before, or it was told to
+    // pause, as the run will be.
     std::optional<double> at(double time, double energy, double smoothness);
     // Why and when the coarser run ended, if it has.
     std::optional<StopReport> stop() const;
@@ -42,6 +51,7 @@ private:
     std::unique_ptr<Coarser> make(Role role, const MotionSettings& settings) const;
     void begin(int triangles);
     void begin(Role role, double coarser_by);
+    bool catch_up(double smoothness);
     double error_of_start(double energy) const;
 
     const Case& case_;
@@ -50,6 +60,7 @@ private:
     const RunClock& clock_;
     MotionSettings of_;
     std::unique_ptr<Coarser> coarser_;
+    ComparedEnergies of_run_;
 };
 
 // Throws as RecordReader if a run with an error could not go on from this.

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "common/solve/interrupt.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/motion/motion_forms.hpp"
@@ -18,11 +20,16 @@ namespace {
 constexpr double pilot_limit = 6;         // seconds of each pilot run
 constexpr double limit = 15;              // of all of them, and their starts
 constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number
-constexpr double time_order = 2;          // of all schemes that control their steps, at least
 constexpr double cost_power = 1.1;        // of the number of triangles: the cost of a step
-constexpr double with_coarser_run = 1.3;  // runs, the coarser one that tells the error included
+constexpr double with_coarser_run = 1.2;  // runs, the coarser one that tells the error included
+constexpr double threads_power = 0.6;     // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
 constexpr double usual_steps = 100, usual_step = 0.5e-3;      // at the loosest tolerance; seconds for a triangle
+
+// Seconds that this process has used, over those that so many threads save on a quiet machine.
+double quiet_seconds() {
+    return std::clock() / (CLOCKS_PER_SEC * std::pow(loop_threads(), threads_power));
+}
 
 // Of both runs: their matrices and factors.
 double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
@@ -30,8 +37,8 @@ double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
     return bytes_at_rest + bytes_per_entry * triangles * width * width;
 }
 
-double steps_by_tolerance(double from, double to) {
-    return std::pow(from / to, 1 / (time_order + 1));
+double steps_by_tolerance(const Case& c, double from, double to) {
+    return std::pow(from / to, 1.0 / (entry(time_scheme(c)).most_order + 1));
 }
 
 struct PilotRun {
@@ -44,19 +51,20 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
     Case c = asked;
     c.time.limit = until;
     c.time.output.clear();
+    c.surface.scheme = time_scheme(asked);
     c.accuracy.energy = std::max(c.accuracy.energy, 0.05);
     Pilot pilot;
     const RunClock clock(c, pilot);
     MotionAttempt run(c, pilot, clock, {.elements = triangles, .tolerance = tolerance}, nullptr);
     try {
         run.begin(start);
-        const double before = clock.seconds();
+        const double before = quiet_seconds();
         run.go();
         const Stop stop = run.summary.stop.reason;
         const bool lost = stop == Stop::resolution_lost || stop == Stop::mesh_lost || stop == Stop::solver_failed;
         if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
         const bool whole = stop != Stop::time_limit && !lost;
-        return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (clock.seconds() - before) / pilot.steps(),
+        return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (quiet_seconds() - before) / pilot.steps(),
                 true};
     } catch (const SolveError&) {
     }
@@ -68,7 +76,7 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
 bool may_be_long(const Case& c, const Start& start) {
     const MotionSettings s = first_settings(c, start);
     const double steps = c.surface.step ? c.time.end / *c.surface.step
-                                        : usual_steps * std::max(1.0, steps_by_tolerance(1e-4, s.tolerance));
+                                        : usual_steps * std::max(1.0, steps_by_tolerance(c, 1e-4, s.tolerance));
     return steps * s.elements * usual_step > 20;
 }
 
@@ -86,7 +94,7 @@ Forecast forecast_motion(const Case& c, const Start& start) {
             const int own = start.resizable() ? std::min(few, triangles) : triangles;
             const PilotRun pilot = pilot_run(c, start, own, tolerance, watch.seconds() + pilot_limit);
             if (pilot.useful) {
-                out.steps = pilot.steps * (c.surface.step ? 1 : steps_by_tolerance(tolerance, wanted.tolerance));
+                out.steps = pilot.steps * (c.surface.step ? 1 : steps_by_tolerance(c, tolerance, wanted.tolerance));
                 const double per_step = pilot.seconds_per_step * std::pow(1.0 * triangles / own, cost_power);
                 out.seconds = with_coarser_run * *out.steps * per_step;
             }

@@ -11,29 +11,30 @@ namespace {
 // Measured choices: docs/decisions/surface_motion.md, "How large is the error of a surface in motion?".
 constexpr int most_pairs = 6;
 constexpr int first_triangles = 180, most_first_triangles = 1000, most_triangles = 40000;
-constexpr double fewer = 1.8;                          // times fewer triangles of the coarser run
-constexpr double smooth_order = 3.4, rough_order = 2;  // of errors in the mesh width
-constexpr double per_smoothness = 1.7;                 // order, for each order of interpolation of H
-constexpr double ahead_in_time = 1.3;                  // errors in time grow by so much more: they vary
+constexpr double fewer = 2.25;                         // times fewer triangles of the coarser run
+constexpr double smooth_order = 4, rough_order = 2;    // of errors in the mesh width
+constexpr double per_smoothness = 2.1;                 // order, for each order of interpolation of H
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
 constexpr double spare = 1.5;                          // the next pair is to be so many times better than asked
 constexpr double later = 2;                            // errors grow from the start on
-constexpr double tolerance_per_accuracy = 0.9;         // tolerance = this * asked accuracy^1.5
+constexpr double tolerance_per_accuracy = 0.8;         // tolerance = this * asked accuracy^1.5, of order 2
+constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * asked accuracy^1.25
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
-constexpr double loosest_of_coarser = 4e-4;            // beyond it they leave waves that no mesh resolves
-constexpr double least_longer = 2;
+constexpr double loosest_of_coarser = 2e-3;            // beyond it they leave waves that no mesh resolves
+constexpr double least_fewer = 1.1;
+constexpr double high_accuracy = 1e-4;  // from here on, without inertia, steps of higher order pay
+constexpr double surest_growth = 4.5;   // of errors: they have maxima between the steps that are compared
 
-double tolerance_for(double accuracy) {
-    return std::clamp(tolerance_per_accuracy * std::pow(accuracy, 1.5), 1e-13, loosest_tolerance);
+double tolerance_for(const Case& c) {
+    const double accuracy = c.accuracy.energy;
+    const double tolerance = entry(time_scheme(c)).most_order > 2 ? tolerance_of_order_4 * std::pow(accuracy, 1.25)
+                                                                  : tolerance_per_accuracy * std::pow(accuracy, 1.5);
+    return std::clamp(tolerance, 1e-13, loosest_tolerance);
 }
 
 // Of errors, from a mesh to the coarser one; elements of one order less count as a mesh.
 double growth_in_space(const MotionSettings& coarser, double order) {
     return coarser.role == Role::other_order ? order : std::pow(coarser.coarser_by, order / 2);
-}
-
-double order_in_time(const Case& c) {
-    return entry(time_scheme(c)).order;
 }
 
 // The number of triangles from which on the energy of the start is as accurate as asked.
@@ -44,7 +45,7 @@ int triangles_for_start(const Case& c, const Start& start) {
     for (int n = first_triangles;; n = static_cast<int>(fewer * n)) {
         StartMesh mesh = start.mesh(n, order);
         const Observables o = observe_start(c, mesh), before = observe_start(c, coarse);
-        other.coarser_by = std::max(1.0 * mesh.mesh.triangles() / coarse.mesh.triangles(), least_longer / fewer);
+        other.coarser_by = std::max(1.0 * mesh.mesh.triangles() / coarse.mesh.triangles(), least_fewer);
         const double error = std::abs(free_energy(c, o, mesh.mesh.period) - free_energy(c, before, mesh.mesh.period)) /
                              (growth_in_space(other, smooth_order) - 1);
         const bool more = later * error > c.accuracy.energy * reference_energy(c, o, mesh.mesh.period);
@@ -56,14 +57,17 @@ int triangles_for_start(const Case& c, const Start& start) {
 }  // namespace
 
 Scheme time_scheme(const Case& c) {
-    return c.surface.scheme.value_or(default_scheme(motion_law(c.model).inertia != 0));
+    if (c.surface.scheme) return *c.surface.scheme;
+    const bool inertia = motion_law(c.model).inertia != 0;
+    if (!inertia && c.accuracy.energy < high_accuracy) return scheme_named("bdf");
+    return default_scheme(inertia);
 }
 
 MotionSettings first_settings(const Case& c, const Start& start) {
     return {c.surface.elements   ? *c.surface.elements
             : !start.resizable() ? first_triangles
                                  : triangles_for_start(c, start),
-            c.surface.time_tolerance.value_or(tolerance_for(c.accuracy.energy))};
+            c.surface.time_tolerance.value_or(tolerance_for(c))};
 }
 
 bool settings_given(const Case& c) {
@@ -74,23 +78,19 @@ int fewer_triangles(int triangles) {
     return static_cast<int>(triangles / fewer);
 }
 
-MotionSettings coarser(const Case& c, const MotionSettings& s, Role role, double coarser_by) {
-    MotionSettings out{.elements = role == Role::other_order ? s.elements : fewer_triangles(s.elements),
-                       .pair = s.pair,
-                       .role = role,
-                       .coarser_by = coarser_by};
-    const double q = order_in_time(c),
-                 longer = std::pow(ahead_in_time * growth_in_space(out, smooth_order), (q + 1) / q);
-    out.tolerance = std::max(std::min(longer * s.tolerance, loosest_of_coarser), least_longer * s.tolerance);
-    return out;
+MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by) {
+    return {.elements = role == Role::other_order ? s.elements : fewer_triangles(s.elements),
+            .tolerance = std::max(loosest_of_coarser, s.tolerance),
+            .pair = s.pair,
+            .role = role,
+            .coarser_by = coarser_by};
 }
 
-double error_by_difference(const Case& c, const MotionSettings& s, const MotionSettings& coarser, double smoothness) {
-    const double q = order_in_time(c);
-    const double in_time = c.surface.step ? std::pow(2, q) : std::pow(coarser.tolerance / s.tolerance, q / (q + 1));
+double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {
+    const double in_time = std::pow(steps_at_once, entry(time_scheme(c)).order);
     const double order =
         element_order(c) < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
-    return 1 / (std::min(growth_in_space(coarser, order), in_time) - 1);
+    return 1 / (std::min({growth_in_space(coarser, order), in_time, surest_growth}) - 1);
 }
 
 // Where the energies of a pair agree and the balance is off, waves are damped by steps that are too long: the mesh is

@@ -21,7 +21,7 @@ struct MotionSettings {
     double coarser_by = 1;  // of a coarser run: so many times fewer triangles
 };
 
-// The case's, or the default of its model.
+// The case's, or the default of its model and accuracy.
 Scheme time_scheme(const Case& c);
 
 // What the case gives, or what its accuracy asks for: as many triangles as the energy of the start takes.
@@ -30,13 +30,13 @@ bool settings_given(const Case& c);
 
 // About how many triangles the coarser run is to have.
 int fewer_triangles(int triangles);
-// The coarser run, which has so many times fewer triangles (elements of another order: 1). Its errors in time grow by
-// a little more than those in space.
-MotionSettings coarser(const Case& c, const MotionSettings& s, Role role, double coarser_by);
+constexpr int steps_at_once = 3;  // of the run, that the coarser one goes over
+// The coarser run, which has so many times fewer triangles (elements of another order: 1).
+MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
 
 // The error of a run over its difference from the coarser one, by the least orders that errors can be relied on to
 // have where H is so smooth (MotionMeasures).
-double error_by_difference(const Case& c, const MotionSettings& s, const MotionSettings& coarser, double smoothness);
+double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
 
 // Of the next pair, after one whose error and defect of the balance are so large, where less is asked; all absolute.
 MotionSettings finer(const MotionSettings& s, double asked, double error, double defect);

@@ -58,35 +58,25 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
-TEST(MotionSettings, TheCoarserRunIsLooserButNotTooLoose) {
-    // Both runs must differ by more than the finer one is off, and the coarser one still be on its way to the solution
-    // (docs/decisions/surface_motion.md): above 4e-4 it is no looser than it has to be.
-    const Case c = begin(wavy, {"discretisation.order=4"}).c;
-    for (const double finer : {1e-7, 1e-6, 5e-5, 1e-4, 1e-3, 1e-2}) {
-        const double looser = coarser(c, {.elements = 320, .tolerance = finer}, Role::other_order, 1).tolerance;
-        EXPECT_GE(looser, 2 * finer);
-        EXPECT_LE(looser, std::max(4e-4, 2 * finer));
-    }
+TEST(MotionSettings, TheCoarserRunHasFewerTrianglesOrAnotherOrder) {
     const MotionSettings fine{.elements = 450, .tolerance = 1e-5};
-    EXPECT_EQ(coarser(c, fine, Role::other_order, 1).elements, fine.elements);
-    EXPECT_LT(coarser(c, fine, Role::fewer_triangles, 1.8).elements, fine.elements / 1.5);
+    EXPECT_EQ(coarser(fine, Role::other_order, 1).elements, fine.elements);
+    EXPECT_LT(coarser(fine, Role::fewer_triangles, 2).elements, fine.elements / 1.5);
 }
 
 TEST(MotionSettings, TheErrorIsAPartOfTheDifferenceByTheOrderOfBoth) {
-    // Errors C h^p on 4 times fewer triangles are 2^p times as large, and differ by 2^p - 1 of the finer one: p = 3.4
-    // where H is smooth, 2 where it is rough. Errors in time, of the power 2/3 of the tolerance, grow by 1.3 times
-    // that.
+    // Errors C h^p on n times fewer triangles are n^(p/2) times as large, and differ by that less 1 of the finer one:
+    // p = 4 where H is smooth, 2 where it is rough; but at most by 3.5.
     const Case c = begin(wavy, {"discretisation.order=4"}).c;
-    const MotionSettings fine{.elements = 400, .tolerance = 1e-7}, coarse = coarser(c, fine, Role::fewer_triangles, 4);
-    EXPECT_NEAR(error_by_difference(c, fine, coarse, 2.0), 1 / (std::pow(2, 3.4) - 1), 1e-9);
-    EXPECT_NEAR(error_by_difference(c, fine, coarse, 0.6), 1.0 / 3, 1e-9);
-    EXPECT_NEAR(std::pow(coarse.tolerance / fine.tolerance, 2.0 / 3), 1.3 * std::pow(2, 3.4), 1e-9);
-    // Steps twice as long as given ones: errors 4 times as large, of Euler steps 2 times, which is then the least.
-    const Case fixed = begin(wavy, {"discretisation.order=4", "discretisation.step=1e-3"}).c,
-               euler =
-                   begin(wavy, {"discretisation.order=4", "discretisation.step=1e-3", "discretisation.scheme=euler"}).c;
-    EXPECT_NEAR(error_by_difference(fixed, fine, coarse, 2.0), 1.0 / 3, 1e-9);
-    EXPECT_NEAR(error_by_difference(euler, fine, coarse, 2.0), 1, 1e-9);
+    const auto on_fewer = [](double n) {
+        return coarser({.elements = 400, .tolerance = 1e-7}, Role::fewer_triangles, n);
+    };
+    EXPECT_NEAR(error_by_difference(c, on_fewer(2), 2.0), 1.0 / 3, 1e-9);
+    EXPECT_NEAR(error_by_difference(c, on_fewer(2), 0.6), 1, 1e-9);
+    EXPECT_NEAR(error_by_difference(c, on_fewer(3), 2.0), 1 / 3.5, 1e-9);
+    // Three Euler steps at once: errors in time are 3 times as large.
+    const Case euler = begin(wavy, {"discretisation.order=4", "discretisation.scheme=euler"}).c;
+    EXPECT_NEAR(error_by_difference(euler, on_fewer(2), 2.0), 1.0 / 2, 1e-9);
 }
 
 TEST(MotionRun, WithoutAnEstimateTheErrorIsUnknown) {
@@ -130,7 +120,14 @@ end = 1000.0
     const double R = std::pow(4001.0, 0.25);
     EXPECT_NEAR(o.last("r_min"), R, 1e-3 * R);
     EXPECT_NEAR(o.last("r_max"), R, 1e-3 * R);
-    EXPECT_TRUE(o.summary.as_accurate_as_asked) << o.summary.estimated_error;
+    // Its energy is 2 pi L/R. After the new mesh short steps grow again, and the coarser run is less accurate.
+    const std::vector<double> time = o.series("time"), energy = o.series("energy");
+    double error = 0;
+    for (std::size_t i = 0; i < time.size(); ++i)
+        error = std::max(error, std::abs(energy[i] - 4 * std::numbers::pi / std::pow(1 + 4 * time[i], 0.25)));
+    EXPECT_LT(error, 1e-2 * o.summary.reference_energy);
+    EXPECT_LT(error, o.summary.estimated_error * o.summary.reference_energy);
+    EXPECT_LT(o.summary.estimated_error, 3e-2);
 }
 
 TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
@@ -146,6 +143,9 @@ TEST(MotionRun, SchemeThatIsNotGivenIsThatOfTheModel) {
         EXPECT_EQ(time_scheme(begin(wavy, {model}).c), scheme);
         EXPECT_EQ(time_scheme(begin(wavy, {model, "discretisation.scheme=euler"}).c), scheme_named("euler"));
     }
+    // Much accuracy takes steps of higher order, which are not for fluids.
+    EXPECT_EQ(time_scheme(begin(wavy, {"model.kind=stokes", "accuracy.energy=1e-5"}).c), scheme_named("bdf"));
+    EXPECT_EQ(time_scheme(begin(wavy, {"model.kind=fluid", "accuracy.energy=1e-5"}).c), scheme_named("alpha"));
 }
 
 TEST(MotionRun, ACoarserRunMayBeOffByMore) {
@@ -339,7 +339,7 @@ TEST(MotionGuards, TimeLimit) {
 }
 
 // The first pair is less accurate than asked.
-const std::vector<std::string> two_pairs{"accuracy.energy=1e-3", "discretisation.order=2", "model.kind=gradient-flow"};
+const std::vector<std::string> two_pairs{"accuracy.energy=2e-3", "discretisation.order=2", "model.kind=gradient-flow"};
 
 Case open_case(const std::vector<std::string>& sets) {
     std::string text = wavy;
