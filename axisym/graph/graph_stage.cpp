@@ -64,7 +64,7 @@ FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& c
         const ProfileSpace space = space_of(cell, out.breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(start);
-        out.reference_energy = reference_energy(c, forms.energy(x), forms.reference_energy(x));
+        out.reference_energy = reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
         const double allowed = settings.defect * out.reference_energy;
         if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return out;
         const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
