@@ -98,6 +98,35 @@ double amplitude_at(double t, const theory::UniformTube& tube, const MotionLaw& 
     return sum.real();
 }
 
+TEST(Ensembles, AReservoirFeedsUniformlyAndBringsHalfTheMomentum) {
+    // theory.md (3.18): div_P u is one number, up to what the elements resolve, and momentum grows with the root of the
+    // area while friction takes its part.
+    const double end = 0.1;
+    const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.05, 3, 2}}};
+    const Model model = open_model(ModelKind::fluid, -3, 1);
+    Motion motion(mesh_of(wavy, icosphere(3), 4), model, all_terms);
+    const int n = motion.mesh().size();
+    motion.state.u.head(n).setConstant(0.2);
+    const MotionMeasures start = motion.measures();
+    motion.until(end, 10);
+    const MotionMeasures now = motion.measures();
+    const double factor = std::exp(-model.gamma * end) * std::sqrt(now.bending.area / start.bending.area);
+    EXPECT_GT(now.bending.area, 1.01 * start.bending.area);
+    EXPECT_LT((now.momentum - factor * start.momentum).norm(), 1e-8 * start.momentum.norm());
+    const CurvedMesh mesh = motion.mesh();
+    const SurfaceSpace space(mesh);
+    double sum = 0, squares = 0, area = 0;
+    for (int cell = 0; cell < space.cells(); ++cell)
+        for (int q = 0; q < space.tabulation().points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(cell_nodes(mesh, cell), space.tabulation(), q);
+            const double dS = space.tabulation().weight[q] * p.area,
+                         rate =
+                             gradients(p, space.tabulation(), q).cwiseProduct(space.gather(now.velocity, cell)).sum();
+            sum += dS * rate, squares += dS * rate * rate, area += dS;
+        }
+    EXPECT_LT(std::sqrt(squares / area - sum * sum / (area * area)), 0.1 * std::abs(sum / area));
+}
+
 struct Wave {
     double tension;
     int m;
