@@ -18,6 +18,8 @@
 namespace tubule::axisym {
 namespace {
 
+constexpr double rounding = 1e-9;  // of the reduced volume of a start that is a sphere
+
 const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
 
 // In space that is periodic along an axis, balls and cylinders enclose most (Pedrosa and Ritore, Indiana Univ. Math. J.
@@ -55,7 +57,7 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
     if (space_->closed()) {
         std::optional<double> v = c.reduced_volume;
         if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
-        if (v && *v > 1)
+        if (v && *v > 1 + rounding)
             throw std::invalid_argument(
                 fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
     } else if (c.area && c.volume) {

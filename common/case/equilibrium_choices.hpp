@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -29,7 +30,7 @@ struct BranchChoices {
 // Words if a branch has no shapes, or too many; else empty.
 inline std::string wrong_branch(double from, double to, double step) {
     constexpr int most = 10000;
-    const double steps = std::ceil(std::abs(to - from) / step - 1e-9);
+    const double steps = std::max(0.0, std::ceil(std::abs(to - from) / step - 1e-9));
     if (steps >= 1 && steps <= most) return {};
     return fmt::format("from {} to {} by {} makes {:.7g} steps; the number must be 1 to {}", from, to, step, steps, most);
 }

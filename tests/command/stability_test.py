@@ -236,7 +236,7 @@ class Stability(ProgramTest):
         waves = {"1,0": (-4.9, 1e-3), "1,1": (-9.9, 1.5e-3), "0,2": (-9.0, 4e-3)}
         errors = {}
         for elements in (100, 200):
-            self.tubule("run", "--quiet", case, "--set", f"discretisation.elements={elements}")
+            self.tubule("run", "--quiet", "--overwrite", case, "--set", f"discretisation.elements={elements}")
             for wave, (exact, _) in waves.items():
                 fit = self.json(self.folder / "moving.hdf", "--fit", wave)
                 self.assertAlmostEqual(fit["linear_rate"], exact, delta=1e-9)

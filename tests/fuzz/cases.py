@@ -88,6 +88,7 @@ def settled(box, done, sets):
     if sets:
         return
     box.write("again/case.toml", done.out)
+    (box.folder / "again/meshes").symlink_to(CASES / "meshes")
     again = box.run("check", "--quick", "again/case.toml", statuses=(0, 2))
     if again.status != 0 or again.out.split("\n", 1)[1] != done.out.split("\n", 1)[1]:
         raise Finding("no-fixed-point", f"check of what check prints differs:\n{again.err[:500]}")

@@ -178,8 +178,7 @@ TEST(EnsembleRuns, AFreePeriodGoesOnWithANewMesh) {
         "[energy]\nk20 = 0.5\n[model]\narea = \"fixed\"\nperiod = \"free\"\nforce = 1.8\n[shape]\nkind = \"tube\"\n"
         "radius = 1\nlength = 6\n[discretisation]\nelements = 120\n[accuracy]\nenergy = 1e-2\n[time]\nend = 60\n");
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
-    const auto elements = o.series("elements");
-    EXPECT_NE(elements.front(), elements.back());
+    EXPECT_GT(detail(o.summary, "meshes"), 1);
     double R = 1;
     const int steps = 60000;
     const auto rate = [](double r) { return 1 / (r * r * r) - 1.8 / (2 * std::numbers::pi * r * r); };

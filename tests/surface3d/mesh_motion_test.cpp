@@ -115,6 +115,7 @@ TEST(MeshMotion, ForgetsHowNodesMovedAlongTheSurface) {
     s.w = (s.X - past) / tau;
     Record record;
     record.kind = RecordKind::surface;
+    record.numbers = {{"restart_period_past", 1}, {"restart_stretch_past", 0}};
     record.arrays = {array("restart_X_past", past), array("restart_w_past", s.w), array("restart_u_past", u)};
     s.memory = restored_memory(scheme_named("bdf2"), RecordReader(record, RecordKind::surface), s);
     motion.steps(tau, 2);

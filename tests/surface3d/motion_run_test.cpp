@@ -347,12 +347,6 @@ Case open_case(const std::vector<std::string>& sets) {
     return begin(text, sets).c;
 }
 
-std::int64_t detail(const RunSummary& s, const std::string& name) {
-    for (const auto& [key, value] : s.details)
-        if (key == name) return std::get<std::int64_t>(value);
-    return -1;
-}
-
 TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     const Case c = open_case(two_pairs);
     Watch undisturbed;

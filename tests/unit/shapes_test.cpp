@@ -145,7 +145,7 @@ TEST(ModelKeys, WhatGoesTogether) {
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"graph\": only the gradient flow of a tube "
-              "with free volume is computed as a graph");
+              "with free volume and area, under tension and pressure that do not change, is computed as a graph");
     EXPECT_EQ(tube("kind = \"gradient-flow\"\n", "[discretisation]\nparametrisation = \"material\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"material\": the gradient flow has no flow "
               "along the membrane");

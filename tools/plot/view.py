@@ -202,6 +202,8 @@ def page_of(data):
 
 
 def write(path, output):
+    if not output.endswith((".html", ".htm")):
+        raise BadInput(f"{output}: must end in .html")
     page = page_of(scan_page(path) if scan.is_scan(path) else run_page(path))
     try:
         with open(output, "w", encoding="utf-8") as file:
