@@ -15,9 +15,16 @@ constexpr int steps_between_looks = 10;
 // Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
 constexpr double error_per_defect = 0.5;  // of the energy balance
 constexpr double least_error = 0.02;      // of what is asked for: no estimate is trusted below
-constexpr double start_steps = 40;        // of a run whose steps grow to its end
+constexpr double start_steps = 40;        // over which steps grow where the integrator begins
 constexpr double least_share = 0.2;       // of the difference of a pair, which is the error of the coarser run
 constexpr double hopeless_rise = 0.1;     // of E_ref: of a run that is not asked for an accuracy
+
+// How often the integrator has begun by this time: at the start, and at each kink of the loads.
+int beginnings(const MotionLaw& law, double t) {
+    int count = 1;
+    for (double kink = next_kink(law, 0); kink < t; kink = next_kink(law, kink)) ++count;
+    return count;
+}
 
 }  // namespace
 
@@ -172,7 +179,8 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
     const bool given = settings_given(setup_.c);
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
                  unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0,
-                 share = std::clamp(start_steps / std::max(trace.size(), 1), least_share, 1.0);
+                 growing = start_steps * beginnings(setup_.motion->law(), t),
+                 share = std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
     const std::optional<double> difference = coarser_->trace.difference(t, s.free_energy);
     error_now_ = std::max(difference ? share * *difference : error_now_, least);
