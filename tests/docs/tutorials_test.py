@@ -126,6 +126,7 @@ class Tutorials(unittest.TestCase):
     maxDiff = None
 
     def test_commands_print_what_the_pages_show(self):
+        self.assertTrue(pages(), FOLDER)
         for path in pages():
             count = 0
             with tempfile.TemporaryDirectory() as folder:

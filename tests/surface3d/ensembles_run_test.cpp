@@ -76,21 +76,28 @@ TEST(EnsembleRuns, AreaAsAWholeIsKept) {
     }
 }
 
+// The run is interrupted at half of its rows and resumed: series end as those of the undisturbed one.
+void expect_the_same_resumed(const std::string& text, const std::vector<std::string>& sets,
+                             const std::vector<std::string>& names) {
+    const Outcome whole = run_case(text, sets);
+    Outcome first = begin(text, sets);
+    first.watch.most_rows = whole.watch.rows.size() / 2;
+    first.summary = run(first.c, first.watch);
+    ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
+    ASSERT_TRUE(first.watch.saved);
+    const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
+    Outcome second = begin(text, sets);
+    second.summary = run(second.c, second.watch, &restart);
+    ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+    for (const std::string& name : names)
+        EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+}
+
 TEST(EnsembleRuns, ResumedRunsEndAsUndisturbedOnes) {
     for (const std::string kind : {"gradient-flow", "fluid"}) {
         SCOPED_TRACE(kind);
-        const Outcome whole = run_case(wavy, open_sets(kind));
-        Outcome first = begin(wavy, open_sets(kind));
-        first.watch.most_rows = whole.watch.rows.size() / 2;
-        first.summary = run(first.c, first.watch);
-        ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
-        ASSERT_TRUE(first.watch.saved);
-        const Restart restart{*first.watch.saved, first.watch.meshes.back()};
-        Outcome second = begin(wavy, open_sets(kind));
-        second.summary = run(second.c, second.watch, &restart);
-        ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
-        for (const char* name : {"free_energy", "work", "identity_defect", "energy_error", "area"})
-            EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+        expect_the_same_resumed(wavy, open_sets(kind),
+                                {"free_energy", "work", "identity_defect", "energy_error", "area"});
     }
 }
 
@@ -156,18 +163,7 @@ TEST(EnsembleRuns, APulledTubeGoesOn) {
         SCOPED_TRACE(kind);
         std::vector<std::string> sets = pulled(kind);
         sets.push_back("discretisation.scheme=" + scheme);
-        const Outcome whole = run_case(tube, sets);
-        Outcome first = begin(tube, sets);
-        first.watch.most_rows = whole.watch.rows.size() / 2;
-        first.summary = run(first.c, first.watch);
-        ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
-        ASSERT_TRUE(first.watch.saved);
-        const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
-        Outcome second = begin(tube, sets);
-        second.summary = run(second.c, second.watch, &restart);
-        ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
-        for (const char* name : {"free_energy", "work", "identity_defect", "energy_error", "height"})
-            EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+        expect_the_same_resumed(tube, sets, {"free_energy", "work", "identity_defect", "energy_error", "height"});
     }
 }
 
