@@ -52,7 +52,12 @@ const Snapshot& CurveAttempt::observe(double t, const double* y, const double* r
 void CurveAttempt::begin() {
     const CurveBegin at = begin_state(setup_);
     make_flow(at.y, at.rate, at.time, at.first_step);
-    const Snapshot s = measure(*setup_.motion, 0, at.shown.data(), at.rate.data());
+    Snapshot s = measure(*setup_.motion, 0, at.shown.data(), at.rate.data());
+    if (!setup_.start.meridian.seams.empty()) {
+        const CurveObservation exact = observe_start(setup_);
+        s.free_energy += exact.energy - s.o.energy;
+        s.o.energy = exact.energy, s.o.energy_term = exact.energy_term;
+    }
     past_.total_start = s.total();
     past_.least = past_.total_start;
     out_.note(doubt_before(setup_.c, s.free_energy, summary.reference_energy));

@@ -15,7 +15,9 @@ namespace {
 // Measured choices: docs/decisions/curves.md, "Curves in motion".
 // Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
-constexpr double seam_size = 0.15, seam_per_accuracy = 5;
+// The run's own are not smaller than `least_seam`, or rounding there keeps the integrator from starting; its first step
+// smooths the seam over far more than that.
+constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 1e-5;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
@@ -54,14 +56,21 @@ double gauge_of(const Case& c, double energy, double area) {
 // Elements of the asked size, small ones at seams. These shrink faster than the rest, for the error is of first order
 // there and the difference of a pair must exceed it; not in a fluid, whose waves they make shorter: ten times the
 // steps.
-std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Case& c) {
+std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Case& c, double least) {
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
     const bool inertia = motion_law(c.model).inertia != 0;
     const double shrunk = std::pow(first_curve_elements * size, 2),
                  largest = seam_size * (inertia ? size : shrunk / first_curve_elements);
-    const double at_seam = std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk);
+    const double at_seam = std::max(std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk), least);
     return seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam);
+}
+
+std::unique_ptr<CurveSpace> space_of(const Case& c, const Meridian& meridian, const std::vector<double>& breaks) {
+    const int degree = c.discretisation.order;
+    return std::make_unique<CurveSpace>(meridian.topology, breaks, degree,
+                                        c.discretisation.smoothness.value_or(degree - 1), meridian.length,
+                                        motion_law(c.model).free_period);
 }
 
 }  // namespace
@@ -92,10 +101,7 @@ int Beginning::images() const {
 CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSettings& with)
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
-    const int degree = c.discretisation.order;
-    space = std::make_unique<CurveSpace>(start.meridian.topology, first_breaks(arc, settings, c), degree,
-                                         c.discretisation.smoothness.value_or(degree - 1), start.meridian.length,
-                                         motion_law(c.model).free_period);
+    space = space_of(c, start.meridian, first_breaks(arc, settings, c, least_seam));
     const CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
     CurveLaw law = law_of(c);
@@ -144,6 +150,12 @@ TimeControl CurveSetup::control(double first_step) const {
     control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);
     control.two_iterations = true;
     return control;
+}
+
+CurveObservation observe_start(const CurveSetup& setup) {
+    const ArcLength arc(setup.start.meridian);
+    const auto space = space_of(setup.c, setup.start.meridian, first_breaks(arc, setup.settings, setup.c, 0));
+    return CurveForms(*space, setup.c.energy).observe(fit(*space, arc));
 }
 
 CurveBegin begin_state(const CurveSetup& setup) {

@@ -43,6 +43,9 @@ struct CurveSetup {
     TimeControl control(double first_step) const;
 };
 
+// Energy and size of the start, with elements at seams as small as the accuracy demands: smaller ones than the run has.
+CurveObservation observe_start(const CurveSetup& setup);
+
 // Unknowns and rates at the start: those to compute from, and those to show, with the exact curve.
 struct CurveBegin {
     Eigen::VectorXd y, rate, shown;
