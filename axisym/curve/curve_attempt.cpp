@@ -17,6 +17,8 @@ constexpr double error_per_defect = 0.5;  // of the energy balance
 constexpr double least_error = 0.02;      // of what is asked for: no estimate is trusted below
 constexpr double start_steps = 40;        // over which steps grow where the integrator begins
 constexpr double least_share = 0.2;       // of the difference of a pair, which is the error of the coarser run
+constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
+constexpr int few_steps = 8;
 constexpr double hopeless_rise = 0.1;     // of E_ref: of a run that is not asked for an accuracy
 
 // How often the integrator has begun by this time: at the start, and at each kink of the loads.
@@ -176,19 +178,28 @@ std::optional<StopReport> CurveAttempt::step() {
     return check(t);
 }
 
-// The error is a share of the difference from the coarser run, the smaller the more steps the tolerance has limited
-// (steps that only grow are alike in both), or a part of the energy that is unaccounted for, as the runs of a pair may
-// have errors of their steps in common. That part is often too large: it alone never asks for a finer run.
+// Of the difference of a pair: the smaller the more steps the tolerance has limited, as steps that only grow are alike
+// in both. Where the finer run has had fewer limited steps than the coarser one, what both had in common while their
+// steps grew may be most of their errors: an instability that it has set going amplifies it.
+double CurveAttempt::share(double t) const {
+    const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
+              other = coarser_->trace.limited_steps(step_growth_of(coarser(setup_.settings)), t);
+    if (other >= few_steps && own < alike * other) return share_if_alike;
+    const double growing = start_steps * beginnings(setup_.motion->law(), t);
+    return std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
+}
+
+// The error is a share of the difference from the coarser run, or a part of the energy that is unaccounted for, as the
+// runs of a pair may have errors of their steps in common. That part is often too large: it alone never asks for a
+// finer run.
 void CurveAttempt::compare(double t, const Snapshot& s) {
     if (!coarser_) return;
     const bool given = settings_given(setup_.c);
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
-                 unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0,
-                 growing = start_steps * beginnings(setup_.motion->law(), t),
-                 share = std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
+                 unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0;
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
     const std::optional<double> difference = coarser_->trace.difference(t, s.free_energy);
-    error_now_ = std::max(difference ? share * *difference : error_now_, least);
+    error_now_ = std::max(difference ? share(t) * *difference : error_now_, least);
     error = std::max(error, error_now_);
 }
 

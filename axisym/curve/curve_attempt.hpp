@@ -51,6 +51,7 @@ private:
     std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);
     void compare(double t, const Snapshot& s);
+    double share(double t) const;
     double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }
     void keep_good();
     double what_may_change(double t) const;

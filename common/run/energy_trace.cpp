@@ -25,6 +25,13 @@ int EnergyTrace::points_after(double t) const {
     return static_cast<int>(time_.end() - std::upper_bound(time_.begin(), time_.end(), t));
 }
 
+int EnergyTrace::limited_steps(double growth, double t) const {
+    int count = 0;
+    for (std::size_t i = 2; i < time_.size() && time_[i] <= t; ++i)
+        if (time_[i] - time_[i - 1] < 0.9 * growth * (time_[i - 1] - time_[i - 2])) ++count;
+    return count;
+}
+
 double EnergyTrace::operator()(double t) const {
     const int after = static_cast<int>(std::lower_bound(time_.begin(), time_.end(), t) - time_.begin());
     if (slope_.empty()) return through_neighbours(t, after);

@@ -18,6 +18,8 @@ public:
     int size() const { return static_cast<int>(time_.size()); }
     double end() const { return time_.back(); }
     int points_after(double t) const;
+    // Of the steps until t, those that did not grow (nearly) by this factor: their lengths were chosen for accuracy.
+    int limited_steps(double growth, double t) const;
 
     // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
     // too near to them.
