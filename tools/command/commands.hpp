@@ -9,6 +9,7 @@
 
 #include "common/case/case.hpp"
 #include "common/result/result.hpp"
+#include "common/run/run.hpp"
 
 namespace CLI {
 class App;
@@ -25,8 +26,9 @@ namespace tubule {
 TUBULE_COMMANDS(TUBULE_COMMAND)
 #undef TUBULE_COMMAND
 
-// What a result records when its run begins: the build, the machine, the time.
+// What a result records when its run begins: the build, the machine, the time; and when it has ended.
 About about_start();
+About about_end(const Case& c, const RunSummary& summary, double wall_seconds);
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
 struct RunOptions {

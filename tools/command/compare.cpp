@@ -17,6 +17,7 @@
 #include "common/case/text.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/compare.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/python.hpp"
@@ -33,11 +34,6 @@ using compare::SeriesDifference;
 using compare::ShapeDifference;
 
 constexpr int beyond_tolerance = 1, bad_input = 2;
-
-struct CompareOptions {
-    std::vector<std::string> results, tolerances, frames, pictures;
-    bool align = false, no_shapes = false, csv = false, json = false;
-};
 
 struct Tolerance {
     std::string quantity;
@@ -178,21 +174,19 @@ void require_known(const std::vector<Tolerance>& tolerances, const std::vector<Q
     }
 }
 
-Result read_side(const std::string& path, Side& side) {
-    Result result = read_result(path);
-    side = {path,
+Side side_of(const std::string& name, const Result& result) {
+    return {name,
             compare::outcome(result),
             compare::stated_error(result),
             result.series.at("time").size(),
             compare::drift(result, "area"),
             compare::drift(result, "volume")};
-    return result;
 }
 
-Comparison compared(const CompareOptions& options) {
+Comparison compared(const CompareOptions& options, const Result& a, const Result& b) {
     const std::vector<Tolerance> tolerances = tolerances_of(options);
     Comparison out;
-    const Result a = read_side(options.results[0], out.a), b = read_side(options.results[1], out.b);
+    out.a = side_of(options.results[0], a), out.b = side_of(options.results[1], b);
     out.aligned = options.align;
     // Pairs of frames that are named say that the times mean nothing to each other.
     if (options.frames.empty()) out.series = compare::compare_series(a, b);
@@ -339,7 +333,7 @@ Text json_text(const Comparison& c) {
 int run_compare(const CompareOptions& options) {
     Comparison c;
     try {
-        c = compared(options);
+        c = compared(options, read_result(options.results[0]), read_result(options.results[1]));
     } catch (const std::exception& error) {
         say(stderr, "tubule compare: {}\n", explanation(error));
         return bad_input;
@@ -354,6 +348,10 @@ int run_compare(const CompareOptions& options) {
 }
 
 }  // namespace
+
+std::string comparison_json(const CompareOptions& options, const Result& a, const Result& b) {
+    return to_string(json_text(compared(options, a, b)));
+}
 
 void add_compare(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("compare", "Compare two results: series, shapes, outcomes");

@@ -61,6 +61,20 @@ About about_start() {
     return about;
 }
 
+About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
+    About about{{"stop", std::string(name(s.stop.reason))},
+                {"stop_time", s.stop.time},
+                {"stop_message", s.stop.message},
+                {"advice", s.stop.advice},
+                {"asked_accuracy", c.accuracy.energy},
+                {"estimated_error", s.estimated_error},
+                {"E_ref", s.reference_energy},
+                {"wall_seconds", wall_seconds}};
+    about.insert(about.end(), s.details.begin(), s.details.end());
+    about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
+    return about;
+}
+
 namespace {
 
 // Hands a run's rows and frames to the result file.
@@ -105,20 +119,6 @@ private:
     Progress progress_;
     std::optional<double> reached_;
 };
-
-About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
-    About about{{"stop", std::string(name(s.stop.reason))},
-                {"stop_time", s.stop.time},
-                {"stop_message", s.stop.message},
-                {"advice", s.stop.advice},
-                {"asked_accuracy", c.accuracy.energy},
-                {"estimated_error", s.estimated_error},
-                {"E_ref", s.reference_energy},
-                {"wall_seconds", wall_seconds}};
-    about.insert(about.end(), s.details.begin(), s.details.end());
-    about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
-    return about;
-}
 
 bool has_rows(const std::filesystem::path& file) {
     return std::filesystem::exists(file) && !read_result(file).series.at("time").empty();

@@ -62,29 +62,21 @@ Record frame_of(const StabilityOptions& options, const Result& result) {
 }
 
 StabilitySubject subject_of(const StabilityOptions& options) {
-    StabilitySubject subject;
     if (!is_result(options.file)) {
         if (!options.fit.empty())
             throw std::invalid_argument("--fit needs a result, NAME.hdf, not a case: run it first");
         if (options.frame) throw std::invalid_argument("--frame needs a result, NAME.hdf, not a case");
-        subject.c = read_case(options.file, options.sets);
-        return subject;
+        return {read_case(options.file, options.sets)};
     }
     if (!options.sets.empty())
         throw std::invalid_argument("--set needs a case: the case of a result cannot be changed");
+    std::optional<Result> result;
     try {
-        subject.result = read_result(options.file);
+        result = read_result(options.file);
     } catch (const std::runtime_error& error) {
         throw std::invalid_argument(error.what());
     }
-    try {
-        subject.c = parse_case(subject.result->case_text.text, subject.result->case_text.sets, options.file);
-    } catch (const CaseError&) {
-        if (options.fit.empty()) throw;
-        subject.case_is_known = false;
-    }
-    if (options.fit.empty()) subject.frame = frame_of(options, *subject.result);
-    return subject;
+    return stability_subject(std::move(*result), options);
 }
 
 // Another model with what it has by default; where both are inextensible, with what the case holds and its loads.
@@ -173,7 +165,7 @@ Record equilibrium_frame(Case c) {
     return keep.frames.back();
 }
 
-std::string answer(const StabilityOptions& options, StabilitySubject subject) {
+std::string answer_for(const StabilityOptions& options, StabilitySubject subject) {
     if (!options.fit.empty()) return fit_report(options, subject);
     const std::vector<Model> models = models_of(options, subject.c.model);
     std::optional<TubeSubject> tube;
@@ -212,12 +204,20 @@ void refuse_contradictions(const StabilityOptions& o) {
         throw std::invalid_argument("--fit can only be combined with --csv and --json");
 }
 
+}  // namespace
+
+std::string stability_answer(const StabilityOptions& options, StabilitySubject subject) {
+    refuse_contradictions(options);
+    return answer_for(options, std::move(subject));
+}
+
+namespace {
+
 int stability(const StabilityOptions& options) {
     catch_interrupts();
     const PauseWatch watch(std::nullopt, interrupted);
     try {
-        refuse_contradictions(options);
-        print_answer(answer(options, subject_of(options)));
+        print_answer(stability_answer(options, subject_of(options)));
         return 0;
     } catch (const NoPicture& failure) {
         return failure.status;
@@ -233,6 +233,19 @@ int stability(const StabilityOptions& options) {
 }
 
 }  // namespace
+
+StabilitySubject stability_subject(Result result, const StabilityOptions& options) {
+    StabilitySubject subject;
+    subject.result = std::move(result);
+    try {
+        subject.c = parse_case(subject.result->case_text.text, subject.result->case_text.sets, options.file);
+    } catch (const CaseError&) {
+        if (options.fit.empty()) throw;
+        subject.case_is_known = false;
+    }
+    if (options.fit.empty()) subject.frame = frame_of(options, *subject.result);
+    return subject;
+}
 
 void add_stability(CLI::App& app, int& exit_status) {
     CLI::App* command =

@@ -43,6 +43,12 @@ struct TubeSubject {
     double end = 0;                 // until when the case runs; 0: nothing moves
 };
 
+// What the command prints. Throws std::invalid_argument for what cannot be asked, SolveError where an equilibrium is
+// not found.
+std::string stability_answer(const StabilityOptions& options, StabilitySubject subject);
+// Of a result: the frame that the options name, counted from the end where negative. Throws std::invalid_argument.
+StabilitySubject stability_subject(Result result, const StabilityOptions& options);
+
 // Reports throw std::invalid_argument for what cannot be asked.
 std::string tube_report(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,

@@ -1,0 +1,353 @@
+#!/usr/bin/python3
+"""The Python package: against the program, and its documentation.
+
+    python_test.py TUBULE TOP PACKAGES
+"""
+import doctest
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+from pathlib import Path
+
+TUBULE, TOP = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+sys.path.insert(0, sys.argv[3])
+
+import h5py
+import numpy as np
+import tubule
+from tubule import cases, commands, results
+
+TUBE = {
+    "tier": "axisym",
+    "energy": {"k20": 0.5, "H0": -1, "k42": 0.1},
+    "shape": {"kind": "tube", "radius": 1, "length": 3, "mode": [{"amplitude": 0.12, "n": 1, "phase": 0.3}]},
+    "accuracy": {"energy": 1e-6},
+    "time": {"end": 0.2, "output": [0.01, 0.05]},
+}
+# It would take minutes.
+LONG = TUBE | {"discretisation": {"elements": 8000, "time_tolerance": 1e-12, "time_order": 1}}
+SURFACE = {
+    "tier": "surface3d",
+    "energy": {"k20": 1},
+    "shape": {"kind": "ellipsoid", "a": 1, "b": 0.9, "c": 0.8},
+    "discretisation": {"elements": 80, "order": 3, "time_tolerance": 1e-3},
+    "time": {"end": 0.002},
+}
+VESICLE = {
+    "tier": "axisym",
+    "energy": {"k20": 1},
+    "shape": {"kind": "ellipsoid", "a": 1, "b": 1, "c": 2},
+    "equilibrium": {"area": 12.566370614359172, "reduced_volume": 0.9},
+}
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def program(self, *arguments):
+        return subprocess.run([TUBULE, *map(str, arguments)], cwd=self.folder, text=True, capture_output=True)
+
+    def written(self, case, name="case.toml"):
+        path = self.folder / name
+        path.write_text(cases.to_toml(case))
+        return path
+
+
+class Cases(Folder):
+    def test_the_same_by_dictionary_text_and_file(self):
+        text = cases.to_toml(TUBE)
+        ways = [tubule.Case(TUBE), tubule.Case(text), tubule.Case(self.written(TUBE))]
+        self.assertEqual({case.toml for case in ways}, {ways[0].toml})
+
+    def test_values_as_toml(self):
+        for value, text in ((True, "true"), (3, "3"), (1e-30, "1e-30"), (np.float64(0.5), "0.5"), (np.int64(2), "2"),
+                            (np.array([1.0, 2.0]), "[1.0, 2.0]"), ('a"b\\\n', '"a\\"b\\\\\\u000a"'), (Path("x"), '"x"'),
+                            ({"a b": None, "c": {"d": ()}}, "{c = {d = []}}")):
+            self.assertEqual(cases.toml_value(value), text)
+        with self.assertRaisesRegex(ValueError, "finite"):
+            cases.toml_value(float("nan"))
+        with self.assertRaisesRegex(TypeError, "complex"):
+            cases.toml_value(1j)
+
+    def test_overrides(self):
+        case = tubule.Case(TUBE, {"energy.k42": 0.2}).with_(energy__k20=0.7)
+        self.assertIn("k42 = 0.2", case.toml)
+        self.assertIn("k20 = 0.7", case.toml)
+
+    def test_mistakes_have_the_words_of_the_program(self):
+        wrong = TUBE | {"energy": {"k02": 1}}
+        path = self.written(wrong)
+        said = self.program("run", path).stderr.strip()
+        with self.assertRaises(tubule.CaseError) as raised:
+            tubule.Case(path)
+        self.assertEqual(str(raised.exception), said)
+        self.assertIsInstance(raised.exception, ValueError)
+
+    def test_a_forecast(self):
+        self.assertGreater(tubule.Case(TUBE).forecast()["steps"], 10)
+
+
+class Runs(Folder):
+    def expect_same(self, case, folder_result):
+        """In memory as in the file that the program writes, bit for bit."""
+        ours = tubule.run(case, threads=1)
+        theirs = tubule.read(folder_result)
+        self.assertEqual(list(ours.series), list(theirs.series))
+        for name in ours.series:
+            if name != "wall_seconds":
+                np.testing.assert_array_equal(ours.series[name], theirs.series[name], name)
+        self.assertEqual(len(ours.frames), len(theirs.frames))
+        for a, b in zip(ours.frames, theirs.frames):
+            self.assertEqual((a.time, a.kind, set(a.arrays)), (b.time, b.kind, set(b.arrays)))
+            for name in a.arrays:
+                np.testing.assert_array_equal(a[name], b[name])
+        timings = {"started", "wall_seconds", "case_path", "blas"}  # and the name under which BLAS was found
+        self.assertEqual({k: v for k, v in ours.about.items() if k not in timings},
+                         {k: v for k, v in theirs.about.items() if k not in timings})
+        return ours
+
+    def test_as_the_program(self):
+        for case in (TUBE, TUBE | {"model": {"kind": "overdamped"}}, SURFACE, VESICLE):
+            with self.subTest(case=case):
+                path = self.written(case)
+                done = subprocess.run([TUBULE, "run", path, "-o", "r.hdf", "--overwrite"], cwd=self.folder,
+                                      env=os.environ | {"OMP_NUM_THREADS": "1"}, capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.expect_same(case, self.folder / "r.hdf")
+
+    def test_output_is_a_result_of_the_program(self):
+        file = self.folder / "out.hdf"
+        ours = tubule.run(TUBE, output=file)
+        self.assertEqual(self.program("show", file, "--verify").returncode, 0)
+        np.testing.assert_array_equal(tubule.read(file).series["energy"], ours.series["energy"])
+        with self.assertRaisesRegex(tubule.CaseError, "cannot be written|journal"):
+            tubule.run(TUBE, output=self.folder / "r.journal")
+
+    def test_early_stops_are_no_exceptions(self):
+        result = tubule.run(TUBE | {"time": {"end": 0.2, "limit": 1e-9}})
+        self.assertEqual(result.stop, "time-limit")
+        pinched = tubule.run(TOP / "cases/pinch_off.toml")
+        self.assertEqual(pinched.stop, "pinch-off")
+        self.assertLess(len(pinched.warnings), 3)
+
+    def test_progress(self):
+        seen = []
+        tubule.run(TUBE, progress=lambda *values: seen.append(values))
+        self.assertTrue(all(len(values) == 3 for values in seen))
+
+        class Enough(Exception):
+            pass
+
+        def refuse(*_):
+            raise Enough("as the caller wishes")
+
+        began = time.monotonic()
+        with self.assertRaisesRegex(Enough, "as the caller wishes"):
+            tubule.run(LONG, progress=refuse)
+        self.assertLess(time.monotonic() - began, 60)
+
+    def test_interrupts(self):
+        script = f"""
+import os, signal, sys, threading, time
+sys.path.insert(0, {sys.argv[3]!r})
+import tubule
+began = threading.Event()
+def kill():
+    began.wait()
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=kill, daemon=True).start()
+try:
+    tubule.run({LONG!r}, progress=lambda *_: began.set())
+except KeyboardInterrupt:
+    print("interrupted")
+assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+print(tubule.run({TUBE!r}).stop)
+"""
+        done = subprocess.run(["/usr/bin/python3", "-c", script], text=True, capture_output=True, timeout=200)
+        self.assertEqual(done.stdout, "interrupted\nfinished\n", done.stderr)
+
+    def test_without_the_lock_of_the_interpreter(self):
+        ticks, over = [], threading.Event()
+
+        def tick():
+            while not over.wait(0.005):
+                ticks.append(1)
+
+        thread = threading.Thread(target=tick, daemon=True)
+        thread.start()
+        tubule.run(TUBE | {"time": {"end": 0.2, "limit": 1.0}} | {"discretisation": LONG["discretisation"]})
+        over.set()
+        thread.join()
+        self.assertGreater(len(ticks), 20)
+
+    def test_many_at_once_are_as_one_after_the_other(self):
+        several = [tubule.Case(TUBE, {"energy.k42": k}) for k in np.linspace(0, 0.2, 12)]
+        for one, case in zip(tubule.run_many(several, jobs=4), several):
+            np.testing.assert_array_equal(one.series["energy"], tubule.run(case).series["energy"])
+
+    def test_equilibria(self):
+        vesicle = tubule.equilibrium(VESICLE)
+        self.assertEqual(vesicle.stop, "finished")
+        # Seifert, Berndl, Lipowsky (1991): a prolate of reduced volume 0.9 has between 1 and 1.4 times the sphere's energy.
+        self.assertTrue(1 < vesicle.energy / (16 * np.pi) < 1.4)
+        with self.assertRaisesRegex(ValueError, "needs a table"):
+            tubule.equilibrium(TUBE)
+
+
+class Shapes(Folder):
+    def test_frames_of_surfaces(self):
+        frame = tubule.run(SURFACE).frames[-1]
+        mesh = frame.meshio()
+        self.assertEqual(mesh.cells[0].type, "VTK_LAGRANGE_TRIANGLE")
+        self.assertEqual(mesh.points.shape, frame.points.shape)
+        np.testing.assert_array_equal(mesh.point_data["H"], frame["H"])
+        grid = frame.vtk()
+        self.assertEqual((grid.GetNumberOfPoints(), grid.GetNumberOfCells()), (len(frame.points), len(frame.cells)))
+        self.assertAlmostEqual(self.vtk_area(grid), tubule.run(SURFACE).series["area"][-1], delta=0.02)
+
+    def vtk_area(self, grid):
+        from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+        from vtkmodules.vtkFiltersCore import vtkMassProperties, vtkTriangleFilter
+
+        surface, triangles, mass = vtkDataSetSurfaceFilter(), vtkTriangleFilter(), vtkMassProperties()
+        surface.SetNonlinearSubdivisionLevel(3)
+        surface.SetInputData(grid)
+        triangles.SetInputConnection(surface.GetOutputPort())
+        mass.SetInputConnection(triangles.GetOutputPort())
+        return mass.GetSurfaceArea()
+
+    def test_periods_of_tubes_are_closed(self):
+        tube = SURFACE | {"shape": {"kind": "tube", "radius": 1, "length": 6, "mode": [{"amplitude": 0.1, "n": 1}]}}
+        result = tubule.run(tube | {"discretisation": {"elements": 120, "order": 3, "time_tolerance": 1e-3}})
+        grid = result.frames[0].vtk()
+        self.assertAlmostEqual(self.vtk_area(grid), result.series["area"][0], delta=0.02 * result.series["area"][0])
+
+    def test_profiles(self):
+        result = tubule.run(TUBE)
+        r, z = result.frames[0].profile(7)
+        np.testing.assert_allclose(r, 1 + 0.12 * np.cos(2 * np.pi * z / 3 + 0.3), atol=1e-7)  # as the case has it
+        mesh = result.frames[0].meshio()
+        corners = mesh.points[mesh.cells[0].data]
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        self.assertAlmostEqual(area / result.series["area"][0], 1, delta=1e-3)
+
+    def test_tables(self):
+        result = tubule.run(TUBE)
+        table = result.to_pandas()
+        self.assertEqual(list(table), list(result.series))
+        self.assertEqual(len(table), len(result.series["time"]))
+
+    def test_what_is_no_result_is_refused(self):
+        (self.folder / "x.hdf").write_text("no")
+        with self.assertRaisesRegex(RuntimeError, "x.hdf"):
+            tubule.read(self.folder / "x.hdf")
+        with self.assertRaises(IndexError):
+            tubule.run(TUBE).frames[99]
+        with self.assertRaises(KeyError):
+            tubule.run(TUBE).series["enrgy"]
+
+
+class Answers(Folder):
+    def test_stability_as_the_program_says_it(self):
+        for options, arguments in (({}, ()), ({"model": "all", "modes": 1, "waves": 3}, ("--model", "all", "--modes", "1", "--waves", "3")),
+                                   ({"numerical": True, "rates": 2}, ("--numerical", "--rates", "2"))):
+            path = self.written(TUBE)
+            theirs = json.loads(self.program("stability", path, "--json", *arguments).stdout)
+            self.assertEqual(tubule.stability(path, **options), theirs)
+        result = self.folder / "r.hdf"
+        self.program("run", path, "-o", result)
+        theirs = json.loads(self.program("stability", result, "--fit", "1", "--json").stdout)
+        self.assertEqual(tubule.stability(tubule.read(result), fit=(1,)), theirs)
+        with self.assertRaisesRegex(ValueError, "exclude"):
+            tubule.stability(path, q=[1.0], waves=2)
+
+    def test_comparisons_as_the_program_says_them(self):
+        for name, k42 in (("a.hdf", 0.1), ("b.hdf", 0.11)):
+            self.assertEqual(self.program("run", self.written(TUBE), "--set", f"energy.k42={k42}", "-o", name).returncode, 0)
+        theirs = json.loads(self.program("compare", "a.hdf", "b.hdf", "--json").stdout)
+        ours = tubule.compare(tubule.read(self.folder / "a.hdf"), tubule.read(self.folder / "b.hdf"))
+        self.assertEqual(ours["series"], theirs["series"])
+        self.assertEqual(ours["frames"], theirs["frames"])
+        with self.assertRaisesRegex(ValueError, "no frame 77"):
+            tubule.compare(tubule.run(TUBE), tubule.run(TUBE), frames=[(77, 0)])
+
+    def test_scans_as_the_program_makes_them(self):
+        over = {"energy.k42": [0, 0.1], "shape.mode.0.amplitude": "0.1:0.3:3"}
+        file = self.folder / "scan.hdf"
+        ours = tubule.scan(TUBE, over, output=file)
+        self.assertEqual((ours.outcome.shape, ours.keys), ((2, 3), list(over)))
+        np.testing.assert_allclose(ours.values[1], [0.1, 0.2, 0.3])
+        self.assertEqual(len(ours.to_pandas()), 6)
+        self.program("scan", self.written(TUBE), "--over", "energy.k42=0,0.1", "--over", "shape.mode.0.amplitude=0.1:0.3:3", "-o", "theirs.hdf")
+        with h5py.File(self.folder / "theirs.hdf") as theirs, h5py.File(file) as written:
+            np.testing.assert_array_equal(ours["energy"].ravel(), theirs["points/energy"][:].ravel())
+            np.testing.assert_array_equal(written["points/energy"][:], theirs["points/energy"][:])
+        with self.assertRaisesRegex(tubule.CaseError, "energy.k24"):
+            tubule.scan(TUBE, {"energy.k24": [1, 2]})
+
+    def test_closed_forms(self):
+        # theory.md (2.1); a tube of radius R has H = -1/R, K = 0, a sphere H = -2/R, K = 1/R^2.
+        self.assertAlmostEqual(tubule.energy_density(-1.5, 2.0, k20=0.5, k42=0.1, H0=-1), 0.5 * 0.25 + 0.1 * 4)
+        H, K = tubule.curvatures(np.array([2.0, 4.0]), 0.0, 0.0)
+        np.testing.assert_allclose((H, K), ([-0.5, -0.25], [0, 0]), atol=1e-16)
+        a = np.linspace(0.2, 2.9, 5)  # a circle of radius 3
+        H, K = tubule.curvatures(3 * np.sin(a), 3 * np.cos(a), -3 * np.sin(a), 3 * np.sin(a), 3 * np.cos(a))
+        np.testing.assert_allclose((H, K), (np.full(5, -2 / 3), np.full(5, 1 / 9)), rtol=1e-14)
+        case = tubule.Case(TUBE)
+        f = case.energy_derivatives(-0.8, 0.3)
+        step = 1e-6
+        self.assertAlmostEqual(f["f_K"], (case.energy_density(-0.8, 0.3 + step) - case.energy_density(-0.8, 0.3 - step)) / (2 * step), places=8)
+        table = tubule.stability(case, q=[0.5, 1.0], modes=0)
+        rates = [wave["rate"] for wave in find(table, "waves")]
+        np.testing.assert_allclose(case.growth_rate(np.array([0.5, 1.0])), rates, rtol=1e-12)
+
+
+def find(tree, key):
+    """The first value of this key in nested tables."""
+    if isinstance(tree, dict):
+        if key in tree:
+            return tree[key]
+        tree = list(tree.values())
+    if isinstance(tree, list):
+        for branch in tree:
+            if (found := find(branch, key)) is not None:
+                return found
+    return None
+
+
+class Documentation(unittest.TestCase):
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+    def test_examples_in_the_modules(self):
+        for module in (cases, commands, results):
+            failed, _ = doctest.testmod(module, extraglobs={"tubule": tubule, "tube": tubule.Case(TUBE)}, optionflags=self.flags)
+            self.assertEqual(failed, 0)
+
+    def test_the_tutorial(self):
+        text = (TOP / "docs/tutorials/python.md").read_text()
+        blocks = "\n".join(re.findall(r"^```pycon\n(.*?)^```$", text, re.M | re.S))
+        example = doctest.DocTestParser().get_doctest(blocks, {}, "python.md", "python.md", 0)
+        before = os.getcwd()
+        os.chdir(TOP)
+        self.addCleanup(os.chdir, before)
+        runner = doctest.DocTestRunner(optionflags=self.flags)
+        runner.run(example)
+        self.assertGreater(runner.tries, 10)
+        self.assertEqual(runner.failures, 0)
+
+    def test_everything_public_says_what_it_is(self):
+        for name in tubule.__all__:
+            self.assertTrue(getattr(tubule, name).__doc__, name)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

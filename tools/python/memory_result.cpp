@@ -1,0 +1,113 @@
+#include "tools/python/memory_result.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+
+#include "common/case/read.hpp"
+#include "common/result/durable_io.hpp"
+#include "common/run/run_clock.hpp"
+#include "common/solve/pause.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/run/engine.hpp"
+#include "tools/run/failure.hpp"
+
+namespace tubule {
+namespace {
+
+class Memory : public RunObserver {
+public:
+    Memory(Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+        : result_(result), options_(options), writer_(writer) {}
+
+    void row(std::span<const double> values) override {
+        for (std::size_t i = 0; i < values.size(); ++i)
+            result_.series.at(result_.series_names[i]).push_back(values[i]);
+        if (writer_) writer_->row(values);
+    }
+    std::size_t mesh(const SurfaceCells& cells) override {
+        const auto same = std::find(result_.meshes.begin(), result_.meshes.end(), cells);
+        const std::size_t number = static_cast<std::size_t>(same - result_.meshes.begin());
+        if (same == result_.meshes.end()) result_.meshes.push_back(cells);
+        if (writer_) writer_->mesh(cells);  // numbers them alike
+        return number;
+    }
+    void frame(const std::function<Record()>& make) override {
+        result_.frames.push_back(make());
+        if (writer_) writer_->frame(result_.frames.back());
+    }
+    void checkpoint(const Record& state) override {
+        result_.checkpoint = state;
+        if (writer_) writer_->checkpoint(state);
+    }
+    void discard() override {
+        for (auto& [name, values] : result_.series) values.clear();
+        result_.frames.clear(), result_.meshes.clear(), result_.checkpoint.reset();
+        if (writer_) writer_->discard();
+    }
+    void progress(double time, double energy, double step) override {
+        const auto now = std::chrono::steady_clock::now();
+        if (!options_.progress || now < next_) return;
+        next_ = now + std::chrono::milliseconds(100);
+        options_.progress(time, energy, step);
+    }
+    bool interrupted() override { return options_.interrupted(); }
+    void note(const std::string& words) override {
+        if (options_.note) options_.note(words);
+    }
+
+private:
+    Result& result_;
+    const MemoryRunOptions& options_;
+    std::optional<ResultWriter>& writer_;
+    std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now();
+};
+
+RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& result, RunObserver& observer) {
+    const auto reached = [&]() -> std::optional<double> {
+        const std::vector<double>& times = result.series.at("time");
+        return times.empty() ? std::nullopt : std::optional(times.back());
+    };
+    try {
+        RunSummary summary = engine.run(observer);
+        if (summary.stop.reason == Stop::solver_failed) blame_extreme_numbers(c, summary.stop);
+        return summary;
+    } catch (const durable::Error&) {
+        throw;
+    } catch (const CaseError&) {
+        throw;
+    } catch (const std::exception& error) {
+        RunSummary summary;
+        summary.stop = failure_of(c, error, reached());
+        summary.estimated_error = 1;
+        summary.warnings.emplace_back("the error is unknown");
+        if (!reached()) throw std::runtime_error(c.path + ": " + summary.stop.message);
+        return summary;
+    }
+}
+
+}  // namespace
+
+MemoryRun run_in_memory(const Case& c, const MemoryRunOptions& options) {
+    PauseWatch watch(c.time.limit, options.interrupted);
+    const auto engine = engine_for(c);
+    MemoryRun out;
+    out.result.case_text = {c.text, c.sets};
+    out.result.about = about_start();
+    out.result.series_names = engine->series_names();
+    for (const std::string& name : out.result.series_names) out.result.series[name];
+    std::optional<ResultWriter> writer;
+    if (options.output) {
+        check_output(*options.output);
+        writer = ResultWriter::create(*options.output, out.result.case_text, out.result.about,
+                                      out.result.series_names);
+    }
+    Memory memory(out.result, options, writer);
+    out.summary = run_to_its_end(c, *engine, out.result, memory);
+    const About end = about_end(c, out.summary, watch.seconds());
+    out.result.about.insert(out.result.about.end(), end.begin(), end.end());
+    if (writer && writer->began()) writer->finish(end);
+    return out;
+}
+
+}  // namespace tubule

@@ -1,0 +1,342 @@
+// The module tubule._core: cases, runs and results for the Python package of this folder.
+#include <omp.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <Eigen/Core>
+#include <csignal>
+#include <filesystem>
+#include <thread>
+
+#include "common/case/read.hpp"
+#include "common/energy/bending.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/result/frame_profile.hpp"
+#include "common/result/record.hpp"
+#include "common/solve/interrupt.hpp"
+#include "common/solve/pause.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/theory/dispersion.hpp"
+#include "common/theory/waves.hpp"
+#include "tools/command/build_info.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/command/compare.hpp"
+#include "tools/command/stability.hpp"
+#include "tools/python/memory_result.hpp"
+#include "tools/run/forecast.hpp"
+#include "tools/scan/dispatcher.hpp"
+
+namespace py = pybind11;
+
+namespace tubule {
+namespace {
+
+// While it lives, Ctrl-C sets the flag that runs ask, as in the program; then Python handles it again. To be made by
+// the main thread alone: Python gives signals to no other.
+class Interruptible {
+public:
+    Interruptible() {
+        sigaction(SIGINT, nullptr, &old_interrupt_), sigaction(SIGTERM, nullptr, &old_terminate_);
+        catch_interrupts();
+    }
+    ~Interruptible() { restore(); }
+    Interruptible(const Interruptible&) = delete;
+    Interruptible& operator=(const Interruptible&) = delete;
+
+    // Raises KeyboardInterrupt if a signal came.
+    void check() {
+        if (!interrupted()) return;
+        restore();
+        PyErr_SetNone(PyExc_KeyboardInterrupt);
+        throw py::error_already_set();
+    }
+
+private:
+    void restore() {
+        sigaction(SIGINT, &old_interrupt_, nullptr), sigaction(SIGTERM, &old_terminate_, nullptr);
+    }
+    struct sigaction old_interrupt_ {}, old_terminate_ {};
+};
+
+bool is_main_thread() {
+    const py::module_ threading = py::module_::import("threading");
+    return threading.attr("current_thread")().is(threading.attr("main_thread")());
+}
+
+// Does the work without the GIL, with so many threads for loops over elements (0: as many as there are processors).
+// Ctrl-C ends it: KeyboardInterrupt.
+template <class Work>
+auto without_gil(int threads, const Work& work) {
+    std::optional<Interruptible> signals;
+    if (is_main_thread()) signals.emplace();
+    const auto done = [&] {
+        const py::gil_scoped_release release;
+        const int before = omp_get_max_threads();
+        omp_set_num_threads(threads > 0 ? threads : std::min(before, omp_get_num_procs()));
+        struct Reset {
+            int threads;
+            ~Reset() { omp_set_num_threads(threads); }
+        } reset{before};
+        Eigen::setNbThreads(1);
+        try {
+            return work();
+        } catch (const Paused& pause) {
+            throw std::runtime_error(pause.reason == Stop::interrupted ? "interrupted"
+                                                                       : "time.limit has passed before there was a row");
+        }
+    };
+    try {
+        auto out = done();
+        if (signals) signals->check();
+        return out;
+    } catch (...) {
+        if (signals) signals->check();
+        throw;
+    }
+}
+
+py::array_t<double> numpy(const std::vector<double>& values) {
+    return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+py::array_t<double> numpy(const Array& array) {
+    return py::array_t<double>(array.shape, array.data.data());
+}
+py::dict dictionary(const About& about) {
+    py::dict out;
+    for (const auto& [name, value] : about) out[py::str(name)] = py::cast(value);
+    return out;
+}
+
+// ---- results
+
+// What the package gets of a run: no more is copied than is asked for.
+struct Results {
+    std::shared_ptr<const Result> result;
+
+    const Record& frame(std::size_t number) const {
+        if (number >= result->frames.size()) throw py::index_error("there are fewer frames");
+        return result->frames[number];
+    }
+};
+
+py::dict frame_dictionary(const Results& r, std::size_t number) {
+    const Record& frame = r.frame(number);
+    py::dict numbers, arrays, out;
+    for (const auto& [name, value] : frame.numbers)
+        if (!name.starts_with("restart_")) numbers[py::str(name)] = value;
+    for (const Array& array : frame.arrays)
+        if (!array.name.starts_with("restart_")) arrays[py::str(array.name)] = numpy(array);
+    out["time"] = frame.time, out["kind"] = py::str(std::string(name(kind_of(frame))));
+    out["numbers"] = numbers, out["arrays"] = arrays;
+    out["mesh"] = frame.mesh ? py::cast(*frame.mesh) : py::none();
+    return out;
+}
+
+py::dict mesh_dictionary(const Results& r, std::size_t number) {
+    const SurfaceCells& mesh = r.result->meshes.at(number);
+    const auto width = static_cast<py::ssize_t>((mesh.order + 1) * (mesh.order + 2) / 2);
+    const auto rows = static_cast<py::ssize_t>(mesh.cells.size()) / width;
+    py::dict out;
+    out["order"] = mesh.order, out["nodes"] = mesh.nodes, out["period"] = mesh.period;
+    out["cells"] = py::array_t<int>({rows, width}, mesh.cells.data());
+    out["shifts"] = mesh.shifts.empty() ? py::object(py::none())
+                                        : py::object(py::array_t<int>({rows, width}, mesh.shifts.data()));
+    return out;
+}
+
+py::tuple profile(const Results& r, std::size_t number, int points) {
+    const auto shape = profile_of(r.frame(number));
+    if (const auto* listed = std::get_if<ProfilePoints>(&shape))
+        return py::make_tuple(numpy(listed->r), numpy(listed->z), listed->length);
+    const Revolution& tube = std::get<Revolution>(shape);
+    if (points < 2) throw std::invalid_argument("a profile needs at least 2 points");
+    std::vector<double> radius, height;
+    for (int i = 0; i < points; ++i) {
+        height.push_back(tube.length * i / (points - 1));
+        radius.push_back(radius_at(tube, height.back()));
+    }
+    return py::make_tuple(numpy(radius), numpy(height), tube.length);
+}
+
+Results run(const Case& c, const py::object& progress, const py::object& output, int threads) {
+    MemoryRunOptions options;
+    options.interrupted = [] { return interrupted(); };
+    std::exception_ptr raised;  // by the caller's own function: it ends the run
+    if (!progress.is_none())
+        options.progress = [&](double time, double energy, double step) {
+            const py::gil_scoped_acquire gil;
+            try {
+                if (!raised) progress(time, energy, step);
+            } catch (...) {
+                raised = std::current_exception();
+            }
+        };
+    if (!progress.is_none()) options.interrupted = [&] { return interrupted() || raised; };
+    if (!output.is_none()) options.output = output.cast<std::filesystem::path>();
+    MemoryRun done = without_gil(threads, [&] { return run_in_memory(c, options); });
+    if (raised) std::rethrow_exception(raised);
+    return {std::make_shared<const Result>(std::move(done.result))};
+}
+
+// ---- closed forms
+
+using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
+    const std::vector<const char*> names{"f", "f_H", "f_K", "f_HH", "f_HK", "f_KK"};
+    py::dict out;
+    const auto part = [&](std::size_t i) {
+        return py::vectorize([&c, i](double h, double k) {
+            const CurvatureJet<double> d = density(c.energy, h, k);
+            return std::array{d.f, d.H, d.K, d.HH, d.HK, d.KK}[i];
+        });
+    };
+    for (std::size_t i = 0; i < names.size(); ++i) out[names[i]] = part(i)(H, K);
+    return out;
+}
+
+py::object growth_rates(const Case& c, const Numbers& q, int m, std::optional<double> tension) {
+    const auto start = theory::tube_start(c);
+    if (!start) throw std::invalid_argument("growth rates in closed form need a case with shape.kind = \"tube\"");
+    theory::UniformTube tube = start->tube;
+    if (tension) tube.tension = *tension;
+    const MotionLaw law = motion_law(c.model);
+    return py::vectorize([&](double wave) { return theory::growth(tube, law, wave, m).rate(); })(q);
+}
+
+// ---- scans
+
+py::dict scan(const Case& c, const std::vector<std::string>& over, const std::optional<std::string>& boundary,
+              const std::filesystem::path& file, std::optional<int> jobs, bool to_the_end) {
+    Scan asked;
+    asked.path = asked.case_path = c.path, asked.case_text = c.text, asked.sets = c.sets;
+    for (const std::string& axis : over) asked.axes.push_back(parse_axis(axis));
+    asked.to_the_end = to_the_end;
+    if (boundary) {
+        asked.boundary.emplace();
+        if (*boundary != "outcome") {
+            asked.boundary->around = outcome_from_name(*boundary);
+            if (!asked.boundary->around)
+                throw std::invalid_argument("boundary must be \"outcome\" or the name of an outcome, not " + *boundary);
+        }
+    }
+    check_scan(asked);
+    const int threads = jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+    if (threads < 1) throw std::invalid_argument("jobs must be 1 or more");
+    const ScanResult done = without_gil(1, [&] {
+        ScanWriter writer = ScanWriter::create(file, asked, about_start());
+        Dispatcher dispatcher(writer, true);
+        run_scan(dispatcher, asked, threads);
+        const Stop stop = dispatcher.was_interrupted() ? Stop::interrupted : Stop::finished;
+        if (writer.began()) writer.finish({{"stop", std::string(name(stop))}});
+        return writer.result();
+    });
+    py::dict out;
+    py::list outcomes, messages;
+    for (const PointResult& p : done.points) outcomes.append(std::string(name(p.outcome))), messages.append(p.message);
+    out["outcome"] = outcomes, out["message"] = messages;
+    for (std::size_t i = 0; i < n_measures; ++i) {
+        std::vector<double> values;
+        for (const PointResult& p : done.points) values.push_back(p.measures[i]);
+        out[measure_names[i]] = numpy(values);
+    }
+    py::list axes;
+    for (const Axis& axis : done.scan.axes) axes.append(py::make_tuple(axis.keys, axis.values));
+    out["axes"] = axes;
+    return out;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, m) {
+    const auto add_error = [&](py::object type, const char* meaning) {
+        type.attr("__doc__") = meaning;
+        type.attr("__module__") = "tubule";
+    };
+    add_error(py::register_exception<CaseError>(m, "CaseError", PyExc_ValueError),
+              "Bad input: where it is, what is wrong, what is allowed, and what was probably meant.");
+    add_error(py::register_exception<SolveError>(m, "SolveError", PyExc_RuntimeError),
+              "The numerics failed before there was anything to return.");
+
+    py::class_<Case>(m, "Case")
+        .def_readonly("path", &Case::path)
+        .def_readonly("text", &Case::text)
+        .def_readonly("sets", &Case::sets)
+        .def_readonly("title", &Case::title)
+        .def_property_readonly("toml", &effective_toml)
+        .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
+    m.def("parse_case", &parse_case, py::arg("text"), py::arg("sets"), py::arg("path"));
+    m.def("read_case", &read_case, py::arg("path"), py::arg("sets"));
+
+    py::class_<Results>(m, "Results")
+        .def_property_readonly("about", [](const Results& r) { return dictionary(r.result->about); })
+        .def_property_readonly("series_names", [](const Results& r) { return r.result->series_names; })
+        .def("series", [](const Results& r, const std::string& name) {
+            const auto found = r.result->series.find(name);
+            if (found == r.result->series.end()) throw py::key_error(name);
+            return numpy(found->second);
+        })
+        .def_property_readonly("case_text", [](const Results& r) { return r.result->case_text.text; })
+        .def_property_readonly("case_sets", [](const Results& r) { return r.result->case_text.sets; })
+        .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
+        .def("frame", &frame_dictionary)
+        .def("mesh", &mesh_dictionary)
+        .def("profile", &profile);
+    m.def("run", &run, py::arg("case"), py::arg("progress"), py::arg("output"), py::arg("threads"));
+    m.def("read_result", [](const std::filesystem::path& file) {
+        return Results{std::make_shared<const Result>(read_result(file))};
+    });
+
+    m.def("density", &density_at);
+    m.def("growth_rates", &growth_rates);
+    m.def("profile_curvatures", [](const Numbers& r, const Numbers& r1, const Numbers& r2, const Numbers& z1,
+                                   const Numbers& z2) {
+        const auto part = [&](auto member) {
+            return py::vectorize([member](double a, double b, double c, double d, double e) {
+                return profile_point(a, b, c, d, e).*member;
+            })(r, r1, r2, z1, z2);
+        };
+        return py::make_tuple(part(&ProfilePoint<double>::H), part(&ProfilePoint<double>::K));
+    });
+    m.def("forecast", [](const Case& c) {
+        const Forecast f = without_gil(0, [&] { return forecast(c); });
+        py::dict out;
+        out["resolution"] = f.resolution, out["steps"] = f.steps, out["seconds"] = f.seconds, out["bytes"] = f.bytes;
+        return out;
+    });
+
+    py::class_<StabilityOptions>(m, "StabilityOptions")
+        .def(py::init<>())
+        .def_readwrite("model", &StabilityOptions::model)
+        .def_readwrite("q", &StabilityOptions::q)
+        .def_readwrite("fit", &StabilityOptions::fit)
+        .def_readwrite("Re", &StabilityOptions::Re)
+        .def_readwrite("gamma", &StabilityOptions::gamma)
+        .def_readwrite("tension", &StabilityOptions::tension)
+        .def_readwrite("waves", &StabilityOptions::waves)
+        .def_readwrite("frame", &StabilityOptions::frame)
+        .def_readwrite("modes", &StabilityOptions::modes)
+        .def_readwrite("rates", &StabilityOptions::rates)
+        .def_readwrite("numerical", &StabilityOptions::numerical);
+    m.def("stability", [](const Case& c, StabilityOptions options) {
+        options.json = true, options.file = c.path;
+        return without_gil(0, [&] { return stability_answer(options, StabilitySubject{c, true, {}, {}}); });
+    });
+    m.def("stability", [](const Results& r, const std::string& name, StabilityOptions options) {
+        options.json = true, options.file = name;
+        return without_gil(0, [&] { return stability_answer(options, stability_subject(*r.result, options)); });
+    });
+    m.def("compare", [](const Results& a, const Results& b, bool align, bool shapes,
+                        const std::vector<std::string>& frames) {
+        CompareOptions options;
+        options.results = {"a", "b"}, options.frames = frames, options.align = align, options.no_shapes = !shapes;
+        return without_gil(0, [&] { return comparison_json(options, *a.result, *b.result); });
+    });
+    m.def("scan", &scan);
+    m.def("build_info", &build_info);
+}
+
+}  // namespace tubule

@@ -1,0 +1,128 @@
+"""Cases: from TOML text, files and dictionaries."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from pathlib import Path
+from typing import Any, Mapping, Union
+
+from . import _core
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
+
+
+def _key(name: str) -> str:
+    return name if _BARE.match(name) else _text(name)
+
+
+def _text(value: str) -> str:
+    out = '"'
+    for c in value:
+        if c in '"\\':
+            out += "\\" + c
+        elif ord(c) < 0x20 or ord(c) == 0x7F:
+            out += f"\\u{ord(c):04x}"
+        else:
+            out += c
+    return out + '"'
+
+
+def toml_value(value: Any) -> str:
+    """A Python value as TOML: numbers (also NumPy's), texts, truth values, sequences and mappings.
+
+    Raises TypeError for anything else, and ValueError for numbers that are not finite.
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, os.PathLike):
+        return _text(os.fspath(value))
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in value.items() if v is not None) + "}"
+    if hasattr(value, "tolist"):  # NumPy's numbers and arrays
+        return toml_value(value.tolist())
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"a case has finite numbers only, not {value}")
+        return repr(value)
+    if isinstance(value, (list, tuple, range)):
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+    raise TypeError(f"a case has no values of type {type(value).__name__}")
+
+
+def to_toml(case: Mapping[str, Any]) -> str:
+    """A dictionary as a case file: one line for each key."""
+    return "".join(f"{_key(k)} = {toml_value(v)}\n" for k, v in case.items() if v is not None)
+
+
+class Case:
+    """A valid case.
+
+    source  a dictionary, a path of a case file, or TOML text (which has a line break)
+    set     overrides by dotted key, such as {"energy.k42": 0.06}; each as `--set` of the program
+
+    Raises CaseError, with place, reason and suggestion for everything that is wrong.
+
+    >>> case = Case({"tier": "axisym", "energy": {"k20": 1},
+    ...              "shape": {"kind": "tube", "radius": 1, "length": 9, "mode": [{"amplitude": 0.1, "n": 1}]},
+    ...              "time": {"end": 0.1}})
+    >>> case.with_(energy__k42=0.06).toml.splitlines()[3]
+    'k20 = 1'
+    """
+
+    def __init__(self, source: Union[Mapping[str, Any], str, os.PathLike], set: Mapping[str, Any] | None = None):
+        sets = [f"{key}={toml_value(value)}" for key, value in (set or {}).items()]
+        if isinstance(source, Mapping):
+            self._core = _core.parse_case(to_toml(source), sets, "case")
+        elif isinstance(source, str) and "\n" in source:
+            self._core = _core.parse_case(source, sets, "case")
+        else:
+            self._core = _core.read_case(str(Path(source)), sets)
+
+    @classmethod
+    def _of(cls, core: _core.Case) -> "Case":
+        case = cls.__new__(cls)
+        case._core = core
+        return case
+
+    def with_(self, set: Mapping[str, Any] | None = None, **keys: Any) -> "Case":
+        """The case with other values: `set` as for Case, or keywords with __ for the dots."""
+        more = dict(set or {}) | {key.replace("__", "."): value for key, value in keys.items()}
+        sets = self._core.sets + [f"{key}={toml_value(value)}" for key, value in more.items()]
+        return Case._of(_core.parse_case(self._core.text, sets, self._core.path))
+
+    @property
+    def toml(self) -> str:
+        """The whole case as TOML: overrides applied, defaults written out."""
+        return self._core.toml
+
+    def forecast(self) -> dict:
+        """What a run is expected to take: resolution, steps, seconds, bytes (None where that is not known)."""
+        return _core.forecast(self._core)
+
+    def energy_density(self, H, K):
+        """f(H, K) of the case, for numbers or arrays that broadcast."""
+        return _core.density(self._core, H, K)["f"]
+
+    def energy_derivatives(self, H, K) -> dict:
+        """f and its derivatives f_H, f_K, f_HH, f_HK, f_KK."""
+        return _core.density(self._core, H, K)
+
+    def growth_rate(self, q, m: int = 0, tension: float | None = None):
+        """The rate of waves exp(i(q z + m theta)) on the straight tube of the case, in closed form (theory.md, section 5).
+
+        The largest real part; `tension` replaces that of the case.
+        """
+        return _core.growth_rates(self._core, q, m, tension)
+
+    def __repr__(self) -> str:
+        return f"<tubule.Case {self._core.title or self._core.path!r}>"
+
+
+def as_case(case) -> Case:
+    return case if isinstance(case, Case) else Case(case)

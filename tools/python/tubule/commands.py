@@ -1,0 +1,178 @@
+"""What the program does, as functions."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from .cases import Case, as_case, toml_value
+from .results import Result, read
+
+Progress = Callable[[float, float, float], None]
+
+
+def run(case, *, output: str | os.PathLike | None = None, progress: Progress | None = None, threads: int = 0) -> Result:
+    """Runs a case of any tier, or finds its equilibria, in this process.
+
+    case      a Case, or what Case takes
+    output    a result file, written as the run goes on: a kill loses nothing. Without it all stays in memory
+    progress  called with (time, energy, step) at most ten times a second; what it raises ends the run
+    threads   for loops over elements of tier surface3d; 0: one a processor
+
+    A run that cannot go on is no exception: see Result.stop. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad
+    input, RuntimeError where nothing could be computed.
+
+    >>> result = run(tube)
+    >>> result.stop, len(result.frames)
+    ('finished', 4)
+    """
+    return Result(_core.run(as_case(case)._core, progress, None if output is None else os.fspath(output), threads))
+
+
+def run_many(cases: Iterable, *, jobs: int | None = None) -> list[Result]:
+    """Runs cases side by side, one thread each, on all processors. Their results, in order.
+
+    The first exception of a run is raised when all that have begun are at their end.
+    """
+    prepared = [as_case(case) for case in cases]
+    jobs = jobs or os.cpu_count() or 1
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        runs = [pool.submit(run, case, threads=1) for case in prepared]
+        try:
+            return [each.result() for each in runs]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def equilibrium(case, **options) -> Result:
+    """As run(), of a case that has a table [equilibrium]: each row of the series is a shape.
+
+    Raises ValueError if it has none.
+    """
+    case = as_case(case)
+    if not case._core.is_equilibrium:
+        raise ValueError("this case moves: an equilibrium needs a table [equilibrium]")
+    return run(case, **options)
+
+
+def stability(subject, *, model: str = "", Re: float | None = None, gamma: float | None = None,
+              tension: float | None = None, modes: int = 2, waves: int | None = None, q: Iterable[float] | None = None,
+              rates: int = 3, frame: int | None = None, numerical: bool = False, fit: tuple[int, ...] | None = None) -> dict:
+    """Growth rates of a case or a result: `tubule stability --json`, docs/schemas/stability.json.
+
+    model, Re, gamma, tension   instead of the case's; model "all" for every one
+    modes, waves, q             m = 0 ... modes; n (spheres: l) up to waves, or these wave numbers
+    rates, numerical            numerical spectra: how many rates for each m; also where a closed form is known
+    frame, fit                  of a result: which frame; or the rate of wave n or (n, m), fitted to its series
+
+    Raises ValueError for what cannot be asked.
+    """
+    o = _core.StabilityOptions()
+    o.model, o.Re, o.gamma, o.tension, o.modes, o.waves = model, Re, gamma, tension, modes, waves
+    o.rates, o.frame, o.numerical = rates, frame, numerical
+    o.q = "" if q is None else ",".join(repr(float(x)) for x in q)
+    o.fit = "" if fit is None else ",".join(str(i) for i in fit)
+    if isinstance(subject, Result):
+        return json.loads(_core.stability(subject._core, subject._name, o))
+    return json.loads(_core.stability(as_case(subject)._core, o))
+
+
+def compare(a: Result, b: Result, *, align: bool = False, shapes: bool = True,
+            frames: Iterable[tuple[int, int]] = ()) -> dict:
+    """Two results against each other: `tubule compare --json`, docs/schemas/compare.json.
+
+    align    first move b rigidly to where it fits best
+    shapes   compare the frames' surfaces, too
+    frames   pairs of frames to compare whatever their times; then no series are compared
+    """
+    return json.loads(_core.compare(a._core, b._core, align, shapes, [f"{i}:{j}" for i, j in frames]))
+
+
+class Scan:
+    """What became of a case over a grid of its keys. Arrays have one axis a key, in the order of `over`.
+
+    keys, values   of each axis
+    outcome        "uniform-tube", "pinched" ... (docs/scans.md)
+    others         measures by name, such as energy, time, energy_error; NaN where a run does not tell
+    """
+
+    def __init__(self, read: dict):
+        self.keys = [keys[0] if len(keys) == 1 else tuple(keys) for keys, _ in read["axes"]]
+        self.values = [np.array([_number(v[0]) if len(v) == 1 else " ".join(v) for v in values]) for _, values in read["axes"]]
+        shape = tuple(len(v) for v in self.values)
+        self._measures = {name: np.array(values).reshape(shape) for name, values in read.items() if name != "axes"}
+
+    @property
+    def outcome(self) -> np.ndarray:
+        return self._measures["outcome"]
+
+    def __getitem__(self, measure: str) -> np.ndarray:
+        return self._measures[measure]
+
+    def measures(self) -> list[str]:
+        return list(self._measures)
+
+    def to_pandas(self):
+        """One row a point. Needs the package pandas."""
+        import pandas
+
+        grid = np.meshgrid(*self.values, indexing="ij")
+        names = [k if isinstance(k, str) else ",".join(k) for k in self.keys]
+        return pandas.DataFrame({name: g.ravel() for name, g in zip(names, grid)} | {n: m.ravel() for n, m in self._measures.items()})
+
+
+def _number(text: str):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _axis(key: str, values) -> str:
+    if isinstance(values, str):
+        return f"{key}={values}"
+    return f"{key}=" + ",".join(toml_value(v) for v in values)
+
+
+def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: str | os.PathLike | None = None,
+         jobs: int | None = None, to_the_end: bool = False) -> Scan:
+    """What becomes of a case over a grid of its keys, on all processors: `tubule scan`.
+
+    over      by key: a sequence of values, or "low:high:count[:log]"
+    boundary  only along the lines between outcomes ("outcome"), or around one of them
+    output    a result file, which the program can draw, resume and extend
+
+    >>> scan(tube, {"energy.k42": [0, 0.06]})["energy"].shape
+    (2,)
+    """
+    axes = [_axis(key, values) for key, values in over.items()]
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.fspath(output) if output is not None else str(Path(folder) / "scan.hdf")
+        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, jobs, to_the_end))
+
+
+def energy_density(H, K, **moduli):
+    """f(H, K) for moduli by name, such as k20=1, k42=0.06, H0=-1; numbers or arrays that broadcast."""
+    return Case({"tier": "axisym", "energy": moduli, "shape": {"kind": "tube", "radius": 1.0, "length": 1.0},
+                 "time": {"end": 1.0}}).energy_density(H, K)
+
+
+def curvatures(r, dr, d2r, dz=1.0, d2z=0.0):
+    """(H, K) of the surface of revolution of a profile (r(s), z(s)) from its first and second derivatives.
+
+    Of a graph r(z) the last two stay as they are. The normal points outwards: a tube has H = -1/r, a sphere H = -2/R.
+    """
+    return _core.profile_curvatures(r, dr, d2r, dz, d2z)
+
+
+__all__ = ["run", "run_many", "equilibrium", "stability", "compare", "scan", "Scan", "energy_density", "curvatures", "read"]

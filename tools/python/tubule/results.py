@@ -1,0 +1,202 @@
+"""Results: series over time, frames, meshes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from .cases import Case
+
+
+class Series(Mapping):
+    """The series of a result by name, as arrays over the rows; "time" is one of them."""
+
+    def __init__(self, core):
+        self._core = core
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._core.series(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._core.series_names)
+
+    def __len__(self) -> int:
+        return len(self._core.series_names)
+
+
+class Frame:
+    """A shape at one time.
+
+    time, kind     when, and what it is: "graph", "curve", "equilibrium", "surface"
+    numbers        by name, such as energy
+    arrays         by name, such as H, K, u: one value a point or node
+    """
+
+    def __init__(self, core, number: int):
+        self._core, self._number = core, number
+        read = core.frame(number)
+        self.time: float = read["time"]
+        self.kind: str = read["kind"]
+        self.numbers: dict[str, float] = read["numbers"]
+        self.arrays: dict[str, np.ndarray] = read["arrays"]
+        self._mesh = None if read["mesh"] is None else core.mesh(read["mesh"])
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.arrays[name]
+
+    def profile(self, points: int = 401) -> tuple[np.ndarray, np.ndarray]:
+        """(r, z) of an axisymmetric shape; graphs r(z) at so many points of a period, others as they were written."""
+        r, z, _ = self._core.profile(self._number, points)
+        return r, z
+
+    @property
+    def points(self) -> np.ndarray:
+        """Nodes of a surface, [nodes, 3]."""
+        return self.arrays["points"]
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Node numbers of the curved triangles of a surface, in VTK's order of Lagrange triangles."""
+        if self._mesh is None:
+            raise ValueError("this frame is a profile: revolve() makes a surface of it")
+        return self._mesh["cells"]
+
+    @property
+    def order(self) -> int:
+        """Polynomial order of the triangles of a surface."""
+        if self._mesh is None:
+            raise ValueError("this frame is a profile: it has no triangles")
+        return self._mesh["order"]
+
+    def _whole(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points, cells and the node of each point: a node that cells see a period away is one point more."""
+        cells, shifts = self.cells, self._mesh["shifts"]
+        if shifts is None:
+            return self.points, cells, np.arange(len(self.points))
+        seen, inverse = np.unique(np.stack([cells.ravel(), shifts.ravel()], axis=1), axis=0, return_inverse=True)
+        points = self.points[seen[:, 0]].copy()
+        points[:, 2] += self._mesh["period"] * seen[:, 1]
+        return points, inverse.reshape(cells.shape), seen[:, 0]
+
+    def revolve(self, around: int = 96, points: int = 401) -> tuple[np.ndarray, np.ndarray]:
+        """The surface of revolution of a profile as flat triangles: points [n, 3], cells [m, 3]."""
+        r, z = self.profile(points)
+        angle = 2 * np.pi * np.arange(around) / around
+        xyz = np.stack([r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), np.broadcast_to(z[:, None], (len(r), around))], axis=-1)
+        i, j = np.meshgrid(np.arange(len(r) - 1), np.arange(around), indexing="ij")
+        a, b, c, d = (k.ravel() for k in (i * around + j, i * around + (j + 1) % around, (i + 1) * around + (j + 1) % around, (i + 1) * around + j))
+        return xyz.reshape(-1, 3), np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+    def meshio(self):
+        """A meshio.Mesh with all data of the nodes; profiles are revolved. Needs the package meshio."""
+        import meshio
+
+        if self._mesh is None:
+            points, cells = self.revolve()
+            return meshio.Mesh(points, [("triangle", cells)])
+        points, cells, node = self._whole()
+        data = {name: a[node] for name, a in self.arrays.items() if name != "points" and len(a) == len(self.points)}
+        kind = {1: "triangle", 2: "triangle6"}.get(self.order, "VTK_LAGRANGE_TRIANGLE")
+        return meshio.Mesh(points, [(kind, cells)], point_data=data)
+
+    def vtk(self):
+        """A vtkUnstructuredGrid with all data of the nodes; profiles are revolved. Needs the Python modules of VTK."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import VTK_LAGRANGE_TRIANGLE, VTK_TRIANGLE, vtkCellArray, vtkUnstructuredGrid
+
+        if self._mesh is None:
+            (points, cells), node, kind = self.revolve(), None, VTK_TRIANGLE
+        else:
+            (points, cells, node), kind = self._whole(), VTK_LAGRANGE_TRIANGLE
+        grid, at, list_ = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
+        at.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+        width = np.full((len(cells), 1), cells.shape[1])
+        list_.SetCells(len(cells), numpy_to_vtkIdTypeArray(np.hstack([width, cells]).astype(np.int64).ravel(), deep=True))
+        grid.SetPoints(at)
+        grid.SetCells(kind, list_)
+        if node is not None:
+            for name, a in self.arrays.items():
+                if name != "points" and len(a) == len(self.points):
+                    array = numpy_to_vtk(np.ascontiguousarray(a[node]), deep=True)
+                    array.SetName(name)
+                    grid.GetPointData().AddArray(array)
+        return grid
+
+    def __repr__(self) -> str:
+        return f"<tubule.Frame {self.kind} at t = {self.time:g}>"
+
+
+class Frames(Sequence):
+    """The frames of a result, read when they are asked for."""
+
+    def __init__(self, core):
+        self._core = core
+
+    def __len__(self) -> int:
+        return self._core.frames
+
+    def __getitem__(self, number):
+        if isinstance(number, slice):
+            return [self[i] for i in range(*number.indices(len(self)))]
+        if not -len(self) <= number < len(self):
+            raise IndexError(f"there are {len(self)} frames")
+        return Frame(self._core, number % len(self))
+
+
+class Result:
+    """What a run has computed.
+
+    series     by name: arrays over the rows (docs/results.md lists them)
+    frames     shapes
+    about      everything else by name: stop, stop_message, E_ref, estimated_error, steps, ...
+    """
+
+    def __init__(self, core, name: str = "result"):
+        self._core, self._name = core, name
+        self.series = Series(core)
+        self.frames = Frames(core)
+        self.about: dict[str, Any] = dict(core.about)
+
+    @property
+    def stop(self) -> str:
+        """Why the run ended: "finished", "pinch-off" ... (docs/results.md); "unfinished" if it has not."""
+        return self.about.get("stop", "unfinished")
+
+    @property
+    def energy(self) -> float:
+        """At the end."""
+        return float(self.series["energy"][-1])
+
+    @property
+    def energy_error(self) -> float | None:
+        """What the run states as the largest error of its energy, absolute; None where it is unknown."""
+        stated = self.about.get("estimated_error", 1)
+        return None if stated >= 1 else stated * self.about["E_ref"]
+
+    @property
+    def warnings(self) -> list[str]:
+        return [line for line in self.about.get("warnings", "").splitlines() if line]
+
+    @property
+    def case(self) -> Case:
+        return Case._of(_core.parse_case(self._core.case_text, self._core.case_sets, self._name))
+
+    def to_pandas(self):
+        """The series as a pandas.DataFrame, one row a time. Needs the package pandas."""
+        import pandas
+
+        return pandas.DataFrame({name: self.series[name] for name in self.series})
+
+    def __repr__(self) -> str:
+        rows = len(self.series["time"])
+        return f"<tubule.Result {self.stop}, {rows} rows, {len(self.frames)} frames>"
+
+
+def read(file: str | os.PathLike) -> Result:
+    """A result file, also of a run that goes on or was killed. Raises RuntimeError if it is none."""
+    return Result(_core.read_result(os.fspath(file)), os.fspath(file))
