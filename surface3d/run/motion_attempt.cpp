@@ -197,6 +197,7 @@ void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.dissipation_past = now_.dissipation;
     memory_.balance.corrected += std::abs(next.correction);
     state_ = next.state;
+    memory_.order = next.order;
     now_ = m;
     memory_.balance.lowest_total = std::min(memory_.balance.lowest_total, total());
     memory_.balance.defect = std::max(memory_.balance.defect, std::abs(memory_.balance.defect_at(total())));
@@ -351,7 +352,7 @@ double MotionAttempt::what_may_change() const {
 void MotionAttempt::compare() {
     if (!out_.reported()) return;
     std::optional<double> error;
-    if (error_) error = error_->at(state_.time, comparable(), now_.smoothness);
+    if (error_) error = error_->at(state_.time, comparable(), memory_.order, now_.smoothness);
     const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
     error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
     if (error) memory_.error = std::max({memory_.error, *error, rise});

@@ -45,7 +45,7 @@ public:
     const std::optional<StopReport>& stop() const { return stop_; }
     const MotionSettings& settings() const { return memory_.settings; }
     const MotionState& state() const { return state_; }  // no nodes: it could not begin
-    double energy() const { return comparable(); }  // with loads: F
+    double energy() const { return comparable(); }       // with loads: F
     CurvedMesh mesh() const { return scheme_->surface().mesh(state_); }
     Record saved() const { return state_record(state_, memory_); }
     // Largest errors, absolute: of the energy; of the balance with dissipation.

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "common/result/record.hpp"
-#include "common/solve/memory.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/run/motion_start.hpp"
 
@@ -12,8 +11,6 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr double least_coarser = 1.25;  // times fewer triangles: else the two runs are too much alike
-constexpr double much_finer = 2.25;     // times more triangles: errors of the start fall at least by this
-const std::string prefix = "restart_coarser_run_";
 
 // What is lost on fewer triangles may not be lost with elements of another order.
 bool lost(const StopReport& stop) {
@@ -26,21 +23,31 @@ struct Saved {
     int stop = -1;  // it goes on
     double stop_time = 0;
     SurfaceCells cells;
-    ComparedEnergies of_run;
 };
 template <class Fields, class S>
 void saved_fields(Fields&& f, S& s) {
     f.number("time", s.time), f.number("stop", s.stop), f.number("stop_time", s.stop_time);
     f.number("order", s.cells.order), f.number("period", s.cells.period);
-    f.number("compared", s.of_run.compared), f.number("since", s.of_run.since), f.number("error", s.of_run.error);
-    f.array("run_times", s.of_run.times), f.array("run_energies", s.of_run.energies, s.of_run.times.size());
+}
+template <class Fields, class R>
+void compared_fields(Fields&& f, R& r) {
+    f.number("restart_compared", r.compared), f.number("restart_compared_error", r.error);
+    f.number("restart_compared_between", r.between), f.number("restart_compared_sum_in_time", r.sum_in_time);
+    f.number("restart_compared_in_time", r.in_time), f.array("restart_compared_times", r.times);
+    f.array("restart_compared_energies", r.energies, r.times.size());
+    f.array("restart_compared_orders", r.orders, r.times.size());
 }
 
-// The record of the coarser run in that of the run, if it has one.
-std::optional<Record> coarser_record(const Record& record) {
+// Coarser runs, by the prefix of their names in the record of the run.
+const std::string of_coarser = "restart_coarser_run_", of_same_steps = "restart_coarser_same_steps_";
+
+bool is_saved(const Record& record, const std::string& prefix) {
     int exists = 0;
-    RecordReader(record).number("restart_compared", exists);
-    if (!exists) return std::nullopt;
+    RecordReader(record).number(prefix + "exists", exists);
+    return exists != 0;
+}
+
+Record record_of(const Record& record, const std::string& prefix) {
     Record out;
     out.kind = RecordKind::surface;
     for (const auto& [name, value] : record.numbers)
@@ -75,98 +82,9 @@ Saved saved_of(Record& record) {
     return out;
 }
 
-}  // namespace
-
-MotionError::MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock,
-                         const MotionSettings& of)
-    : case_(c), start_(start), watch_(watch), clock_(clock), of_(of) {}
-
-std::unique_ptr<MotionError::Coarser> MotionError::make(Role role, const MotionSettings& settings) const {
-    auto out = std::make_unique<Coarser>(Coarser{case_, {}});
-    const int order = element_order(case_);
-    if (role == Role::other_order) out->c.surface.order = order > 2 ? order - 1 : 3;
-    out->c.surface.step.reset();
-    out->c.time.output.clear();
-    out->c.time.stationary.reset();  // it goes as far as the run does
-    out->run.emplace(out->c, watch_, clock_, settings, nullptr);
-    return out;
-}
-
-double MotionError::begin(int triangles, double energy) {
-    begin(triangles);
-    return error_of_start(energy);
-}
-
-double MotionError::error_of_start(double energy) const {
-    if (!start_.resizable()) return 0;
-    try {
-        const StartMesh finer = start_.mesh(static_cast<int>(much_finer * of_.elements), element_order(case_));
-        return std::abs(free_energy(case_, observe_start(case_, finer), finer.mesh.period) - energy) * much_finer /
-               (much_finer - 1);
-    } catch (const TooLarge&) {
-        return 0;
-    }
-}
-
-void MotionError::begin(int triangles) {
-    const int fewer = fewer_triangles(of_.elements);
-    if (start_.resizable() && fewer >= least_triangles) {
-        const double coarser_by = 1.0 * triangles / start_.mesh(fewer, element_order(case_)).mesh.triangles();
-        if (coarser_by >= least_coarser) return begin(Role::fewer_triangles, coarser_by);
-    }
-    begin(Role::other_order, 1);
-}
-
-void MotionError::begin(Role role, double coarser_by) {
-    auto next = make(role, coarser(of_, role, coarser_by));
-    next->run->begin(start_);
-    coarser_ = std::move(next);
-    of_run_.compared = 0;
-}
-
-// At all times that are to be compared. False if the coarser run does not get there.
-bool MotionError::catch_up(double smoothness) {
-    MotionAttempt& run = *coarser_->run;
-    ComparedEnergies& r = of_run_;
-    double largest = 0;
-    for (; r.compared < std::ssize(r.times); ++r.compared) {
-        run.advance_to(r.times[r.compared]);
-        if (run.state().X.size() == 0 || is_before(run.state().time, r.times[r.compared])) return false;
-        largest = std::max(largest, std::abs(run.energy() - r.energies[r.compared]));
-        r.error = largest * error_by_difference(case_, run.settings(), smoothness);
-    }
-    return true;
-}
-
-std::optional<double> MotionError::at(double time, double energy, double smoothness) {
-    const bool last = !is_before(time, case_.time.end);
-    if (of_run_.times.empty() || ++of_run_.since >= steps_at_once || last) {
-        of_run_.times.push_back(time), of_run_.energies.push_back(energy);
-        of_run_.since = 0;
-    }
-    try {
-        while (!catch_up(smoothness)) {
-            const auto& stop = coarser_->run->stop();
-            if (!stop || !lost(*stop) || coarser_->run->settings().role == Role::other_order) return std::nullopt;
-            begin(Role::other_order, 1);
-        }
-    } catch (const Paused&) {
-        return std::nullopt;
-    }
-    return of_run_.error;
-}
-
-std::optional<StopReport> MotionError::stop() const {
-    return coarser_ ? coarser_->run->stop() : std::nullopt;
-}
-
-void MotionError::save(Record& record) const {
-    const bool exists = coarser_ && coarser_->run->state().X.size() > 0;
-    RecordWriter(record).number("restart_compared", exists);
-    if (!exists) return;
-    const MotionAttempt& run = *coarser_->run;
+void save_coarser(const MotionAttempt& run, const std::string& prefix, Record& record) {
     Record own = run.saved();
-    Saved saved{.time = own.time, .cells = cells_of(run.mesh()), .of_run = of_run_};
+    Saved saved{.time = own.time, .cells = cells_of(run.mesh())};
     if (const auto& stop = run.stop(); stop && !can_go_on(stop->reason))
         saved.stop = static_cast<int>(stop->reason), saved.stop_time = stop->time;
     RecordWriter writer(own);
@@ -177,24 +95,181 @@ void MotionError::save(Record& record) const {
     for (Array& a : own.arrays) record.arrays.push_back({prefix + a.name, std::move(a.shape), std::move(a.data)});
 }
 
+}  // namespace
+
+MotionError::MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock,
+                         const MotionSettings& of)
+    : case_(c), start_(start), watch_(watch), clock_(clock), of_(of) {}
+
+bool MotionError::tells_apart() const {
+    return is_of_high_order(case_);
+}
+
+std::unique_ptr<MotionError::Coarser> MotionError::make(const MotionSettings& settings) const {
+    auto out = std::make_unique<Coarser>(Coarser{case_, {}});
+    const int order = element_order(case_);
+    if (settings.role == Role::other_order) out->c.surface.order = order > 2 ? order - 1 : 3;
+    out->c.surface.step.reset();
+    out->c.time.output.clear();
+    out->c.time.stationary.reset();  // it goes as far as the run does
+    out->run.emplace(out->c, watch_, clock_, settings, nullptr);
+    return out;
+}
+
+// What goes wrong in coarser runs leaves the run alone: its error is unknown from then on.
+template <class Work>
+void MotionError::attempt(const Work& work, double time) {
+    try {
+        work();
+    } catch (const std::exception& failure) {
+        coarser_.reset(), same_steps_.reset();
+        failure_ = StopReport{Stop::solver_failed, time, failure.what(), ""};
+    }
+}
+
+double MotionError::begin(int triangles, double energy) {
+    attempt([&] { begin(triangles); }, begin_time(case_));
+    return error_of_start(case_, start_, of_.elements, energy);
+}
+
+void MotionError::begin(int triangles) {
+    const int fewer = fewer_triangles(of_.elements);
+    if (start_.resizable() && fewer >= least_triangles) {
+        try {
+            const double coarser_by = 1.0 * triangles / start_.mesh(fewer, element_order(case_)).mesh.triangles();
+            if (coarser_by >= least_coarser) return begin(Role::fewer_triangles, coarser_by);
+        } catch (const std::exception&) {  // another order may do
+        }
+    }
+    begin(Role::other_order, 1);
+}
+
+void MotionError::begin(Role role, double coarser_by) {
+    const auto begun = [&] {
+        auto next = make(coarser(of_, role, coarser_by));
+        next->run->begin(start_);
+        return next;
+    };
+    coarser_ = begun();
+    if (tells_apart()) same_steps_ = begun();
+    of_run_ = {.times = of_run_.times, .energies = of_run_.energies, .orders = of_run_.orders};
+}
+
+bool MotionError::is_compared(std::size_t i) const {
+    return i % steps_at_once == 0 || !is_before(of_run_.times[i], case_.time.end);
+}
+
+// At all times that are to be compared. False if a coarser run does not get there.
+bool MotionError::catch_up(double smoothness) {
+    const auto gets_to = [](MotionAttempt& run, double time) {
+        run.advance_to(time);
+        return run.state().X.size() > 0 && !is_before(run.state().time, time);
+    };
+    ComparedEnergies& r = of_run_;
+    double largest = 0;
+    for (; r.compared < std::ssize(r.times); ++r.compared) {
+        if (same_steps_ && !gets_to(*same_steps_->run, r.times[r.compared])) return false;
+        if (!is_compared(r.compared)) continue;
+        if (!gets_to(*coarser_->run, r.times[r.compared])) return false;
+        largest = std::max(largest, error_at(r.compared, smoothness));
+        r.error = largest;
+    }
+    return true;
+}
+
+// Which all coarser runs have got to.
+double MotionError::error_at(std::size_t i, double smoothness) {
+    ComparedEnergies& r = of_run_;
+    const MotionSettings& settings = coarser_->run->settings();
+    const double longer_steps = coarser_->run->energy();
+    if (!same_steps_) return std::abs(longer_steps - r.energies[i]) * error_by_difference(case_, settings, smoothness);
+    const double same_steps = same_steps_->run->energy();
+    const std::size_t since = i == 0 ? 0 : steps_at_once * ((i - 1) / steps_at_once) + 1;
+    const auto order = static_cast<int>(*std::min_element(r.orders.begin() + since, r.orders.begin() + i + 1));
+    r.sum_in_time += (longer_steps - same_steps - r.between) * error_in_time(order);
+    r.between = longer_steps - same_steps;
+    r.in_time = std::max(r.in_time, std::abs(r.sum_in_time));
+    return std::abs(same_steps - r.energies[i]) * error_in_space(case_, settings, smoothness) + std::abs(r.sum_in_time);
+}
+
+// Without an end, or to that of a coarser run; what is lost on fewer triangles is tried with elements of another order.
+void MotionError::follow(double smoothness) {
+    while (true) {
+        const Role role = coarser_->run->settings().role;
+        const bool another = role == Role::fewer_triangles;
+        try {
+            if (catch_up(smoothness)) return;
+            const auto ended = stop();
+            if (!another || !ended || !lost(*ended)) return;
+        } catch (const std::exception&) {
+            if (!another) throw;
+        }
+        begin(Role::other_order, 1);
+    }
+}
+
+std::optional<double> MotionError::at(double time, double energy, int order, double smoothness) {
+    of_run_.times.push_back(time), of_run_.energies.push_back(energy), of_run_.orders.push_back(order);
+    if (failure_) return std::nullopt;
+    try {
+        attempt([&] { follow(smoothness); }, time);
+    } catch (const Paused&) {
+        return std::nullopt;
+    }
+    if (failure_ || of_run_.compared < std::ssize(of_run_.times)) return std::nullopt;
+    return of_run_.error;
+}
+
+std::optional<double> MotionError::in_time() const {
+    if (!same_steps_) return std::nullopt;
+    return of_run_.in_time;
+}
+
+std::optional<StopReport> MotionError::stop() const {
+    if (failure_) return failure_;
+    std::optional<StopReport> out = coarser_ ? coarser_->run->stop() : std::nullopt;
+    const std::optional<StopReport> other = same_steps_ ? same_steps_->run->stop() : std::nullopt;
+    if (other && (!out || other->time < out->time)) return other;
+    return out;
+}
+
+void MotionError::save(Record& record) const {
+    RecordWriter writer(record);
+    const auto is_begun = [](const auto& coarser) { return coarser && coarser->run->state().X.size() > 0; };
+    const bool exists = is_begun(coarser_), both = exists && is_begun(same_steps_);
+    writer.number(of_coarser + "exists", exists), writer.number(of_same_steps + "exists", both);
+    compared_fields(writer, of_run_);
+    if (exists) save_coarser(*coarser_->run, of_coarser, record);
+    if (both) save_coarser(*same_steps_->run, of_same_steps, record);
+}
+
 void MotionError::resume(const Record& record, int triangles) {
-    auto own = coarser_record(record);
-    if (!own) return begin(triangles);
-    const Saved saved = saved_of(*own);
-    const MotionSettings settings = motion_restart(*own, time_scheme(case_)).memory.settings;
-    coarser_ = make(settings.role, settings);
-    coarser_->run->resume({std::move(*own), saved.cells});
-    of_run_ = saved.of_run;
-    const auto stop = static_cast<Stop>(saved.stop);
-    const bool goes_on = saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));
-    if (!goes_on) coarser_->run->end({stop, saved.stop_time, "", ""});
+    compared_fields(RecordReader(record), of_run_);
+    if (!is_saved(record, of_coarser)) return attempt([&] { begin(triangles); }, record.time);
+    const auto resumed = [&](const std::string& prefix) {
+        Record own = record_of(record, prefix);
+        const Saved saved = saved_of(own);
+        auto out = make(motion_restart(own, time_scheme(case_)).memory.settings);
+        out->run->resume({std::move(own), saved.cells});
+        const auto stop = static_cast<Stop>(saved.stop);
+        const bool goes_on =
+            saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));
+        if (!goes_on) out->run->end({stop, saved.stop_time, "", ""});
+        return out;
+    };
+    coarser_ = resumed(of_coarser);
+    if (is_saved(record, of_same_steps)) same_steps_ = resumed(of_same_steps);
 }
 
 void check_error_restart(const Case& c, const Record& record) {
-    auto own = coarser_record(record);
-    if (!own) return;
-    saved_of(*own);
-    motion_restart(*own, time_scheme(c));
+    ComparedEnergies compared;
+    compared_fields(RecordReader(record), compared);
+    for (const std::string& prefix : {of_coarser, of_same_steps}) {
+        if (!is_saved(record, prefix)) continue;
+        Record own = record_of(record, prefix);
+        saved_of(own);
+        motion_restart(own, time_scheme(c));
+    }
 }
 
 }  // namespace tubule::surface3d

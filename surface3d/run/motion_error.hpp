@@ -10,15 +10,18 @@
 
 namespace tubule::surface3d {
 
-// The coarser run has fewer triangles and goes over several steps of the run at once, so that errors in space and in
-// time are larger by known factors: the difference of the energies is R - 1 times the error, R being the smaller
-// factor. It follows the run by these few steps. It has elements of another order where fewer triangles would be too
-// few, are not ours to choose, or lose the surface on the way.
+// Coarser runs have fewer triangles, so that errors in space are larger by a known factor, or elements of another order
+// where fewer triangles would be too few, are not ours to choose, or lose the surface on the way. One goes over several
+// steps of the run at once, so that errors in time are larger by a known factor, too: theory.md (11.2). With schemes of
+// high order that factor is far beyond that of errors in space; another coarser run then takes the steps of the run and
+// tells both apart, theory.md (11.3).
 struct ComparedEnergies {
-    std::vector<double> times, energies;  // of the run, at which the coarser one is compared with it
-    int compared = 0;                     // so many of them, as yet
-    int since = 0;                        // steps of the run since the last of these times
-    double error = 0;                     // at the last time compared
+    std::vector<double> times, energies, orders;  // of the run and its steps
+    int compared = 0;                             // so many of them, as yet
+    double error = 0;                             // at the last time compared
+    double between = 0;                           // then, of the two coarser runs
+    double sum_in_time = 0;                       // then, of the parts that steps have added to the error in time
+    double in_time = 0;                           // largest error in time
 };
 
 class MotionError {
@@ -26,41 +29,49 @@ public:
     // All references must outlive it. `of`: the run whose error it is.
     MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const MotionSettings& of);
 
-    // With the run, which has so many triangles, or where that goes on. resume() throws as RecordReader. The error of
-    // the start, which is known from a finer mesh: where the shape is not smooth, two meshes may be off by the same.
+    // With the run, which has so many triangles, or where that goes on. resume() throws as RecordReader. begin()
+    // tells the error of the start.
     double begin(int triangles, double energy);
     void resume(const Record& record, int triangles);
     void save(Record& record) const;
 
-    // Of this energy, which is that after a step, or of the last one that was compared, absolute; the smoothness is
-    // that of MotionMeasures. Nothing where the coarser run has no energy: it has ended before, or it was told to
-    // pause, as the run will be.
-    std::optional<double> at(double time, double energy, double smoothness);
-    // Why and when the coarser run ended, if it has.
+    // Of this energy, which is that after a step of this order, or of the last one that was compared, absolute; the
+    // smoothness is that of MotionMeasures. Nothing where a coarser run has no energy: it has ended before, whatever
+    // made it fail, or it was told to pause, as the run will be.
+    std::optional<double> at(double time, double energy, int order, double smoothness);
+    // The part of it that is due to time, largest; nothing where that is not known apart.
+    std::optional<double> in_time() const;
+    // Why and when a coarser run ended, if it has.
     std::optional<StopReport> stop() const;
 
     double give_up = HUGE_VAL;  // beyond this error, of E_ref, the run is not worth going on
 
 private:
-    // The coarser run refers to its case.
+    // A coarser run refers to its case.
     struct Coarser {
         Case c;
         std::optional<MotionAttempt> run;
     };
 
-    std::unique_ptr<Coarser> make(Role role, const MotionSettings& settings) const;
+    std::unique_ptr<Coarser> make(const MotionSettings& settings) const;
     void begin(int triangles);
     void begin(Role role, double coarser_by);
+    template <class Work>
+    void attempt(const Work& work, double time);
+    void follow(double smoothness);
     bool catch_up(double smoothness);
-    double error_of_start(double energy) const;
+    double error_at(std::size_t i, double smoothness);
+    bool is_compared(std::size_t i) const;
+    bool tells_apart() const;
 
     const Case& case_;
     const Start& start_;
     RunObserver& watch_;
     const RunClock& clock_;
     MotionSettings of_;
-    std::unique_ptr<Coarser> coarser_;
+    std::unique_ptr<Coarser> coarser_, same_steps_;  // the second one where errors are told apart
     ComparedEnergies of_run_;
+    std::optional<StopReport> failure_;  // there are no coarser runs
 };
 
 // Throws as RecordReader if a run with an error could not go on from this.

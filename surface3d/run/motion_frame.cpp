@@ -18,6 +18,7 @@ void state_fields(Fields&& f, State& s) {
 template <class Fields, class Memory>
 void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_next_step", m.next_step), f.number("restart_relaxation", m.scale.relaxation);
+    f.number("restart_last_order", m.order);
     f.number("restart_elements", m.settings.elements), f.number("restart_tolerance", m.settings.tolerance);
     f.number("restart_difference", m.settings.difference), f.number("restart_pair", m.settings.pair);
     f.number("restart_role", m.settings.role), f.number("restart_coarser_by", m.settings.coarser_by);

@@ -44,6 +44,7 @@ struct MotionMemory {
     MotionBalance balance;
     MotionCounters count;
     double next_step = 0;
+    int order = 1;     // of the last step, in time
     double error = 0;  // largest so far, of the energy, absolute
     double moved = 0;  // the nodes, at most, since the last look for self-intersection
 };

@@ -42,7 +42,7 @@ public:
             run.begin(start_);
         }
         run.go();
-        ended_ = {std::move(run.summary), run.error(), run.defect()};
+        ended_ = {std::move(run.summary), {run.error(), error.in_time(), run.defect()}};
         judge(error.stop());
         return ended_.summary;
     }
@@ -50,7 +50,7 @@ public:
     bool refine(const RunSummary& last) override {
         if (last.as_accurate_as_asked || last.stop.reason == Stop::ill_posed) return false;
         if (!fixed_by().empty() || !can_be_finer(settings_)) return false;
-        settings_ = finer(settings_, case_.accuracy.energy * last.reference_energy, ended_.error, ended_.defect);
+        settings_ = finer(settings_, case_.accuracy.energy * last.reference_energy, ended_.errors);
         return true;
     }
 
@@ -63,7 +63,7 @@ private:
     // What is left of the last run.
     struct Ended {
         RunSummary summary;
-        double error = 0, defect = 0;
+        MotionErrors errors;
     };
 
     // The stated error. Where the coarser run ended earlier, it is all of the energy, but not if the same happened to
@@ -74,11 +74,12 @@ private:
         const bool known = case_.accuracy.estimate && (!coarser || coarser->time >= s.stop.time * (1 - 1e-3));
         const bool together = coarser && ended_by_physics(s.stop) && s.stop.reason == coarser->reason;
         if (coarser && !paused && !known && !together)
-            s.warnings.push_back(
-                fmt::format("the coarser run beside it ended at t = {:.6g} with {}: the error after that is unknown",
-                            coarser->time, name(coarser->reason)));
-        if (!known && !together) ended_.error = s.reference_energy;
-        s.estimated_error = s.reference_energy > 0 ? std::max(ended_.error, ended_.defect) / s.reference_energy : 1;
+            s.warnings.push_back(fmt::format(
+                "the coarser run beside it ended at t = {:.6g} with {}{}: the error after that is unknown",
+                coarser->time, name(coarser->reason), coarser->message.empty() ? "" : " (" + coarser->message + ")"));
+        if (!known && !together) ended_.errors.energy = s.reference_energy;
+        const double error = std::max(ended_.errors.energy, ended_.errors.defect);
+        s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
     }
 
     const Case& case_;

@@ -16,12 +16,14 @@ constexpr double smooth_order = 4, rough_order = 2;    // of errors in the mesh 
 constexpr double per_smoothness = 2.1;                 // order, for each order of interpolation of H
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
 constexpr double spare = 1.5;                          // the next pair is to be so many times better than asked
+constexpr double part_of_asked = 0.4;                  // of space and of time, where they are known apart
 constexpr double later = 2;                            // errors grow from the start on
 constexpr double tolerance_per_accuracy = 0.8;         // tolerance = this * asked accuracy^1.5, of order 2
 constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * asked accuracy^1.25
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
 constexpr double loosest_of_coarser = 2e-3;            // beyond it they leave waves that no mesh resolves
 constexpr double least_fewer = 1.1;
+constexpr double spare_in_time = 1.25;  // at most 1.1 of the error was seen to be missing
 constexpr double high_accuracy = 1e-4;  // from here on, without inertia, steps of higher order pay
 constexpr double surest_growth = 4.5;   // of errors: they have maxima between the steps that are compared
 
@@ -37,20 +39,25 @@ double growth_in_space(const MotionSettings& coarser, double order) {
     return coarser.role == Role::other_order ? order : std::pow(coarser.coarser_by, order / 2);
 }
 
-// The number of triangles from which on the energy of the start is as accurate as asked.
+double order_in_space(const Case& c, double smoothness) {
+    return element_order(c) < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
+}
+
+// The number of triangles from which on the energy of the start is as accurate as asked, by a coarser mesh and by a
+// finer one: two of them may agree by chance.
 int triangles_for_start(const Case& c, const Start& start) {
     const int order = element_order(c);
     MotionSettings other{.role = Role::fewer_triangles};
-    StartMesh coarse = start.mesh(fewer_triangles(first_triangles), order);
-    for (int n = first_triangles;; n = static_cast<int>(fewer * n)) {
-        StartMesh mesh = start.mesh(n, order);
-        const Observables o = observe_start(c, mesh), before = observe_start(c, coarse);
+    for (int n = first_triangles;; n = static_cast<int>(least_growth * n)) {
+        const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
+        const Observables o = observe_start(c, mesh);
+        const double energy = free_energy(c, o, mesh.mesh.period),
+                     before = free_energy(c, observe_start(c, coarse), coarse.mesh.period);
         other.coarser_by = std::max(1.0 * mesh.mesh.triangles() / coarse.mesh.triangles(), least_fewer);
-        const double error = std::abs(free_energy(c, o, mesh.mesh.period) - free_energy(c, before, mesh.mesh.period)) /
-                             (growth_in_space(other, smooth_order) - 1);
-        const bool more = later * error > c.accuracy.energy * reference_energy(c, o, mesh.mesh.period);
-        if (!more || fewer * n > most_first_triangles) return n;
-        coarse = std::move(mesh);
+        const double error = later * std::abs(energy - before) / (growth_in_space(other, smooth_order) - 1);
+        const double asked = c.accuracy.energy * reference_energy(c, o, mesh.mesh.period);
+        const bool more = error > asked || error_of_start(c, start, n, energy) > asked;
+        if (!more || least_growth * n > most_first_triangles) return n;
     }
 }
 
@@ -86,22 +93,39 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by) {
             .coarser_by = coarser_by};
 }
 
+bool is_of_high_order(const Case& c) {
+    return entry(time_scheme(c)).most_order > 2;
+}
+
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {
     const double in_time = std::pow(steps_at_once, entry(time_scheme(c)).order);
-    const double order =
-        element_order(c) < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
-    return 1 / (std::min({growth_in_space(coarser, order), in_time, surest_growth}) - 1);
+    return 1 / (std::min({growth_in_space(coarser, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
+}
+
+double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness) {
+    return 1 / (growth_in_space(coarser, order_in_space(c, smoothness)) - 1);
+}
+
+double error_in_time(int order) {
+    return spare_in_time / (std::pow(steps_at_once, order) - 1);
 }
 
 // Where the energies of a pair agree and the balance is off, waves are damped by steps that are too long: the mesh is
-// kept, once.
-MotionSettings finer(const MotionSettings& s, double asked, double error, double defect) {
-    const double excess = spare * std::max(error, defect) / asked;
-    if (error <= asked && s.difference == 0)
-        return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), error, s.pair + 1};
-    const double by = std::clamp(std::sqrt(excess), least_growth, most_growth);
-    return {static_cast<int>(std::ceil(by * s.elements)), s.tolerance / std::clamp(std::pow(excess, 1.5), 3.0, 64.0), 0,
-            s.pair + 1};
+// kept, once. So it is where errors in time are known apart and those in space are small, and the tolerance is where
+// those in time are.
+MotionSettings finer(const MotionSettings& s, double asked, const MotionErrors& errors) {
+    const double excess = spare * std::max(errors.energy, errors.defect) / asked;
+    if (errors.energy <= asked && s.difference == 0)
+        return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), errors.energy, s.pair + 1};
+    double in_space = excess, in_time = std::pow(excess, 1.5);
+    if (errors.in_time) {
+        const double part = part_of_asked * asked, space = (errors.energy - *errors.in_time) / part,
+                     time = *errors.in_time / part;
+        if (space > 1 || time > 1) in_space = space, in_time = std::pow(time, 1.25);
+    }
+    const double by = in_space > 1 ? std::clamp(std::sqrt(in_space), least_growth, most_growth) : 1;
+    return {static_cast<int>(std::ceil(by * s.elements)),
+            s.tolerance / (in_time > 1 ? std::clamp(in_time, 3.0, 64.0) : 1), 0, s.pair + 1};
 }
 
 bool can_be_finer(const MotionSettings& s) {

@@ -1,6 +1,8 @@
 // How fine a run in motion is, and the coarser run that tells its error.
 #pragma once
 
+#include <optional>
+
 #include "common/case/case.hpp"
 #include "surface3d/run/start.hpp"
 
@@ -38,8 +40,23 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
 // have where H is so smooth (MotionMeasures).
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
 
-// Of the next pair, after one whose error and defect of the balance are so large, where less is asked; all absolute.
-MotionSettings finer(const MotionSettings& s, double asked, double error, double defect);
+// Whether steps have so high an order that errors in time grow far more than those in space when several are made at
+// once: the two are then told apart. Errors in space over the difference from the coarser run with the same steps; in
+// time over that of steps of this order from several at once.
+bool is_of_high_order(const Case& c);
+double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness);
+double error_in_time(int order);
+
+// What is known of the errors of a run, absolute: of the energy; the part that is due to time, where it is known apart;
+// of the balance.
+struct MotionErrors {
+    double energy = 0;
+    std::optional<double> in_time;
+    double defect = 0;
+};
+
+// Of the next pair, after one with these errors, where less is asked.
+MotionSettings finer(const MotionSettings& s, double asked, const MotionErrors& errors);
 
 // Whether more triangles are worth a try.
 bool can_be_finer(const MotionSettings& s);

@@ -11,6 +11,7 @@ namespace {
 // Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double relaxes_in = 0.2;  // of the time that the shape needs to change
 // H counts as constant if it varies by less than this, or by less than so many times the difference of two recoveries.
+constexpr double much_finer = 2.25;  // times more triangles: errors of the start fall at least by this
 constexpr double same_everywhere = 1e-9, times_noise = 4;
 
 // The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.
@@ -52,6 +53,17 @@ Observables observe_start(const Case& c, const StartMesh& start) {
 
 double free_energy(const Case& c, const Observables& o, double period) {
     return o.energy + SurfaceLaw(motion_law(c.model)).potential(begin_time(c), {o.area, o.volume, period});
+}
+
+double error_of_start(const Case& c, const Start& start, int elements, double energy) {
+    if (!start.resizable()) return 0;
+    try {
+        const StartMesh finer = start.mesh(static_cast<int>(much_finer * elements), element_order(c));
+        const double change = free_energy(c, observe_start(c, finer), finer.mesh.period) - energy;
+        return std::abs(change) * much_finer / (much_finer - 1);
+    } catch (const SolveError&) {
+        return 0;
+    }
 }
 
 double reference_energy(const Case& c, const Observables& o, double period) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/case/case.hpp"
@@ -31,6 +32,8 @@ public:
     const std::vector<std::string>& notes() const { return notes_; }  // what was changed on the way, whole sentences
 
     using Make = std::function<StartMesh(int triangles, int order)>;
+    // Meshes that are made elsewhere.
+    Start(Make make, bool resizable) : make_(std::move(make)), resizable_(resizable) {}
 
 private:
     Make make_;
