@@ -21,8 +21,9 @@ constexpr double pilot_limit = 6;         // seconds of each pilot run
 constexpr double limit = 15;              // of all of them, and their starts
 constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number
 constexpr double cost_power = 1.1;        // of the number of triangles: the cost of a step
-constexpr double with_coarser_run = 1.2;  // runs, the coarser one that tells the error included
-constexpr double threads_power = 0.6;     // two of them are worth 1.5
+// Runs, the coarser ones that tell the error included: one, or two where orders are high.
+constexpr double with_coarser_run = 1.2, with_coarser_runs = 1.6;
+constexpr double threads_power = 0.6;                         // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
 constexpr double usual_steps = 100, usual_step = 0.5e-3;      // at the loosest tolerance; seconds for a triangle
 
@@ -35,6 +36,11 @@ double quiet_seconds() {
 double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
     const double width = MotionUnknowns(mesh, motion_law(c.model), c.energy).width();
     return bytes_at_rest + bytes_per_entry * triangles * width * width;
+}
+
+double runs_at_once(const Case& c) {
+    if (!c.accuracy.estimate) return 1;
+    return is_of_high_order(c) ? with_coarser_runs : with_coarser_run;
 }
 
 double steps_by_tolerance(const Case& c, double from, double to) {
@@ -96,7 +102,7 @@ Forecast forecast_motion(const Case& c, const Start& start) {
             if (pilot.useful) {
                 out.steps = pilot.steps * (c.surface.step ? 1 : steps_by_tolerance(c, tolerance, wanted.tolerance));
                 const double per_step = pilot.seconds_per_step * std::pow(1.0 * triangles / own, cost_power);
-                out.seconds = with_coarser_run * *out.steps * per_step;
+                out.seconds = runs_at_once(c) * *out.steps * per_step;
             }
             if (own == triangles) break;
         }
