@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Every command of docs/tutorials/ runs and prints what the page shows.
+"""Every command of docs/tutorials/ and of pages like it runs and prints what the page shows.
 
     tutorials_test.py TUBULE TOP [PAGE...]              compares; without a page all of them
     tutorials_test.py TUBULE TOP --update [PAGE...]     writes what the commands print, and draw, into the pages
 
-A block ```console has commands after "$ " and what they print; a line "..." there stands for any lines. The file of
+Pages are named relative to docs/tutorials/, without their ending. A block ```console has commands after "$ " and what they print; a line "..." there stands for any lines. The file of
 "Save this as `NAME`:" is written before the commands that follow it; what `sed -i` and others change stays changed. Numbers
 agree within one unit of their last digit, long ones within 1e-5 of themselves. Not compared: times in seconds, sizes in MB, and when something came to rest.
 Counts of steps, points and the like agree within a tenth, and errors (at most two digits with an exponent) within a factor
