@@ -4,17 +4,21 @@
     plot_test.py [TUBULE]    with the program, its subcommand `plot` is tested too
 """
 
+import os
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 import xml.etree.ElementTree
 from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
+from PIL import Image, ImageSequence
 
 PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 sys.path[:0] = [str(PLOT), str(Path(__file__).resolve().parents[1] / "support")]
@@ -22,6 +26,7 @@ import colours  # noqa: E402
 import curves  # noqa: E402
 import energy  # noqa: E402
 import labels  # noqa: E402
+import movie  # noqa: E402
 import results  # noqa: E402
 import scripts  # noqa: E402
 import tubes  # noqa: E402
@@ -449,6 +454,60 @@ class Curves(InFolder):
         found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
         expected = ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"]
         self.assertEqual(found, expected)
+
+
+class Films(InFolder):
+    def film(self, name, *arguments, **options):
+        done = self.plot(*arguments, "--movie", self.folder / name, **options)
+        self.assertEqual((done.returncode, done.stdout), (0, f"{self.folder / name}\n"), done.stderr)
+        return self.folder / name
+
+    def frames(self, path):
+        with Image.open(path) as film:
+            return [np.asarray(frame.convert("RGB"), int) for frame in ImageSequence.Iterator(film)]
+
+    def test_shape_and_point_on_the_energy_move_and_nothing_else(self):
+        path = write(self.folder / "a.hdf", times=(0, 0.5, 1), profile=lambda t: tube(t, 0.3 * (1 - t)))
+        first, second, last = self.frames(self.film("a.gif", path))
+        self.assertEqual(first.shape, (450, 800, 3))
+        changed = (np.abs(first - last).max(axis=2) > 60).any(axis=0).nonzero()[0]
+        self.assertTrue((changed < 400).any() and (changed > 528).any())  # shape; point
+        np.testing.assert_array_equal(abs(first - last)[390:] > 60, False)  # colour bar
+
+        def reds(frame):  # the point is red: matplotlib's C3
+            return (np.abs(frame - [214, 39, 40]).max(axis=2) < 40).nonzero()[1].mean()
+
+        middle = (reds(first) + reds(last)) / 2
+        self.assertAlmostEqual(reds(second), middle, delta=6)  # rows are 1/39 of the time apart
+        self.assertFalse(list(self.folder.glob("*.part*")))
+
+    def test_mp4(self):
+        path = write(self.folder / "a.hdf", times=(0, 1))
+        with unittest.mock.patch.dict(os.environ, PATH="/nowhere"):
+            self.refused("install the package ffmpeg", path, "--movie", self.folder / "a.mp4", status=4)
+        if shutil.which("ffmpeg"):
+            self.assertEqual(self.film("a.mp4", path).read_bytes()[4:8], b"ftyp")
+
+    def test_profile_becomes_a_surface(self):
+        for profile, area in ((ball(0, 201), 4 * np.pi), (tube(0, 0.0), 4 * np.pi)):
+            frame = results.Frame(0.0, *(profile[name] for name in ("z", "r", "H", "K")))
+            points, normal, values, closed = movie.revolved(frame, frame.H)
+            a, b, c = (points[:, i] for i in range(3))
+            twice = np.cross(b - a, c - a)
+            self.assertAlmostEqual(np.linalg.norm(twice, axis=1).sum() / 2 / area, 1, delta=3e-3)
+            solid = np.linalg.norm(twice, axis=1) > 1e-9
+            self.assertTrue((np.einsum("ij,ij->i", twice, normal.mean(axis=1))[solid] > 0).all())  # seen from outside
+            self.assertEqual(closed, profile["r"][0] < 1e-9)
+            np.testing.assert_allclose(values, frame.H[0], atol=1e-6)
+
+    def test_refusals(self):
+        one, two = write(self.folder / "one.hdf", times=(0,)), write(self.folder / "two.hdf")
+        self.refused("a film needs two or more", one, "--movie", self.folder / "a.gif")
+        self.refused("one of .mp4, .gif", two, "--movie", self.folder / "a.avi")
+        self.refused("does not exist", two, "--movie", self.folder / "no/a.gif")
+        self.refused("shows one result", one, two, "--movie", self.folder / "a.gif")
+        self.refused("not all frames have p", two, "--movie", self.folder / "a.gif", "--colour", "p")
+        self.refused("one --colour only", two, "--movie", self.folder / "a.gif", "--kind", "energy")
 
 
 class Refusals(InFolder):

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The pages of `tubule view`: what is packed into them, and, in a browser without a screen, what they draw.
 
-    view_test.py TUBULE [--browser]    with a browser, which must be installed
+    view_test.py TUBULE [--browser [--screenshots FOLDER]]    with a browser, which must be installed
 """
 
 import base64
@@ -23,11 +23,14 @@ sys.path.insert(0, str(ROOT / "tools/plot"))
 import view  # noqa: E402
 
 TUBULE = sys.argv[1]
+SCREENSHOTS = Path(sys.argv[sys.argv.index("--screenshots") + 1]) if "--screenshots" in sys.argv else None
 BROWSERS = ("chromium-headless-shell", "chromium")
 TUBE = ["run", "cases/figure_k42_006.toml", "--set", "accuracy.energy=1e-3"]
 CELL = ["run", "cases/capsule_stokes.toml"]
 BRANCH = ["equilibrium", "cases/branch_prolate.toml", "--set", "equilibrium.branch.to=0.85"]
 SURFACE = ["run", "cases/surface_rotating_tube.toml", "--set", "time.end=0.05", "--set", "accuracy.estimate=false"]
+WAVES = ["run", "cases/surface_tube_modes.toml", "--set", "time.end=0.05", "--set", "time.output=[0.005,0.02]", "--set",
+         "accuracy.estimate=false", "--set", "accuracy.energy=0.05", "--set", "discretisation.elements=120"]  # fmt: skip
 SCAN = ["scan", "cases/figure_k42_006.toml", "--set", "accuracy.energy=1e-3", "--over", "energy.k42=0,0.1",
         "--over", "shape.mode.0.amplitude=0.1,0.2,0.45"]  # fmt: skip
 
@@ -134,32 +137,34 @@ class Browser(Folder):
     """What the pages draw: the page says what it has drawn, the picture has colours, the console has no error."""
 
     @staticmethod
-    def opened(page, *arguments):
+    def opened(page, place, *arguments):
         browser = next(path for name in BROWSERS if (path := shutil.which(name)))
         command = [browser, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
                    "--enable-unsafe-swiftshader", "--window-size=1200,700", "--enable-logging=stderr",
-                   "--virtual-time-budget=3000", *arguments, page.as_uri()]  # fmt: skip
+                   "--virtual-time-budget=3000", *arguments, page.as_uri() + place]  # fmt: skip
         return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
-    def drawn(self, page):
+    def drawn(self, page, name, place=""):
         """What the page says that it has drawn, and the part of its left half that is not white or grey."""
-        done = self.opened(page, "--dump-dom")
+        done = self.opened(page, place, "--dump-dom")
         self.assertNotIn("CONSOLE", done.stderr)
         picture = page.with_suffix(".png")
-        self.opened(page, f"--screenshot={picture}")
+        self.opened(page, place, f"--screenshot={picture}")
         pixels = matplotlib.image.imread(picture)[:, :700, :3]
+        if SCREENSHOTS:
+            shutil.copyfile(picture, SCREENSHOTS / f"view_{name}.png")
         return re.search(r'data-drawn="([^"]*)"', done.stdout)[1], float((np.ptp(pixels, axis=2) > 0.1).mean())
 
     def test_shapes(self):
-        for command in (TUBE, CELL, BRANCH, SURFACE):
+        for name, command, begin in (("tube", TUBE, 2), ("cell", CELL, 2), ("branch", BRANCH, ""), ("surface", WAVES, 1)):
             page = made(self.folder, command)[1]
             frames = len(data_of(page)["frames"])
-            words, part = self.drawn(page)
-            self.assertRegex(words, rf"^frame {frames} of {frames}, \d{{4,}} triangles, H$")
+            words, part = self.drawn(page, name, f"#{begin}")
+            self.assertRegex(words, rf"^frame {begin or frames} of {frames}, \d{{4,}} triangles, H$")
             self.assertGreater(part, 0.05, command)
 
     def test_map(self):
-        words, part = self.drawn(made(self.folder, SCAN)[1])
+        words, part = self.drawn(made(self.folder, SCAN)[1], "scan")
         self.assertEqual(words, "map of 2 x 3, outcome")
         self.assertGreater(part, 0.1)
 

@@ -38,7 +38,8 @@ struct PlotOptions {
     SeriesOptions series;
     std::string quantity;  // of scans
     std::vector<double> times;
-    std::string kind = "all", plane = "z=0", scale = "run", confirmed;
+    std::string kind = "all", plane = "z=0", scale = "run", confirmed, movie;
+    double fps = 10;  // frames of a film per second
 };
 
 bool is_plane(const std::string& text) {
@@ -64,6 +65,8 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     if (options.series.from) arguments.push_back(fmt::format("--from={}", *options.series.from));
     if (options.series.to) arguments.push_back(fmt::format("--to={}", *options.series.to));
     if (options.series.logy) arguments.push_back("--logy");
+    if (!options.movie.empty())
+        arguments.insert(arguments.end(), {"--movie=" + options.movie, fmt::format("--fps={}", options.fps)});
     if (!options.confirmed.empty()) arguments.push_back("--confirmed=" + options.confirmed);
     for (const std::string& label : options.labels) arguments.push_back("--label=" + label);
     for_each_bending_term([&](std::size_t, const auto& term) {
@@ -113,8 +116,28 @@ void add_series_options(CLI::App& command, PlotOptions& options) {
     command.add_option("--to", options.series.to, "with --series: draw up to this value of --x")
         ->check(refuse_infinite);
     command.add_flag("--logy", options.series.logy, "with --series: logarithmic axis");
+}
+
+void add_scan_options(CLI::App& command, PlotOptions& options) {
+    command.add_option(
+        "--quantity", options.quantity,
+        "of a scan: what its map shows: outcome (default), energy, r_min, volume, steps ... (all columns "
+        "of show --csv)");
+    command
+        .add_option("--slice", options.slices,
+                    "of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
+        ->allow_extra_args(false);
     command.add_option("--confirmed", options.confirmed,
                        "of a scan: the output of `tubule confirm --json`, whose points are marked on the map");
+}
+
+void add_movie_options(CLI::App& command, PlotOptions& options) {
+    command.add_option("--movie", options.movie,
+                       "film to write instead, .mp4 (needs ffmpeg) or .gif: the shape of one result, frame by frame, "
+                       "coloured by H or the given --colour, and its energy");
+    command.add_option("--fps", options.fps, "with --movie: frames per second")
+        ->check(CLI::Range(0.1, 100.0))
+        ->capture_default_str();
 }
 
 }  // namespace
@@ -158,18 +181,13 @@ void add_plot(CLI::App& app, int& exit_status) {
         ->check(
             [](const std::string& text) { return is_plane(text) ? "" : "is not x, y or z = number, such as y=0.5"; })
         ->capture_default_str();
-    command->add_option(
-        "--quantity", options->quantity,
-        "of a scan: what its map shows: outcome (default), energy, r_min, volume, steps ... (all columns "
-        "of show --csv)");
-    command
-        ->add_option("--slice", options->slices,
-                     "of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
-        ->allow_extra_args(false);
     add_series_options(*command, *options);
+    add_scan_options(*command, *options);
+    add_movie_options(*command, *options);
     end_help(*command,
              {"tubule plot figure.hdf -o figure.svg",
-              "tubule plot k42.hdf --quantity energy --slice shape.radius=1 -o energy.png"},
+              "tubule plot k42.hdf --quantity energy --slice shape.radius=1 -o energy.png",
+              "tubule plot figure.hdf --movie figure.gif"},
              {{0}, {2}, {4, "the picture could not be drawn"}}, {"pictures"});
     command->callback([options, &exit_status] { exit_status = plot(*options); });
 }

@@ -10,6 +10,7 @@ from operator import attrgetter
 import command_line
 
 command_line.require_libraries("tubule plot")
+import movie  # noqa: E402
 import scan  # noqa: E402
 import style  # noqa: E402
 from balance import BalancePanel, has_balance  # noqa: E402
@@ -50,6 +51,8 @@ def arguments():
     parser.add_argument("--from", type=float, dest="low", help="from this value of it")
     parser.add_argument("--to", type=float, dest="high", help="up to this one")
     parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
+    parser.add_argument("--movie", default="", help="film to write, .mp4 or .gif, and nothing else")
+    parser.add_argument("--fps", type=float, default=movie.DEFAULT_FPS, help="of a film: frames per second, 0.1 to 100")
     parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
     parser.add_argument("--quantity", default="", help="of a scan: what its map shows")
     parser.add_argument("--slice", action="append", default=[], help="of a scan: KEY=VALUE of an axis that is cut")
@@ -169,6 +172,21 @@ def read_arguments(options):
     options.terms = dict(term.split("=", 1) for term in options.term)
 
 
+def draw_movie(options):
+    paths = options.results
+    if len(paths) > 1 or scan.is_scan(paths[0]):
+        raise BadInput(f"{paths[0]}: --movie shows one result, and no scan")
+    if options.series or options.kind != "all" or options.output or len(options.colour) > 1:
+        raise BadInput("--movie goes with --times, --label, --fps and one --colour only")
+    result = read_result(paths[0])
+    frames = result.surfaces or result.frames
+    if options.times:
+        columns = choose_columns([result], options.times, attrgetter("surfaces" if result.surfaces else "frames"))
+        frames = [column.cells[0] for column in columns if column.cells[0]]
+    title = as_label(options.label[0]) if options.label else result.title
+    movie.draw(result, frames, options.movie, (options.colour or ["H"])[0], title, options.fps)
+
+
 def draw_any(options, outputs):
     """A scan, or runs."""
     if not any(scan.is_scan(path) for path in options.results):
@@ -191,6 +209,19 @@ def main():
     except ValueError as error:
         command_line.say(f"tubule plot: {error}")
         return command_line.EXIT_BAD_INPUT
+    if options.movie:
+        try:
+            draw_movie(options)
+        except BadInput as error:
+            command_line.say(error)
+            return command_line.EXIT_BAD_INPUT
+        except movie.Unavailable as error:
+            command_line.say(error)
+            return command_line.EXIT_UNAVAILABLE
+        except KeyboardInterrupt:
+            return 130
+        command_line.say(options.movie, sys.stdout)
+        return 0
     return command_line.run(lambda pictures: draw_any(options, pictures), outputs, str)
 
 

@@ -23,7 +23,10 @@ function unpacked(text, low, high) {
   return Float32Array.from(new Uint16Array(bytes(text)), x => low + (high - low) * x / steps);
 }
 
-const short = x => x === null || x === undefined ? "-" : String(Number(x.toPrecision(6)));
+function short(x) {
+  if (x === null || x === undefined) return "-";
+  return x !== 0 && Math.abs(x) < 1e-3 ? x.toExponential(2) : String(Number(x.toPrecision(6)));
+}
 
 // A canvas as sharp as the screen, its context in CSS pixels.
 function context(canvas) {
@@ -211,7 +214,7 @@ class Plot {
     for (const y of [y0, (y0 + y1) / 2, y1]) c.fillText(short(y), this.left - 4, py(y) + 4);
     c.textAlign = "center";
     for (const x of [x0, (x0 + x1) / 2, x1]) c.fillText(short(this.logarithmic ? 10 ** x : x), Math.min(px(x), width - 28), height - 14);
-    c.fillText(data.along_words + (this.logarithmic ? " (logarithmic)" : ""), (this.left + this.right) / 2, height - 1);
+    c.fillText(data.along_words + (this.logarithmic ? " (logarithmic)" : ""), (this.left + this.right) / 2, height - 3);
     c.strokeStyle = "#1f5fa8", c.lineWidth = 1.5, c.beginPath();
     xs.forEach((x, i) => i ? c.lineTo(px(x), py(ys[i])) : c.moveTo(px(x), py(ys[i])));
     c.stroke();
@@ -258,7 +261,9 @@ function show_shapes() {
   const side = at("side"), scale = element("div", {id: "scale"}, at("shape")), scene = new Scene(at("shape"));
   at("note").textContent = `Positions are rounded to ${short(data.rounding)}. Drag to turn, scroll to zoom, click the plot to go there.`;
   const controls = element("div", {}, side), words = element("div", {id: "now"}, side);
-  const slider = element("input", {type: "range", id: "time", min: 0, max: data.frames.length - 1, value: data.frames.length - 1, step: 1}, controls);
+  const slider = element("input", {type: "range", id: "time", min: 0, max: data.frames.length - 1, step: 1}, controls);
+  const wanted = Number(location.hash.slice(1)) || data.frames.length;  // page.html#3 begins with frame 3
+  slider.value = Math.min(wanted, data.frames.length) - 1;
   const play = element("button", {textContent: "play"}, controls);
   const update = () => draw();
   const colour = choice(element("div", {}, side), "colour", data.fields.map(f => [f.name, f.words]), update);
