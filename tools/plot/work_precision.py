@@ -28,8 +28,9 @@ def read_table(path):
 def draw(path, outputs):
     """Filled: errors; hollow: the estimates of the program; dotted lines: requested accuracies."""
     lines = read_table(path)
-    figure = Figure(figsize=(style.WIDTH * 0.68, 3.2))
-    axes = figure.add_axes([0.135, 0.125, 0.73, 0.845])
+    figure = Figure(figsize=(style.WIDTH, 4.2))
+    axes = figure.add_axes([0.09, 0.215, 0.8, 0.73])
+    axes.set_title("The paper's tube in gradient flow, k42 = 0.12", loc="left")
     reference = np.array(PROTOTYPE)
     handles = [Line2D([], [], color="0.55", linestyle="--", marker="D", markersize=4, label="prototype, tuned by hand")]
     axes.loglog(reference[:, 1], reference[:, 0], color="0.55", linestyle="--", marker="D", markersize=4, zorder=1)
@@ -54,7 +55,7 @@ def draw(path, outputs):
         axes.annotate(text, (1, asked), (4, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
                       va="center", fontsize=6.5, color="0.35")
     axes.margins(x=0.08, y=0.1)
-    axes.legend(handles=handles, loc="best")
+    figure.legend(handles=handles, loc="lower center", ncol=4)
     style.save(figure, outputs)
 
 
