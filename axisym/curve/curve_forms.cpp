@@ -249,14 +249,25 @@ double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const
 
 Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
     const ProfileSpace& splines = space_.splines();
-    const int w = splines.width();
+    const int w = splines.width(), rise = space_.shape_size();
     Eigen::SparseMatrix<double> out = pattern_;
+    const auto add_rise = [&](int i, double value) {  // of a free period, whose displacement is s e_z
+        out.coeffRef(i, rise) += value;
+        if (i != rise) out.coeffRef(rise, i) += value;
+    };
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
             const Local at(space_, e, g, x.data());
             const Pack dS = (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
             const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+            if (space_.free_period()) {
+                const Pack s = dS * load(basis.z);
+                add_rise(rise, stdx::reduce(s * load(basis.z)));
+                for (int a = 0; a < w; ++a)
+                    add_rise(space_.r().size() + space_.z().dofs(e)[a],
+                             space_.z().signs(e)[a] * stdx::reduce(s * load(basis.by_point[0][a])));
+            }
             for (int b = 0; b < w; ++b)
                 for (int a = 0; a < w; ++a) {
                     const double value = stdx::reduce(dS * load(basis.by_point[0][a]) * load(basis.by_point[0][b]));

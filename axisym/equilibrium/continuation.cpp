@@ -261,6 +261,7 @@ private:
         e.sigma = place.w[n], e.lambda = place.w[n + 1];
         std::vector<double> defect;
         e.observed = system_->forms().observe(e.x, &defect);
+        e.length = e.space->length(e.x.data());
         e.reference_energy = system_->forms().reference_energy(e.x);
         e.estimated_error = lost(defect) / e.reference_energy;
         e.stop = Stop::finished;
@@ -291,8 +292,9 @@ private:
         std::vector<double> breaks = adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(),
                                                     settings_.shapes.max_elements + 1);
         if (static_cast<int>(breaks.size()) - 1 > settings_.shapes.max_elements) return false;
-        const auto finer = std::make_shared<CurveSpace>(system_->space().topology(), breaks, splines.degree(),
-                                                        splines.smoothness(), system_->space().length());
+        const auto finer =
+            std::make_shared<CurveSpace>(system_->space().topology(), breaks, splines.degree(), splines.smoothness(),
+                                         system_->space().length(), system_->space().free_period());
         const int n = system_->space().size(), m = finer->size();
         const Eigen::VectorXd y = finer->prolong(system_->space(), x);
         const Eigen::VectorXd ahead = finer->prolong(system_->space(), x + place_.tangent.head(n));

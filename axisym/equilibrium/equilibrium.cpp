@@ -44,6 +44,10 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
 
 void StationarySystem::set_problem(const StationaryProblem& problem) {
     const Constraints& c = problem.constraints;
+    if (problem.free_period != space_->free_period() || (!problem.free_period && problem.loads.force != 0))
+        throw std::invalid_argument("a force needs a free period, and a space with one");
+    if (problem.free_period && !c.area && !c.volume)
+        throw std::invalid_argument("a free period needs a given area or a given volume");
     if ((c.area && problem.loads.tension != 0) || (c.volume && problem.loads.pressure != 0) ||
         (c.reduced_volume && (problem.loads.tension != 0 || problem.loads.pressure != 0)))
         throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
@@ -60,7 +64,7 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
         if (v && *v > 1 + rounding)
             throw std::invalid_argument(
                 fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
-    } else if (c.area && c.volume) {
+    } else if (c.area && c.volume && !problem.free_period) {
         const double most = largest_volume(*c.area, space_->length());
         if (*c.volume > most)
             throw std::invalid_argument(
@@ -83,6 +87,7 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
     Eigen::VectorXd F = Eigen::VectorXd::Zero(n + 3);
     F.head(n) = u[n + 2] * place_;
     forms_.add_gradient(lagrangian(u), x.data(), F.data());
+    if (problem_.free_period) F[n - 1] -= problem_.loads.force * space_->images();
     if (c.reduced_volume) {
         F[n] = 2 * u[n] * o.area + 3 * u[n + 1] * o.volume;  // no change with size
         F[n + 1] = o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5);
@@ -139,7 +144,7 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const Constraints& c = problem_.constraints;
     const CurveObservation o = forms_.observe(u.head(space_->size()));
-    double value = o.energy + problem_.loads.energy(o.area, o.volume, 0) + gauge_ * o.gauge;
+    double value = o.energy + problem_.loads.energy(o.area, o.volume, length(u)) + gauge_ * o.gauge;
     if (c.area) value += u[sigma()] * (o.area - *c.area);
     if (c.volume) value += u[lambda()] * (o.volume - *c.volume);
     if (c.reduced_volume) value += u[lambda()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
@@ -316,8 +321,10 @@ private:
 
 constexpr int coarsest = 8;  // elements of a whole cell or period
 
-std::shared_ptr<const CurveSpace> make_space(Topology topology, double length, std::vector<double> breaks, int degree) {
-    return std::make_shared<CurveSpace>(topology, std::move(breaks), degree, degree - 1, length);
+// The topology and the period of another space.
+std::shared_ptr<const CurveSpace> space_like(const CurveSpace& other, std::vector<double> breaks, int degree) {
+    return std::make_shared<CurveSpace>(other.topology(), std::move(breaks), degree, degree - 1, other.length(),
+                                        other.free_period());
 }
 
 // Scales a closed curve to the required area (or volume, if that alone is held).
@@ -448,16 +455,18 @@ std::string why_none(const Constraints& goal, const CurveObservation& first, con
     return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
-double free_energy(const StationaryProblem& problem, const CurveObservation& o) {
-    return o.energy + problem.loads.energy(o.area, o.volume, 0);
+double free_energy(const StationaryProblem& problem, const CurveObservation& o, double length) {
+    return o.energy + problem.loads.energy(o.area, o.volume, length);
 }
 
 // E_ref, theory.md (11.1).
 double reference_energy_of(const StationaryProblem& problem, const CurveForms& forms, const Eigen::VectorXd& x) {
     const CurveObservation o = forms.observe(x);
     const Loads& loads = problem.loads;
-    return std::max(std::abs(free_energy(problem, o)),
-                    forms.reference_energy(x) + std::abs(loads.tension) * o.area + std::abs(loads.pressure * o.volume));
+    const double length = forms.space().length(x.data());
+    return std::max(std::abs(free_energy(problem, o, length)),
+                    forms.reference_energy(x) + std::abs(loads.tension) * o.area + std::abs(loads.pressure * o.volume) +
+                        std::abs(loads.force) * length);
 }
 
 // Newton on meshes that follow the shape found on the one before, until their energies agree.
@@ -485,8 +494,9 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         std::vector<double> defect;
         out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
         out.observed = system.forms().observe(x, &defect);
+        out.length = space->length(x.data());
         if (!found) compare.restart();
-        const double error = found ? compare(free_energy(problem, out.observed), elements, settings.degree)
+        const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, settings.degree)
                                    : std::numeric_limits<double>::infinity();
         // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
@@ -501,10 +511,9 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         if (elements >= settings.max_elements)
             return end(Stop::resolution_lost, fmt::format("with {} elements, the error of the energy is still {:.1e}",
                                                           elements, out.estimated_error));
-        const auto finer =
-            make_space(space->topology(), space->length(),
-                       next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements),
-                       settings.degree);
+        const auto finer = space_like(
+            *space, next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements),
+            settings.degree);
         Eigen::VectorXd next(finer->size() + 3);
         next << finer->prolong(*space, x), u.tail(3);
         space = finer, u = next;
@@ -520,6 +529,12 @@ Eigen::VectorXd unknowns(const Equilibrium& shape) {
     return u;
 }
 
+double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
+    if (problem.free_period || shape.length == 0) return problem.loads.force;
+    const CurveForms forms(*shape.space, problem.bending);
+    return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda}, shape.x) / shape.length;
+}
+
 int negative_directions(const StationaryProblem& problem, const Equilibrium& shape) {
     const StationarySystem system(shape.space, problem, shape.gauge);
     return static_cast<int>((system.variation(unknowns(shape)).eigenvalues.array() < 0).count());
@@ -531,8 +546,9 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& s
         throw std::invalid_argument(
             "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
     const int images = start.topology == Topology::cell ? 1 : 2;
-    const auto space = make_space(start.topology, start.length,
-                                  equal_breaks(std::max(settings.elements, coarsest) / images), settings.degree);
+    const auto space =
+        std::make_shared<CurveSpace>(start.topology, equal_breaks(std::max(settings.elements, coarsest) / images),
+                                     settings.degree, settings.degree - 1, start.length, problem.free_period);
     const CurveForms forms(*space, problem.bending);
     Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + 3), x = fit(*space, start);
     scale_to(forms, problem.constraints, x);
@@ -546,8 +562,7 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     // Fewer elements first, as the mesh that confirms the first one has more: a chain of shapes keeps its size.
     const CurveSpace& old = *nearby.space;
     const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
-    const auto coarser =
-        make_space(old.topology(), old.length(), regraded(old.splines().breaks(), elements), settings.degree);
+    const auto coarser = space_like(old, regraded(old.splines().breaks(), elements), settings.degree);
     Eigen::VectorXd u(coarser->size() + 3);
     u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.lambda, 0;
     const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);

@@ -1,5 +1,5 @@
-// Stationary shapes of the bending energy, at given area and volume or at a given tension and pressure of what is free:
-// E + sigma A + lambda V stationary.
+// Stationary shapes of the bending energy, at given area, volume and period, or at a given tension, pressure and axial
+// force of what is free: E + sigma A + lambda V - force L stationary.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +27,8 @@ struct Constraints {
 struct StationaryProblem {
     Bending bending;
     Constraints constraints;
-    Loads loads{};  // the tension of a free area, the pressure of a free volume; not with a reduced volume
+    Loads loads{};  // tension of a free area, pressure of a free volume, force of a free period; see set_problem
+    bool free_period = false;  // of half a tube
 };
 
 // Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.
@@ -35,8 +36,9 @@ struct Variation {
     Eigen::VectorXd eigenvalues, lowest;
 };
 
-// The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve, then sigma, lambda
-// and the force that holds a whole cell in place along the axis (zero in the end). `gauge` is the weight of the gauge
+// The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve (the last of them the
+// rise of a free period), then sigma, lambda and the force that holds a whole cell in place along the axis (zero in the
+// end). `gauge` is the weight of the gauge
 // energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
@@ -46,6 +48,8 @@ public:
     const std::shared_ptr<const CurveSpace>& space_handle() const { return space_; }
     const CurveForms& forms() const { return forms_; }
     const StationaryProblem& problem() const { return problem_; }
+    // Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
+    // values that no shape has, and where the period of the space is not free as the problem says.
     void set_problem(const StationaryProblem& problem);
     double gauge() const { return gauge_; }
     int size() const { return space_->size() + 3; }
@@ -63,6 +67,7 @@ public:
 
 private:
     Weights lagrangian(const Eigen::VectorXd& u) const;
+    double length(const Eigen::VectorXd& x) const { return space_->length(x.data()); }
 
     std::shared_ptr<const CurveSpace> space_;
     StationaryProblem problem_;
@@ -86,6 +91,7 @@ struct Equilibrium {
     double sigma = 0, lambda = 0;
     double gauge = 0;
     CurveObservation observed;
+    double length = 0;                                 // of the period, 0 of a cell
     double reference_energy = 0, estimated_error = 0;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
     // finished; or why this is not an equilibrium: solver_failed, resolution_lost, self_intersection.
@@ -103,6 +109,9 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
 
 // u of a StationarySystem on its mesh.
 Eigen::VectorXd unknowns(const Equilibrium& shape);
+
+// The axial force of a tube at rest, theory.md (3.19): given, or what holds its period.
+double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 
 // Axisymmetric displacements, up to the constraints, that lower the energy: 0 at a minimum.
 int negative_directions(const StationaryProblem& problem, const Equilibrium& shape);

@@ -49,6 +49,8 @@ SetParameter setter(int parameter) {
             return [](StationaryProblem& p, double value) { p.loads.tension = value; };
         case vary_pressure:
             return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
+        case vary_force:
+            return [](StationaryProblem& p, double value) { p.loads.force = value; };
         default:
             return [](StationaryProblem& p, double value) {
                 if (p.constraints.area)
@@ -73,6 +75,8 @@ double start_of(int parameter, const StationaryProblem& p) {
             return p.loads.tension;
         case vary_pressure:
             return p.loads.pressure;
+        case vary_force:
+            return p.loads.force;
         default:
             return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
     }
@@ -90,6 +94,7 @@ Task task_of(const Case& c) {
     const auto [area, volume] = area_and_volume(task.start);
     task.problem.bending = c.energy;
     task.problem.loads = loads_at(motion_law(c.model), 0);
+    task.problem.free_period = c.model.free_period;
     const Held is_held = held_of(c);
     Constraints& held = task.problem.constraints;
     if (is_held == Held::area_and_volume || is_held == Held::area) held.area = e.area.value_or(area);
@@ -113,7 +118,8 @@ Task task_of(const Case& c) {
             branch.output.push_back(i < steps ? branch.from + i * std::copysign(*b.step, way) : branch.to);
     }
     try {  // what contradicts itself is said before anything is computed
-        StationarySystem(std::make_shared<CurveSpace>(task.start.topology, equal_breaks(4), 3, 2, task.start.length),
+        StationarySystem(std::make_shared<CurveSpace>(task.start.topology, equal_breaks(4), 3, 2, task.start.length,
+                                                      task.problem.free_period),
                          task.problem, 1);
     } catch (const std::invalid_argument& error) {
         const char* key = e.reduced_volume ? ".reduced_volume" : e.volume ? ".volume" : e.area ? ".area" : "";
@@ -142,14 +148,21 @@ int elements_of(const Equilibrium& e) {
 struct ShapeRow {
     int number;
     const BranchPoint& point;
-    const Loads& loads;
+    const StationaryProblem& problem;
     const CurveObservation& o;
     const ShapeMeasures& measures;
     const std::vector<ModeRates>& modes;
     double distance_to_start, wall_seconds;
 };
 
-SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
+// The first mode whose growth is found: with a free period, axisymmetric displacements change the period, too, and
+// negative_directions alone tells about them.
+int first_mode(const Case& c) {
+    return c.model.free_period ? 1 : 0;
+}
+
+SeriesTable<ShapeRow> shape_series(const Case& c) {
+    const EquilibriumChoices& choices = *c.equilibrium;
     SeriesTable<ShapeRow> table;
     table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
     if (choices.branch.parameter)
@@ -158,13 +171,18 @@ SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", energy_term_numbers(),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    table.add({{"free_energy", [](const ShapeRow& r) { return r.o.energy + r.loads.energy(r.o.area, r.o.volume, 0); }},
+    table.add({{"free_energy",
+                [](const ShapeRow& r) {
+                    return r.o.energy + r.problem.loads.energy(r.o.area, r.o.volume, r.point.shape.length);
+                }},
                {"area", [](const ShapeRow& r) { return r.o.area; }},
                {"volume", [](const ShapeRow& r) { return r.o.volume; }},
                {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
                {"tension", [](const ShapeRow& r) { return r.point.shape.sigma; }},
-               {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }},
-               {"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
+               {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }}});
+    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape))
+        table.add({{"force", [](const ShapeRow& r) { return axial_force(r.problem, r.point.shape); }}});
+    table.add({{"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
                {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
                {"height", [](const ShapeRow& r) { return r.measures.height; }},
                {"r_middle", [](const ShapeRow& r) { return r.measures.r_middle; }},
@@ -172,7 +190,7 @@ SeriesTable<ShapeRow> shape_series(const EquilibriumChoices& choices) {
                {"pole_curvature", [](const ShapeRow& r) { return r.measures.pole_curvature; }},
                {"distance_to_start", [](const ShapeRow& r) { return r.distance_to_start; }}});
     std::vector<std::string> waves;
-    for (int m = 0; m <= choices.modes.value_or(-1); ++m) waves.push_back(std::to_string(m));
+    for (int m = first_mode(c); m <= choices.modes.value_or(-1); ++m) waves.push_back(std::to_string(m));
     table.add_family("growth_<m>", waves, [](const ShapeRow& r, std::size_t m) {
         return r.modes[m].rates.empty() ? 0 : r.modes[m].rates[0];
     });
@@ -189,7 +207,7 @@ public:
         : c_(c),
           task_(task),
           observer_(observer),
-          series_(shape_series(*c.equilibrium)),
+          series_(shape_series(c)),
           started_(std::chrono::steady_clock::now()) {}
 
     void operator()(const BranchPoint& point) {
@@ -197,8 +215,11 @@ public:
         StationaryProblem problem = task_.problem;
         if (task_.set) task_.set(problem, point.parameter);
         std::vector<ModeRates> modes;
-        if (c_.equilibrium->modes) modes = mode_stability(problem, e, *c_.equilibrium->modes, motion_law(c_.model));
-        observer_.row(row(point, problem.loads, modes));
+        if (const auto last = c_.equilibrium->modes) {
+            const ModeStability stability(problem, e);
+            for (int m = first_mode(c_); m <= *last; ++m) modes.push_back(stability.rates(m, motion_law(c_.model)));
+        }
+        observer_.row(row(point, problem, modes));
         observer_.frame([&] { return frame(point, modes); });
         observer_.progress(point.parameter, e.observed.energy, 0);
         worst_ = std::max(worst_, e.estimated_error);
@@ -211,11 +232,12 @@ public:
     const Equilibrium& last() const { return last_; }
 
 private:
-    std::vector<double> row(const BranchPoint& point, const Loads& loads, const std::vector<ModeRates>& modes) const {
+    std::vector<double> row(const BranchPoint& point, const StationaryProblem& problem,
+                            const std::vector<ModeRates>& modes) const {
         const Equilibrium& e = point.shape;
         const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
         const double moved = hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)));
-        return series_.values({count_, point, loads, e.observed, measures(*e.space, e.x), modes, moved, seconds});
+        return series_.values({count_, point, problem, e.observed, measures(*e.space, e.x), modes, moved, seconds});
     }
 
     Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
@@ -224,10 +246,8 @@ private:
             *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
-        out.numbers = {{"energy", e.observed.energy},
-                       {"length", e.space->length()},
-                       {"tension", e.sigma},
-                       {"pressure", -e.lambda}};
+        out.numbers = {
+            {"energy", e.observed.energy}, {"length", e.length}, {"tension", e.sigma}, {"pressure", -e.lambda}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
         const auto add = [&](const char* name, double Sample::*member) {
             Array a{name, {samples.size()}, {}};
@@ -303,7 +323,7 @@ StopReport find_shapes(const Task& task, Writer& write, const RunClock& clock) {
 }  // namespace
 
 std::vector<std::string> equilibrium_series_names(const Case& c) {
-    return shape_series(*c.equilibrium).names();
+    return shape_series(c).names();
 }
 
 void check_equilibrium(const Case& c) {

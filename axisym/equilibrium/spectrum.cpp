@@ -14,6 +14,36 @@
 namespace tubule::axisym {
 namespace {
 
+// Of multipliers of what is held: sum of slopes times multipliers = wanted, the equation of a free period, theory.md
+// (3.19); no slopes at a fixed one.
+struct StretchBalance {
+    Eigen::VectorXd slopes;
+    double wanted = 0;
+};
+
+void append(Eigen::VectorXd& v, double value) {
+    v.conservativeResize(v.size() + 1);
+    v[v.size() - 1] = value;
+}
+
+// Those that minimise |force + columns multipliers|; of the balance, among those that meet it.
+Eigen::VectorXd multipliers_for(const Eigen::MatrixXd& columns, const Eigen::VectorXd& force,
+                                const StretchBalance& balance) {
+    // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's error.
+    const auto least_squares = [](const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
+        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+        solver.setThreshold(1e-6);
+        solver.compute(A);
+        return Eigen::VectorXd(solver.solve(b));
+    };
+    if (balance.slopes.size() == 0) return least_squares(columns, -force);
+    const Eigen::VectorXd& c = balance.slopes;
+    Eigen::VectorXd out = c * (balance.wanted / c.squaredNorm());
+    if (c.size() == 1) return out;
+    const Eigen::Vector2d along(-c[1], c[0]);
+    return out + along * least_squares(columns * along, -(force + columns * out))[0];
+}
+
 // The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
 Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& settings, const Meridian& shape,
                      int elements, double& unbalanced) {
@@ -26,7 +56,7 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     e.space = std::make_shared<CurveSpace>(shape.topology, breaks, degree, degree - 1, shape.length);
     e.x = fit(*e.space, shape);
     const CurveForms forms(*e.space, bending);
-    e.observed = forms.observe(e.x);
+    e.observed = forms.observe(e.x), e.length = shape.length;
     e.reference_energy = forms.reference_energy(e.x);
 
     const bool area = kept == Held::area || kept == Held::area_and_volume || kept == Held::reduced_volume,
@@ -42,12 +72,14 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
     for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
     if (!held.empty()) {
-        // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's
-        // error.
-        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-        solver.setThreshold(1e-6);
-        solver.compute(columns);
-        const Eigen::VectorXd multipliers = solver.solve(-force);
+        StretchBalance balance;
+        if (settings.force) {
+            const auto slope = [&](const Weights& weights) { return forms.stretch_slope(weights, e.x); };
+            if (area && !sigma) append(balance.slopes, slope({.area = 1}));
+            if (volume) append(balance.slopes, slope({.volume = 1}));
+            balance.wanted = *settings.force * shape.length - slope({.energy = 1, .area = e.sigma, .volume = e.lambda});
+        }
+        const Eigen::VectorXd multipliers = multipliers_for(columns, force, balance);
         if (area && !sigma) e.sigma = multipliers[0];
         if (volume) e.lambda = multipliers[multipliers.size() - 1];
     }
@@ -76,10 +108,12 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-void refuse_what_has_none(const MotionLaw& law) {
+void refuse_what_has_none(const MotionLaw& law, const SpectrumSettings& settings) {
     if (law.inertia != 0)
         throw std::invalid_argument(
             "spectra neglect inertia: use model stokes instead of fluid; its growing modes are the same");
+    if (law.free_period && settings.first == 0)
+        throw std::invalid_argument("a free period has no spectrum of m = 0: those displacements keep the period");
 }
 
 }  // namespace
@@ -89,9 +123,16 @@ Held held_by(const MotionLaw& law) {
     return law.keeps_volume ? Held::volume : Held::nothing;
 }
 
+void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, double time) {
+    const Loads loads = loads_at(law, time);
+    if (!holds_area(held) && held != Held::reduced_volume && !settings.sigma) settings.sigma = loads.tension;
+    settings.pressure = loads.pressure;
+    if (law.free_period) settings.force = loads.force;
+}
+
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings) {
-    refuse_what_has_none(law);
+    refuse_what_has_none(law, settings);
     StationaryProblem problem{bending, {}};
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {

@@ -17,7 +17,11 @@ struct SpectrumSettings {
     int max_elements = 200;
     std::optional<double> sigma;  // the tension: of a free area; or where the shape leaves it open (a tube, a sphere)
     double pressure = 0;          // of a free volume
+    std::optional<double> force;  // of a free period: what balances it
 };
+
+// The loads of a law at a time, where `held` leaves their partners free.
+void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, double time);
 
 struct Spectrum {
     std::vector<ModeRates> modes;
@@ -39,8 +43,9 @@ Held held_by(const MotionLaw& law);
 // if the shape were held by them.
 // For m = 0 the constraints act: there are no rates for a moving shape except in gradient flow with nothing held
 // (std::invalid_argument). For m >= 1 there are always rates;
-// those of inextensible laws neglect the effect of the motion itself on waves, so they are an estimate. A law with
-// inertia is rejected (std::invalid_argument): the second variation has none. SolveError if an eigenproblem fails.
+// those of inextensible laws, and where a free period changes, neglect the effect of the motion itself on waves, so
+// they are an estimate. A free period has no spectrum for m = 0, and a law with inertia none at all, since the
+// displacements of the second variation have neither (std::invalid_argument). SolveError if an eigenproblem fails.
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
                   const SpectrumSettings& settings = {});
 

@@ -120,13 +120,15 @@ CurvePoint CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {
 }
 
 Eigen::VectorXd CurveSpace::prolong(const CurveSpace& other, const Eigen::VectorXd& x) const {
-    if (other.topology_ != topology_ || other.length_ != length_ || free_period_ || other.free_period_)
-        throw std::invalid_argument(
-            "curves of different topology, different or free period cannot be prolonged to each other");
-    return project([&](double s) {
+    if (other.topology_ != topology_ || other.length_ != length_ || other.free_period_ != free_period_)
+        throw std::invalid_argument("curves of different topology or period cannot be prolonged to each other");
+    const double excess = other.rise(x.data()) - rise();  // of a free period
+    Eigen::VectorXd out = project([&](double s) {
         const CurvePoint p = other.evaluate(x, s);
-        return std::array{p.r, p.z};
+        return std::array{p.r, p.z - excess * s};
     });
+    if (free_period_) out[shape_size()] += excess;
+    return out;
 }
 
 std::vector<double> equal_breaks(int n) {

@@ -20,7 +20,8 @@ enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
 
 // What a branch is followed in: the moduli by the index of their term, then these.
 inline constexpr int vary_H0 = static_cast<int>(n_bending_terms), vary_area = vary_H0 + 1, vary_volume = vary_H0 + 2,
-                     vary_reduced_volume = vary_H0 + 3, vary_tension = vary_H0 + 4, vary_pressure = vary_H0 + 5;
+                     vary_reduced_volume = vary_H0 + 3, vary_tension = vary_H0 + 4, vary_pressure = vary_H0 + 5,
+                     vary_force = vary_H0 + 6;
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -32,7 +33,8 @@ inline std::string wrong_branch(double from, double to, double step) {
     constexpr int most = 10000;
     const double steps = std::max(0.0, std::ceil(std::abs(to - from) / step - 1e-9));
     if (steps >= 1 && steps <= most) return {};
-    return fmt::format("from {} to {} by {} makes {:.7g} steps; the number must be 1 to {}", from, to, step, steps, most);
+    return fmt::format("from {} to {} by {} makes {:.7g} steps; the number must be 1 to {}", from, to, step, steps,
+                       most);
 }
 
 struct EquilibriumChoices {
@@ -73,7 +75,7 @@ inline std::string held_against(const Model& model, Held held) {
     return {};
 }
 
-// The keys of [equilibrium], for a case with this model; see common/case/keys.hpp.
+// The keys of [equilibrium] under this model; see common/case/keys.hpp. Long: a line for each key and each condition.
 template <class Keys>
 void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
     k.choice("held", e.held,
@@ -86,9 +88,13 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
     k.number("volume", e.volume, {.above = 0});
     k.number("reduced_volume", e.reduced_volume, {.above = 0, .to = 1});
     k.flag("descend", e.descend);
-    k.integer("modes", e.modes, {.from = 0, .to = 100});
+    k.integer("modes", e.modes, {.from = model.free_period ? 1.0 : 0.0, .to = 100});
     const Held held = e.held.value_or(default_held(model));
-    k.check("held", [&] { return held_against(model, held); });
+    k.check("held", [&]() -> std::string {
+        if (const std::string clash = held_against(model, held); !clash.empty() || !model.free_period) return clash;
+        if (holds_area(held) || holds_volume(held)) return {};
+        return "must hold the area or the volume where model.period is \"free\"";
+    });
     const char* not_held = "is not held fixed: see equilibrium.held";
     const bool area = holds_area(held), volume = holds_volume(held),
                reduced = held == Held::reduced_volume || held == Held::area_and_volume;
@@ -108,7 +114,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
                                              {"equilibrium.volume", vary_volume},
                                              {"equilibrium.reduced_volume", vary_reduced_volume},
                                              {"model.tension", vary_tension},
-                                             {"model.pressure", vary_pressure}});
+                                             {"model.pressure", vary_pressure},
+                                             {"model.force", vary_force}});
         k.choice("vary", e.branch.parameter, parameters);
         k.number("to", e.branch.to);
         k.number("step", e.branch.step, {.above = 0});
@@ -116,6 +123,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
             const BranchChoices& b = e.branch;
             if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
+            if (*b.parameter == vary_force)
+                return model.free_period ? "" : "varies a force at a fixed period: see model.period";
             if (*b.parameter == vary_tension || *b.parameter == vary_pressure) {
                 const bool fixed = *b.parameter == vary_tension ? area : volume;
                 return fixed || held == Held::reduced_volume

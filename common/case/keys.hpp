@@ -322,15 +322,18 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_area) return c.equilibrium->area;
     if (parameter == vary_volume) return c.equilibrium->volume;
     if (parameter == vary_reduced_volume) return c.equilibrium->reduced_volume;
+    const Loads loads = loads_at(motion_law(c.model), 0);
+    if (parameter == vary_tension) return loads.tension;
+    if (parameter == vary_pressure) return loads.pressure;
+    if (parameter == vary_force) return loads.force;
     return parameter == vary_H0 ? c.energy.H0 : c.energy.k[parameter];
 }
 
 // Of equilibria of tier axisym.
 template <class Keys>
 void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
-    k.check("model.period",
-            [&] { return law.free_period ? "must not be \"free\": equilibria are computed at a fixed period" : ""; });
-    for (const auto& [key, load] : {std::pair{"model.tension", &law.tension}, {"model.pressure", &law.pressure}})
+    for (const auto& [key, load] :
+         {std::pair{"model.tension", &law.tension}, {"model.pressure", &law.pressure}, {"model.force", &law.force}})
         k.check(key, [&] {
             return load->is_constant() ? "" : "must be a number: nothing moves in a case with [equilibrium]";
         });
@@ -345,7 +348,7 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     });
     k.check("equilibrium.volume", [&]() -> std::string {
         const EquilibriumChoices& e = *c.equilibrium;
-        if (is_tube(c.shape) || !e.area || !e.volume) return {};
+        if (is_tube(c.shape) || c.model.free_period || !e.area || !e.volume) return {};
         const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
         if (*e.volume <= most) return {};
         return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);

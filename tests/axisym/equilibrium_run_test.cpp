@@ -100,7 +100,7 @@ TEST(EquilibriumCase, refusals) {
     expect("energy.k42", "energy.k43",
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
            "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", "
-           "\"model.tension\", \"model.pressure\", not \"energy.k43\"; did you mean 'energy.k40'?");
+           "\"model.tension\", \"model.pressure\", \"model.force\", not \"energy.k43\"; did you mean 'energy.k40'?");
     const std::string varies = "14:1: equilibrium.branch varies a quantity that is not held fixed: see " + held;
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"area\"\n[equilibrium.branch]\nvary = \"equilibrium.volume\"", varies);
@@ -256,6 +256,133 @@ held = "area"
     EXPECT_NEAR(o.at("energy", 0), (-1 / (R * R) + 0.5 / std::pow(R, 4)) * A, 1e-8);
     const std::string slanted = std::string(tube).replace(tube.find("n = 1"), 5, "n = 1\nphase = 0.3");
     EXPECT_EQ(refusal(slanted), "case.toml: shape: the curve is not symmetric about the middle of its parameter range");
+}
+
+const std::string free_tube = R"(tier = "axisym"
+[energy]
+k20 = 0.5
+k40 = 0.03
+k42 = 0.1
+H0 = -0.7
+[model]
+kind = "overdamped"
+period = "free"
+[shape]
+kind = "tube"
+radius = 1.05
+length = 3.0
+[accuracy]
+energy = 1e-10
+[equilibrium]
+descend = false
+)";
+
+// theory.md (3.21): the straight tube of radius 1 and length 3 at rest under its force, with area, volume or both kept.
+TEST(EquilibriumCase, straightTubesRestUnderForce) {
+    const double h = -0.3, f = 0.5 * h * h + 0.03 * std::pow(h, 4), f_H = h + 0.12 * std::pow(h, 3), tension = 0.2;
+    const auto text = [](const char* key, double value) { return fmt::format("{}={:.17g}", key, value); };
+    const std::string area = text("equilibrium.area", 6 * pi), volume = text("equilibrium.volume", 3 * pi);
+    const auto expect = [&](double sigma, double pressure, double given_tension, std::vector<std::string> sets) {
+        const double force = 2 * pi * (f + sigma) - pi * pressure;
+        sets.push_back(text("model.force", force));
+        const Outcome o = outcome(free_tube, sets);
+        EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        EXPECT_NEAR(o.at("r_max", 0), 1, 1e-8);
+        EXPECT_NEAR(o.at("height", 0), 3, 1e-8);
+        EXPECT_NEAR(o.at("tension", 0), sigma, 1e-8);
+        EXPECT_NEAR(o.at("pressure", 0), pressure, 1e-8);
+        EXPECT_EQ(o.at("force", 0), force);
+        EXPECT_NEAR(o.at("free_energy", 0), 6 * pi * (f + given_tension) - 3 * force, 1e-7);
+        EXPECT_EQ(o.log.frames[0].numbers[1].first, "length");
+        EXPECT_NEAR(o.log.frames[0].numbers[1].second, 3, 1e-8);
+        EXPECT_NEAR(o.array("z", 0).back(), 3, 1e-8);
+    };
+    expect(
+        tension, f + f_H + tension, tension,
+        {"model.kind=gradient-flow", "model.volume=fixed", "model.area=free", text("model.tension", tension), volume});
+    expect(-f - f_H, 0, 0, {"model.volume=free", area});
+    expect(0.37, f + f_H + 0.37, 0, {area, volume});
+    // A period that is kept has the same force.
+    const Outcome kept = outcome(free_tube, {"model.period=fixed", "shape.radius=1", "model.volume=free"});
+    EXPECT_NEAR(kept.at("force", 0), -2 * pi * f_H, 1e-8);
+    EXPECT_NEAR(kept.at("height", 0), 3, 1e-14);
+}
+
+// Delaunay's unduloid of radii 1 +- B has H = -1 everywhere, so that no energy k20 (H + 1)^2 and no force. Kenmotsu's
+// parametrisation by arc length s in [0, 2 pi]: r = sqrt(1 + B^2 + 2 B sin s), z' = (1 + B sin s)/r; its integrals by
+// the trapezoidal rule.
+TEST(EquilibriumCase, anUnduloidFindsItsPeriod) {
+    const double B = 0.4;
+    double area = 0, volume = 0, length = 0;
+    constexpr int points = 400;
+    for (int i = 0; i < points; ++i) {
+        const double sine = std::sin(2 * pi * i / points), r = std::sqrt(1 + B * B + 2 * B * sine),
+                     ds = 2 * pi / points;
+        area += ds * 2 * pi * r, length += ds * (1 + B * sine) / r, volume += ds * pi * r * (1 + B * sine);
+    }
+    const std::vector<std::string> unduloid = {"energy.k20=1",
+                                               "energy.k40=0",
+                                               "energy.k42=0",
+                                               "energy.H0=-1",
+                                               "equilibrium.descend=true",
+                                               "shape.radius=1",
+                                               "shape.length=6",
+                                               "shape.mode.0.amplitude=-0.35",
+                                               "shape.mode.0.n=1",
+                                               fmt::format("equilibrium.area={:.17g}", area)};
+    for (const bool keeps_volume : {false, true}) {
+        std::vector<std::string> sets = unduloid;
+        sets.push_back(keeps_volume ? fmt::format("equilibrium.volume={:.17g}", volume) : "model.volume=free");
+        const Outcome o = outcome(free_tube, sets);
+        EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        EXPECT_NEAR(o.at("energy", 0), 0, 1e-9);
+        EXPECT_NEAR(o.at("height", 0), length, 1e-5);
+        EXPECT_NEAR(o.at("volume", 0), volume, 1e-5);
+        EXPECT_NEAR(o.at("r_max", 0), 1 + B, 1e-5);
+        EXPECT_NEAR(o.at("tension", 0), 0, 1e-5);
+        EXPECT_NEAR(o.at("pressure", 0), 0, 1e-5);
+        EXPECT_EQ(o.at("negative_directions", 0), 0);
+    }
+    std::vector<std::string> sets = unduloid;
+    sets.push_back("equilibrium.modes=1");
+    const Outcome o = outcome(free_tube, sets);
+    EXPECT_EQ(std::count(o.names.begin(), o.names.end(), "growth_0"), 0);
+    EXPECT_LT(o.at("growth_1", 0), 0);
+}
+
+// A tube of constant volume that is pulled: R = 3 pi k20/force by theory.md (3.21).
+TEST(EquilibriumCase, branchOverTheForce) {
+    const std::string branch = "[equilibrium.branch]\nvary = \"model.force\"\nto = 6.0\nstep = 0.5\n";
+    const Outcome o = outcome(free_tube + branch, {"energy.k40=0", "energy.H0=0", "model.kind=gradient-flow",
+                                                   "model.volume=fixed", "model.area=free", "model.force=4.5"});
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    ASSERT_EQ(o.log.rows.size(), 4u);
+    for (int i = 0; i < 4; ++i) {
+        const double force = 4.5 + 0.5 * i, R = 1.5 * pi / force;
+        EXPECT_NEAR(o.at("force", i), force, 1e-12);
+        EXPECT_NEAR(o.at("r_max", i), R, 1e-8);
+        EXPECT_NEAR(o.at("height", i), 3 * 1.05 * 1.05 / (R * R), 1e-6);
+    }
+}
+
+TEST(EquilibriumCase, refusalsOfFreePeriods) {
+    const auto expect = [](const std::string& old_text, const std::string& new_text, const std::string& message) {
+        EXPECT_EQ(refusal(std::string(free_tube).replace(free_tube.find(old_text), old_text.size(), new_text)),
+                  "case.toml:" + message);
+    };
+    expect("descend = false", "held = \"nothing\"",
+           "17:8: equilibrium.held must hold the area or the volume where model.period is \"free\"");
+    expect("descend = false", "modes = 0", "17:9: equilibrium.modes must be an integer >= 1 and <= 100, not 0");
+    expect("period = \"free\"", "period = \"free\"\nforce = {time = [0, 1], value = [0, 1]}",
+           "10:9: model.force must be a number: nothing moves in a case with [equilibrium]");
+    expect("kind = \"tube\"\nradius = 1.05\nlength = 3.0", "kind = \"sphere\"\nradius = 1.05",
+           "9:10: model.period must not be \"free\": only a tube has a period");
+    EXPECT_EQ(refusal(with("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
+                           "modes = 1\n[equilibrium.branch]\nvary = \"model.force\"")),
+              "case.toml:14:1: equilibrium.branch varies a force at a fixed period: see model.period");
+    // A branch over a load begins at its value.
+    expect("[shape]", "force = 1.0\n[equilibrium.branch]\nvary = \"model.force\"\nto = 1.0\nstep = 0.5\n[shape]",
+           "11:1: equilibrium.branch from 1 to 1 by 0.5 makes 0 steps; the number must be 1 to 10000");
 }
 
 TEST(EquilibriumCase, canBeInterrupted) {

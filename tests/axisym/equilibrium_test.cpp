@@ -59,6 +59,42 @@ TEST(StationarySystem, jacobianIsThatOfTheResidual) {
         }
 }
 
+// The same with a free period, and the gradient of the merit, of which the residual consists.
+TEST(StationarySystem, freePeriods) {
+    const double area = 11, volume = 3, force = 1.7, length = 2.5;
+    for (const Constraints& c :
+         {Constraints{area, volume, {}}, Constraints{area, {}, {}}, Constraints{{}, volume, {}}}) {
+        const auto space = std::make_shared<CurveSpace>(Topology::half_tube, equal_breaks(7), 5, 4, length, true);
+        const StationarySystem system(space, {bending(0.2, -2, 0.03, 0.06), c, {.force = force}, true}, 0.3);
+        const int n = space->size();
+        Vector u(n + 3), w(u.size());
+        u << fit(*space, half(meridian(Tube{1, length, {{0.2, 1}}}))), c.area ? -0.7 : 0, c.volume ? 1.3 : 0, 0;
+        for (int i = 0; i < u.size(); ++i) w[i] = std::sin(3 * i + 1);
+        for (int i = 0; i < n; ++i) u[i] += 0.01 * std::cos(5 * i);
+        const double h = 1e-5;
+        const Vector expected = (system.residual(u + h * w) - system.residual(u - h * w)) / (2 * h);
+        EXPECT_LT((system.jacobian(u) * w - expected).norm(), 1e-6 * expected.norm());
+        const Vector damped = (system.jacobian(u, 0.5) - system.jacobian(u)) * w;
+        EXPECT_LT((damped.head(n) - 0.5 * system.forms().mass(u.head(n)) * w.head(n)).norm(), 1e-10);
+        w.tail(3).setZero();
+        const double slope = (system.merit(u + h * w) - system.merit(u - h * w)) / (2 * h);
+        EXPECT_NEAR(system.residual(u).head(n).dot(w.head(n)), slope, 1e-6 * std::abs(slope));
+    }
+    // INT |s e_z|^2 dS over both halves of a straight tube: 2 pi R L/3. A finer mesh has the same curve.
+    const CurveSpace space(Topology::half_tube, equal_breaks(5), 5, 4, length, true),
+        finer(Topology::half_tube, equal_breaks(15), 5, 4, length, true);
+    Vector x = fit(space, half(meridian(Tube{1.5, length, {}})));
+    const CurveForms forms(space, bending(1));
+    EXPECT_NEAR(forms.mass(x).coeff(x.size() - 1, x.size() - 1), pi * length, 1e-12);
+    for (int i = 0; i < x.size(); ++i) x[i] += 0.1 * std::cos(5 * i);
+    const Vector y = finer.prolong(space, x);
+    EXPECT_NEAR(finer.length(y.data()), space.length(x.data()), 1e-13);
+    for (const double s : {0.0, 0.21, 0.7, 1.0}) {
+        EXPECT_NEAR(finer.evaluate(y, s).r, space.evaluate(x, s).r, 1e-12);
+        EXPECT_NEAR(finer.evaluate(y, s).z, space.evaluate(x, s).z, 1e-12);
+    }
+}
+
 TEST(StationarySystem, refusals) {
     const auto with = [](const Constraints& c) {
         return message_of<std::invalid_argument>([&] {
@@ -217,6 +253,34 @@ TEST(Equilibrium, halfPeriodsOfTubes) {
     ASSERT_EQ(tube.stop, Stop::finished) << tube.message;
     EXPECT_NEAR(tube.observed.energy, 0, 1e-10);
     EXPECT_NEAR(tube.observed.r_max, 1, 1e-5);
+}
+
+// A pearled tube with a period that is kept is at rest with a free one, too, under the force which it measures, and
+// gives that force as the slope of its energy.
+TEST(Equilibrium, atTheMeasuredForceAFreePeriodStays) {
+    const StationaryProblem kept{bending(1, 0, 0, 0.1), {48, 20, {}}};
+    const auto found = [&](double length) {
+        return find_equilibrium(kept, half(meridian(Tube{1, length, {{0.3, 1}}})));
+    };
+    const Equilibrium a = found(7);
+    ASSERT_EQ(a.stop, Stop::finished) << a.message;
+    const double force = axial_force(kept, a), h = 1e-3;
+    EXPECT_NEAR((found(7 + h).observed.energy - found(7 - h).observed.energy) / (2 * h), force, 1e-5 * std::abs(force));
+    Meridian longer = meridian(*a.space, a.x);
+    longer.length *= 1.01;
+    longer.at = [at = longer.at](double t) {
+        const auto [r, r1, z, z1] = at(t);
+        return std::array{r, r1, 1.01 * z, 1.01 * z1};
+    };
+    const StationaryProblem freed{kept.bending, kept.constraints, {.force = force}, true};
+    EquilibriumSettings settings;
+    settings.descend = false;
+    const Equilibrium b = find_equilibrium(freed, longer, settings);
+    ASSERT_EQ(b.stop, Stop::finished) << b.message;
+    EXPECT_NEAR(b.length, 7, 1e-5);
+    EXPECT_NEAR(b.sigma, a.sigma, 1e-4 * std::abs(a.sigma));
+    EXPECT_NEAR(b.lambda, a.lambda, 1e-4 * std::abs(a.lambda));
+    EXPECT_NEAR(b.observed.energy, a.observed.energy, 1e-4 * std::abs(force));
 }
 
 TEST(Equilibrium, failuresAreSaid) {

@@ -109,6 +109,9 @@ TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
     MotionLaw fed = law_of(ModelKind::overdamped);
     fed.reservoir = true, fed.keeps_volume = false;
     EXPECT_THROW(found(fed, wavy), std::invalid_argument);
+    MotionLaw stretches = law_of(ModelKind::overdamped);
+    stretches.free_period = true;
+    EXPECT_THROW(found(stretches, straight), std::invalid_argument);  // of m = 0
 }
 
 // theory.md (5.8) to (5.10) at the tension of a reservoir or of a gradient flow, below and above the threshold of

@@ -200,6 +200,25 @@ class Stability(ProgramTest):
         self.tubule("stability", self.tube, *wavy)
         self.refuses("inertia", self.write("fluid.toml", FLUID), "--numerical")
 
+    def test_a_free_period_begins_at_m_1(self):
+        # The rates of a pearled tube at rest, as the equilibrium has them and from points on its profile.
+        case = self.write("unduloid.toml", """tier = "axisym"
+energy = {k20 = 1.0, H0 = -1.0}
+model = {period = "free", area = "fixed", volume = "free"}
+shape = {kind = "tube", radius = 1.0, length = 6.0, mode = [{amplitude = -0.35, n = 1}]}
+accuracy = {energy = 1e-9}
+equilibrium = {modes = 2, area = 41.074}
+""")  # fmt: skip
+        self.tubule("equilibrium", case, "--quiet", "-o", self.result)
+        found = series(self.result)
+        self.assertEqual([name for name in found if name.startswith("growth")], ["growth_1", "growth_2"])
+        rows = list(csv.DictReader(io.StringIO(self.tubule("stability", self.result, "--csv")[0])))
+        self.assertEqual({row["m"] for row in rows}, {"1", "2"})
+        for m in (1, 2):
+            largest = max(float(row["rate"]) for row in rows if row["m"] == str(m))
+            self.assertAlmostEqual(largest / found[f"growth_{m}"][0], 1, delta=1e-5)
+        self.assertIn("0   left out: such waves change the free period", self.tubule("stability", self.result)[0])
+
     def test_fits_of_tier_1(self):
         self.tubule("run", "--quiet", self.tube)
         result = self.folder / "tube.hdf"

@@ -34,6 +34,7 @@ std::string words_of(const std::vector<Found>& found) {
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
+        if (model.free_period) out += "    0   left out: such waves change the free period\n";
         const axisym::ModeRates* fastest = nullptr;
         for (const axisym::ModeRates& mode : spectrum.modes) {
             out += fmt::format("{:>5}", mode.m);
@@ -93,9 +94,8 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
             const MotionLaw law = motion_law(model);
             const Held held = held_in(subject.c, law);
             settings.sigma = options.tension;
-            if (!holds_area(held) && held != Held::reduced_volume && !settings.sigma)
-                settings.sigma = law.tension.at(time);
-            settings.pressure = law.pressure.at(time);
+            settings.first = law.free_period ? 1 : 0;
+            axisym::set_loads(settings, law, held, time);
             found.push_back({model, axisym::spectrum(subject.c.energy, law, held, shape, settings)});
         } catch (const std::invalid_argument& error) {
             if (models.size() == 1) throw;
