@@ -94,6 +94,7 @@ struct Handover {
     WavedProfile surface;
     double time = 0;
     double reference_energy = 0;  // E_ref of the whole run
+    double work = 0;              // that loads have done until then
 };
 
 // Expected results of a run: checked by `tubule run --expect`.

@@ -367,31 +367,14 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     });
 }
 
-// What a case says about tension, pressure, force and reservoirs, where its tier does not compute it.
-template <class Keys>
-void check_ensemble(Keys& k, const Case& c, const MotionLaw& law) {
-    k.check("model.period", [&] {
-        const bool period = is_tube(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
-        return law.free_period && !period ? "must not be \"free\": only a tube has a period" : "";
-    });
-    if (c.tier != Tier::automatic) return;
-    const auto refuse = [&](const char* key, bool chosen) {
-        k.check(key, [&]() -> std::string {
-            return chosen ? "is not computed in tier \"auto\" yet" : "";
-        });
-    };
-    refuse("model.period", law.free_period);
-    refuse("model.area", law.reservoir || law.keeps_area);
-    refuse("model.tension", !law.tension.is_zero());
-    refuse("model.pressure", !law.pressure.is_zero());
-    refuse("model.force", !law.force.is_zero());
-}
-
 // Conditions across tables.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
-    check_ensemble(k, c, law);
+    k.check("model.period", [&] {
+        const bool period = is_tube(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
+        return law.free_period && !period ? "must not be \"free\": only a tube has a period" : "";
+    });
     const SchemeEntry scheme = c.surface.scheme ? entry(*c.surface.scheme) : SchemeEntry{};
     if (c.tier == Tier::automatic) {
         k.check("discretisation.scheme", [&]() -> std::string {

@@ -81,7 +81,7 @@ void MotionAttempt::begin(const Start& from) {
     look();
     out_.note(doubt_before(case_, now_.free_energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
-    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, comparable()));
+    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_.free_energy));
     compare();
     error_now_ = std::max(error_now_, memory_.error);
     write_row();

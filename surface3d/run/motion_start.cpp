@@ -75,6 +75,7 @@ void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& s
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
+    memory.balance.work = c.handover ? c.handover->work : 0;
     memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);
     memory.scale.relaxation =
         c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0,

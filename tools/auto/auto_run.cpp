@@ -33,9 +33,11 @@ std::vector<double> until(const std::vector<double>& times, double end) {
     return out;
 }
 
-// Output times of the case, and those for rates.
+// Besides the output times of the case; rates have kinks where loads have them.
 std::set<double> times_for_rates(const Case& c) {
     std::set<double> out;
+    const MotionLaw law = motion_law(c.model);
+    for (double t = next_kink(law, 0); t < c.time.end; t = next_kink(law, t)) out.insert(t);
     for (int i = 1; i < parts; ++i) out.insert(c.time.end * i / parts);
     for (int i = 1; i <= halvings; ++i) out.insert(c.time.end / parts * std::pow(0.5, i));
     for (const double t : c.time.output) out.erase(t);
@@ -83,6 +85,12 @@ std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& gr
         say(fmt::format("the growth of m = {} is known only to within a factor of {:.2g}", peak.m,
                         std::exp(growth.error(peak.m))));
     return out;
+}
+
+// That loads have done by the last row; 0 where none changes.
+double work_of(const Before& before, const std::vector<std::string>& names) {
+    const auto work = std::find(names.begin(), names.end(), "work");
+    return work == names.end() ? 0 : before.rows.back()[work - names.begin()];
 }
 
 void add_doubts(RunSummary& s, const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
@@ -249,7 +257,8 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
 
     Case c = surface_case(case_);
     RunSummary s = clock_.pausing([&] {
-        c.handover = Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy};
+        c.handover =
+            Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
         SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, before);
         return surface3d::run(c, part, restart);
     });

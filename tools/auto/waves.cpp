@@ -16,13 +16,15 @@ namespace {
 constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
-// Without inertia.
-axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Meridian& profile) {
+// Without inertia, under the loads of this time.
+axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Meridian& profile, double time) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
     settings.max_elements = most_elements;
     law.inertia = 0;
-    return axisym::spectrum(c.energy, law, axisym::held_by(law), profile, settings);
+    const Held held = axisym::held_by(law);
+    axisym::set_loads(settings, law, held, time);
+    return axisym::spectrum(c.energy, law, held, profile, settings);
 }
 
 double fastest(const axisym::ModeRates& mode) {
@@ -41,15 +43,15 @@ double rate_with_inertia(double stokes, double overdamped) {
 WaveRates wave_rates(const Case& c, const Record& frame) {
     const Meridian profile = axisym::frame_meridian(frame);
     const MotionLaw law = motion_law(c.model);
-    const axisym::Spectrum found = spectrum_of(c, law, profile);
+    const axisym::Spectrum found = spectrum_of(c, law, profile, frame.time);
     WaveRates out;
     for (const axisym::ModeRates& mode : found.modes) out.rates.push_back(fastest(mode));
-    out.estimated = law.inextensible && !found.at_rest();
+    out.estimated = (law.inextensible || law.free_period) && !found.at_rest();
     out.accuracy = found.estimated_error;
     if (law.inertia == 0) return out;
     MotionLaw overdamped = law;
     overdamped.viscosity = 0, overdamped.friction = 1;
-    const axisym::Spectrum inert = spectrum_of(c, overdamped, profile);
+    const axisym::Spectrum inert = spectrum_of(c, overdamped, profile, frame.time);
     for (std::size_t i = 0; i < out.rates.size(); ++i)
         out.rates[i] = rate_with_inertia(out.rates[i], fastest(inert.modes[i]));
     return out;
@@ -59,7 +61,7 @@ WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector
     const auto [r, z, length] = profile_points(frame);
     WavedProfile out{profile_curve(r, z, length), {}, {}};
     const double radius = *std::max_element(r.begin(), r.end());
-    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), axisym::frame_meridian(frame));
+    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), axisym::frame_meridian(frame), frame.time);
     for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
         const axisym::ModeRates& mode = found.modes[i];
         if (relative_amplitudes[i] == 0 || mode.shape.empty()) continue;

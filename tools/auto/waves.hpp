@@ -11,7 +11,7 @@ namespace tubule {
 
 struct WaveRates {
     std::vector<double> rates;  // the fastest of m = 1 ... auto.modes
-    bool estimated = false;     // the shape moves, and is inextensible: the effect on waves is neglected
+    bool estimated = false;     // the shape flows or stretches: the effect on waves is neglected
     double accuracy = 0;        // relative to the larger of a rate and the slowest one
 };
 
