@@ -135,6 +135,32 @@ TEST(Ensembles, spheresComeToRestUnderTensionAndPressure) {
     EXPECT_NEAR(run_case(c).last("pressure"), pressure, 1e-7);
 }
 
+// The radius R + a under the pressure of R changes as a' = -(dP/dR)/resistance a, with the pressure at rest P(R) of
+// theory.md (3.21), (3.23), and resistance 1 in gradient flow, gamma + 2 mu/R^2 of a tube and gamma + 4 mu/R^2 of a
+// sphere in Stokes flow, whose membrane stretches in one direction and in two.
+TEST(Ensembles, unstableStatesAreLeftAtTheirRate) {
+    const double R = 1, tension = 0.4, a = 1e-5, mu = 0.5, gamma = 0.3;
+    for (const bool tube : {true, false}) {
+        const auto pressure = [&](double radius) {
+            return tube ? tube_pressure(all_terms, radius, tension) : sphere_pressure(all_terms, radius, tension);
+        };
+        const double h = 1e-4, slope = (pressure(R + h) - pressure(R - h)) / (2 * h);
+        EXPECT_LT(slope, 0);
+        const Model loaded{.keeps_volume = false, .tension = tension, .pressure = pressure(R)};
+        Model fed = loaded;
+        fed.kind = ModelKind::stokes, fed.Re = 1 / mu, fed.gamma = gamma, fed.area = AreaRule::reservoir;
+        for (const Model& model : {loaded, fed}) {
+            const double resistance = model.kind == ModelKind::stokes ? gamma + (tube ? 2 : 4) * mu : 1,
+                         rate = -slope / resistance, end = 2 / rate;
+            Case c = case_of(all_terms, tube ? Shape(Tube{R + a, 2, {}}) : Shape(Sphere{R + a, {}}), model, end);
+            explicitly(c, 16, 1e-11, 7);
+            const Outcome o = run_case(c);
+            ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+            EXPECT_NEAR(std::log((o.last("r_max") - R) / a) / end, rate, 1e-3 * rate) << name(model) << tube;
+        }
+    }
+}
+
 // With a fixed volume and no tension the force is pi (R f - f_H) by (3.21), with a fixed area and no pressure -2 pi
 // f_H: both rest states are minima of F over the tubes of that volume or area for k20 alone, at 3 pi k20/R and 4 pi
 // k20/R.

@@ -97,6 +97,22 @@ class Confirm(ProgramTest):
         self.assertIn("not a result of tubule scan", self.tubule("confirm", "case.toml", status=2)[1])
         self.assertFalse((self.folder / "scan_confirm").exists())
 
+    def test_under_a_force(self):
+        # Area and volume are kept, the period is free: theory.md (3.22) gives the tension, (5.9) the rate of the ring.
+        self.write("case.toml", CASE.replace('"overdamped"', '"overdamped"\nperiod = "free"')
+                   .replace(f"amplitude = {AMPLITUDE}", "amplitude = 0.01").replace("0.7", "1.5"))  # fmt: skip
+        pushed, pulled = -3 * math.pi, 3 * math.pi
+        self.tubule("scan", "case.toml", "--over", f"model.force={pushed},{pulled}", "-o", self.folder / "force.hdf")
+        out, _ = self.tubule("confirm", "force.hdf", *FEW, "--noise", 1e-4, "--csv", "--quiet", status=1)
+        ring, tube = csv.DictReader(io.StringIO(out))
+        for row, force in ((ring, pushed), (tube, pulled)):
+            rate = -0.8 * (15 + 3 * (force / math.pi - 3))
+            self.assertAlmostEqual(float(row["fastest_rate_m2"]), rate, delta=1e-6)
+        self.assertEqual((tube["verdict"], tube["outcome"]), ("agrees", tube["axisym_outcome"]))
+        self.assertEqual((ring["verdict"], ring["n"], ring["m"]), ("symmetry-broken", "0", "2"))
+        self.assertAlmostEqual(float(ring["linear_rate"]), 2.4, delta=1e-3)
+        self.assertAlmostEqual(float(ring["rate"]) / 2.4, 1, delta=0.1)
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

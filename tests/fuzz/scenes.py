@@ -6,10 +6,11 @@ asked for a thirtieth of the accuracy; where they differ by more than the run st
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
 
-    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE]
+    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles]
 
 prints how true and stated errors compare over many scenes, for a program and for one of before: a run that finishes
-rightly with that one and now stops or does not know its error is a *false alarm*.
+rightly with that one and now stops or does not know its error is a *false alarm*. With --ensembles, every scene has
+random rules and loads; otherwise every other one.
 
     scenes.py TUBULE --print N                       the case of scene N
 """
@@ -108,8 +109,8 @@ def draw_ensemble(draw, model, tube, size, modulus, end):
         model["force"] = draw_load(draw, 6 * modulus * size, end)
 
 
-def scene(draw):
-    """The case of a scene."""
+def scene(draw, ensembles=0.5):
+    """The case of a scene; `ensembles` is the probability of random rules and loads."""
     shape, size = draw_shape(draw)
     energy, modulus = draw_energy(draw, size)
     kind = draw.choice(MODELS)
@@ -121,7 +122,7 @@ def scene(draw):
         model["volume"] = draw.choice(("fixed", "free"))
     end = size**4 / modulus * math.exp(draw.uniform(math.log(1e-3), math.log(1)))
     asked = math.exp(draw.uniform(math.log(5e-5), math.log(2e-2)))
-    if draw.random() < 0.5:
+    if draw.random() < ensembles:
         draw_ensemble(draw, model, shape["kind"] == "tube", size, modulus, end)
     return {
         "tier": "axisym",
@@ -219,12 +220,11 @@ def one(rng, box):
 # ------------------------------------------------------------------------------------------------ many scenes
 
 
-def scene_number(n):
-    return scene(random.Random(f"scene {n}"))
+def scene_number(n, ensembles):
+    return scene(random.Random(f"scene {n}"), ensembles)
 
 
-def judge(n, programs, top):
-    case = scene_number(n)
+def judge(n, case, programs, top):
     boxes = {name: Sandbox(program.resolve(), Path(top) / f"{n} {name}") for name, program in programs.items()}
     reference = Reference(boxes["now"], case)
     line = {"scene": n, "asked": case["accuracy"]["energy"], "model": case["model"]["kind"], "shape": case["shape"]["kind"]}
@@ -268,16 +268,17 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--save", type=Path, help="a line of JSON for each scene")
+    parser.add_argument("--ensembles", action="store_const", const=1, default=0.5, help="in every scene")
     parser.add_argument("--print", type=int)
     a = parser.parse_args()
     if a.print is not None:
-        print(toml.dump(scene_number(a.print)), end="")
+        print(toml.dump(scene_number(a.print, a.ensembles)), end="")
         return 0
     programs = {"now": a.program} | ({"before": a.before} if a.before else {})
     lines = []
     for n in range(a.first, a.first + a.count):
         with tempfile.TemporaryDirectory() as top:
-            lines.append(judge(n, programs, top))
+            lines.append(judge(n, scene_number(n, a.ensembles), programs, top))
         if a.save:
             a.save.write_text("".join(json.dumps(x) + "\n" for x in lines))
     report(lines)
