@@ -6,6 +6,7 @@
 
 import os
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -487,6 +488,17 @@ class Films(InFolder):
             self.refused("install the package ffmpeg", path, "--movie", self.folder / "a.mp4", status=4)
         if shutil.which("ffmpeg"):
             self.assertEqual(self.film("a.mp4", path).read_bytes()[4:8], b"ftyp")
+
+    def test_interrupted_film_leaves_nothing(self):
+        path = write(self.folder / "a.hdf", times=list(np.linspace(0, 1, 200)))
+        command = ["/usr/bin/python3", "-B", PLOT / "plot.py", path, "--movie", self.folder / "a.gif"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            while process.poll() is None and not process.stderr.readline().startswith("frame"):
+                pass
+            process.send_signal(signal.SIGINT)
+            out, _ = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, out), (130, ""))
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["a.hdf"])
 
     def test_profile_becomes_a_surface(self):
         for profile, area in ((ball(0, 201), 4 * np.pi), (tube(0, 0.0), 4 * np.pi)):

@@ -8,6 +8,10 @@ EXIT_BAD_INPUT, EXIT_UNAVAILABLE = 2, 4
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
 
 
+class Unavailable(Exception):
+    """What is missing on this machine, and what to install."""
+
+
 def say(words, out=None):
     """Prints words, by default to stderr. Nothing depends on them: where they cannot be written, it goes on without."""
     out = out or sys.stderr

@@ -13,6 +13,7 @@ import tomllib
 from pathlib import Path
 
 DRAWERS = {"plot": "plot.py", "chart": "chart.py", "compare": "compare.py", "stability": "stability.py", "view": "view.py"}
+OTHER_PURPOSES = {"movie"}  # modules that no picture needs
 SAME = 1e-3  # relative difference of numbers that a picture does not show
 
 
@@ -44,7 +45,7 @@ def named_by(path):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
-            yield from (path.parent / f"{name}.py" for name in names)
+            yield from (path.parent / f"{name}.py" for name in names if name not in OTHER_PURPOSES)
     elif path.suffix == ".toml":
         case = tomllib.loads(path.read_text()).get("case")
         if isinstance(case, str):

@@ -16,28 +16,24 @@ from matplotlib.figure import Figure
 import flow
 import raster
 from colours import Colours, colour_scale, curvature_colours, draw_bar
-from command_line import say
+from command_line import Unavailable, say
 from labels import power, symbol
 from results import BadInput
 from style import draw_scale_bar, line_colours, time_text
+from surfaces import node_areas
+from tubes import ring_areas
 
 SIZE, DPI = (8.0, 4.5), 100  # inches; pixels per inch: 800 x 450, even as codecs want them
 BOX = 0.35, 0.75, 4.1, 3.45  # of the shape: left, bottom, width, height in inches
 AROUND, ALONG = 72, 240  # pieces of a profile that is turned around the axis
 FORMATS = (".mp4", ".gif")
 SAY_EVERY = 5.0  # seconds between lines about the progress, off a terminal
-DEFAULT_FPS = 10.0
-
-
-class Unavailable(Exception):
-    """What is missing to write the film, and what to install."""
 
 
 @dataclass
 class Picture:
     """What is drawn of a frame: triangles as results.Surface has them, and one number for each node."""
 
-    time: float
     order: int
     closed: bool
     points: np.ndarray
@@ -70,37 +66,35 @@ def revolved(frame, values):
     return triangles(grid(r, z)), triangles(grid(*way.T)), triangles(values_there), poles or ring
 
 
-def pictures(frames, name):
-    for frame in frames:
-        values = getattr(frame, name, None)
-        if values is None:
-            raise BadInput(f"--colour: not all frames have {name}")
-        if hasattr(frame, "order"):
-            yield Picture(frame.time, frame.order, frame.closed, frame.points, frame.normal, values)
-        else:
-            points, normal, values, closed = revolved(frame, values)
-            yield Picture(frame.time, 1, closed, points, normal, values)
+def picture(frame, name):
+    values = getattr(frame, name)
+    if hasattr(frame, "order"):
+        return Picture(frame.order, frame.closed, frame.points, frame.normal, values)
+    points, normal, values, closed = revolved(frame, values)
+    return Picture(1, closed, points, normal, values)
 
 
-def areas_of(picture):
-    a, b, c = (picture.points[:, i] for i in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)[:, None] + 1e-300
-    return np.broadcast_to(area, picture.values.shape).ravel()
+def extent(frame, view):
+    """Corners of what the frame covers in the picture."""
+    if hasattr(frame, "order"):
+        return view.extent(frame.points.reshape(-1, 3))
+    return view.extent(revolved(frame, frame.H)[0].reshape(-1, 3))
 
 
-def colours_of(result, frames, shown, name):
+def colours_of(result, frames, name):
     """One scale for all frames."""
-    areas = [areas_of(picture) for picture in shown]
+    if any(getattr(frame, name, None) is None for frame in frames):
+        raise BadInput(f"--colour: not all frames have {name}")
+    areas = [(node_areas if hasattr(frame, "order") else ring_areas)(frame).ravel() for frame in frames]
     if name in "HK":
-        values = [type("Values", (), {"H": picture.values, "K": picture.values}) for picture in shown]
-        colours = curvature_colours([result], values, areas)["HK".index(name)]
+        colours = curvature_colours([result], frames, areas)["HK".index(name)]
         colours.label = colours.label.format("")
         return colours
+    values = [getattr(frame, name).ravel() for frame in frames]
     if name == "u_n":
-        largest = max(float(np.abs(picture.values).max()) for picture in shown) or 1.0
+        largest = max(float(np.abs(v).max()) for v in values) or 1.0
         label = f"normal velocity {flow.SYMBOLS['u_n']}, > 0: outward"
         return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
-    values = [picture.values.ravel() for picture in shown]
     mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
     return Colours("PRGn", *colour_scale(values, areas, mean), f"pressure p, white: its mean {power(mean, 3)}")
 
@@ -109,11 +103,10 @@ class Stage:
     """The page on which one frame after the other is drawn."""
 
     def __init__(self, result, frames, name, title):
-        self.result, self.frames = result, frames
-        self.pictures = list(pictures(frames, name))
-        self.colours = colours_of(result, frames, self.pictures, name)
+        self.result, self.frames, self.quantity = result, frames, name
+        self.colours = colours_of(result, frames, name)
         self.view = raster.View()
-        ends = [self.view.extent(picture.points.reshape(-1, 3)) for picture in self.pictures]
+        ends = [extent(frame, self.view) for frame in frames]
         self.low, self.high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
         self.scale = min(np.array(BOX[2:]) / (self.high - self.low))  # inches per unit of length
         self.figure = Figure(figsize=SIZE)
@@ -155,11 +148,12 @@ class Stage:
         self.energy = np.asarray(series[key]), np.asarray(series["energy"])
 
     def draw(self, index):
-        picture, frame = self.pictures[index], self.frames[index]
+        frame = self.frames[index]
+        shape = picture(frame, self.quantity)
         width, height = self.pixels
         per_unit = self.scale * DPI * raster.OVERSAMPLING
         samples = raster.sample(
-            picture.points, picture.normal, picture.values[..., None], picture.order, picture.closed, self.view,
+            shape.points, shape.normal, shape.values[..., None], shape.order, shape.closed, self.view,
             (self.low[0], self.high[1]), per_unit, width * raster.OVERSAMPLING, height * raster.OVERSAMPLING,
         )  # fmt: skip
         there = np.isfinite(samples.depth)
@@ -201,7 +195,7 @@ def writer_for(path, fps):
     return FFMpegWriter(fps=fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
 
 
-def draw(result, frames, path, name, title, fps=DEFAULT_FPS):
+def draw(result, frames, path, name, title, fps):
     """Writes the film of these frames of a result, coloured by a quantity; a file of that name is replaced at the end."""
     writer = writer_for(path, fps)
     if len(frames) < 2:
@@ -217,6 +211,8 @@ def draw(result, frames, path, name, title, fps=DEFAULT_FPS):
                 progress(index + 1)
         os.replace(part, path)
     except subprocess.CalledProcessError as error:
+        if isinstance(error.__context__, KeyboardInterrupt):  # Ctrl-C reaches ffmpeg, too
+            raise error.__context__
         raise Unavailable(f"{path}: ffmpeg failed: {(error.stderr or error.output or '').strip()[-200:]}") from error
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error}") from error

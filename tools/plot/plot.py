@@ -10,7 +10,6 @@ from operator import attrgetter
 import command_line
 
 command_line.require_libraries("tubule plot")
-import movie  # noqa: E402
 import scan  # noqa: E402
 import style  # noqa: E402
 from balance import BalancePanel, has_balance  # noqa: E402
@@ -52,7 +51,7 @@ def arguments():
     parser.add_argument("--to", type=float, dest="high", help="up to this one")
     parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
     parser.add_argument("--movie", default="", help="film to write, .mp4 or .gif, and nothing else")
-    parser.add_argument("--fps", type=float, default=movie.DEFAULT_FPS, help="of a film: frames per second, 0.1 to 100")
+    parser.add_argument("--fps", type=float, default=10.0, help="of a film: frames per second, 0.1 to 100")
     parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
     parser.add_argument("--quantity", default="", help="of a scan: what its map shows")
     parser.add_argument("--slice", action="append", default=[], help="of a scan: KEY=VALUE of an axis that is cut")
@@ -173,6 +172,8 @@ def read_arguments(options):
 
 
 def draw_movie(options):
+    import movie  # no picture needs it
+
     paths = options.results
     if len(paths) > 1 or scan.is_scan(paths[0]):
         raise BadInput(f"{paths[0]}: --movie shows one result, and no scan")
@@ -215,7 +216,7 @@ def main():
         except BadInput as error:
             command_line.say(error)
             return command_line.EXIT_BAD_INPUT
-        except movie.Unavailable as error:
+        except command_line.Unavailable as error:
             command_line.say(error)
             return command_line.EXIT_UNAVAILABLE
         except KeyboardInterrupt:

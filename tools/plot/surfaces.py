@@ -26,7 +26,7 @@ def slots(count):
     return SLOTS.get(count) or tuple((0.05 + 0.95 * i / count, 0.95 / count - 0.06) for i in range(count))
 
 
-def _areas(surface):
+def node_areas(surface):
     """Approximate area of each value, for a colour scale."""
     a, b, c = (surface.points[:, corner] for corner in range(3))
     cell = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2 + 1e-300
@@ -91,7 +91,7 @@ class Quantity:
 
 def quantities(names, results, surfaces):
     """Scales of colours that all surfaces share; of the normal velocity relative to its largest value on each."""
-    areas = [_areas(surface).ravel() for surface in surfaces]
+    areas = [node_areas(surface).ravel() for surface in surfaces]
     u_n = flow.SYMBOLS["u_n"]
     label = f"normal velocity {u_n} / max |{u_n}| of the shape, > 0: outward"
     found = {"u_n": Quantity("u_n", u_n, Colours(flow.VELOCITY, Normalize(-1, 1), "neither", label))}

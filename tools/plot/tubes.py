@@ -89,7 +89,8 @@ def caption(column, row, numbered=False):
     return stop if shown or numbered else f"{stop}\nt = {time_text(frame.time)}"
 
 
-def _area(frame):
+def ring_areas(frame):
+    """Area of each value of a profile, up to a common factor."""
     return np.abs(frame.r) * np.hypot(np.gradient(frame.r), np.gradient(frame.z)) + 1e-300
 
 
@@ -146,7 +147,7 @@ class ProfilePanel:
         self._choose_colours()
 
     def _choose_colours(self):
-        self.H, self.K = curvature_colours(self.results, self.frames, [_area(frame) for frame in self.frames])
+        self.H, self.K = curvature_colours(self.results, self.frames, [ring_areas(frame) for frame in self.frames])
 
     def _words(self, column, row):
         """Below the profile of that row and column."""
