@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_series.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
@@ -13,13 +14,13 @@ namespace {
 
 constexpr int steps_between_looks = 10;
 // Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
-constexpr double error_per_defect = 0.5;  // of the energy balance
-constexpr double least_error = 0.02;      // of what is asked for: no estimate is trusted below
-constexpr double start_steps = 40;        // over which steps grow where the integrator begins
-constexpr double least_share = 0.2;       // of the difference of a pair, which is the error of the coarser run
+constexpr double error_per_defect = 0.5;           // of the energy balance
+constexpr double least_error = 0.02;               // of what is asked for: no estimate is trusted below
+constexpr double start_steps = 40;                 // over which steps grow where the integrator begins
+constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
 constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
 constexpr int few_steps = 8;
-constexpr double hopeless_rise = 0.1;     // of E_ref: of a run that is not asked for an accuracy
+constexpr double hopeless_rise = 0.1;  // of E_ref: of a run that is not asked for an accuracy
 
 // How often the integrator has begun by this time: at the start, and at each kink of the loads.
 int beginnings(const MotionLaw& law, double t) {
@@ -63,6 +64,7 @@ void CurveAttempt::begin() {
     past_.total_start = s.total();
     past_.least = past_.total_start;
     out_.note(doubt_before(setup_.c, s.free_energy, summary.reference_energy));
+    out_.note(setup_.start.note);
     compare(0, s);
     trace.add(0, s.free_energy, 0);
     add_to_trace(at.time);
@@ -158,6 +160,8 @@ std::optional<StopReport> CurveAttempt::step() {
     const bool at_kink = outcome == Flow::Outcome::end && t < end;
     if (at_kink) outcome = Flow::Outcome::step;
     if (auto stall = stall_.after_step(t, flow_->step_size(), end)) return stall;
+    if (outcome == Flow::Outcome::failed && may_be_undefined(now_.o.domain))
+        return undefined_energy(now_.o.domain, t, fmt::format("s = {:.4g}", now_.o.domain.place));
     if (outcome == Flow::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
                           "try another accuracy, discretisation.elements or parametrisation"};

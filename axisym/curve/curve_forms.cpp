@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -39,7 +40,7 @@ S stretching(const S& r1, const S& r2, const S& z1, const S& z2) {
 }
 
 // The functional per unit of s, with derivatives with respect to (r, r', r'', z', z'').
-template <int Order>
+template <int Order, Added added = Added::any>
 Jet<Pack, 5, Order> functional_density(const Bending& bending, const Weights& w, const Local& at) {
     using J = Jet<Pack, 5, Order>;
     const J r = J::variable(at.r, 0), r1 = J::variable(at.r1, 1), r2 = J::variable(at.r2, 2),
@@ -47,7 +48,7 @@ Jet<Pack, 5, Order> functional_density(const Bending& bending, const Weights& w,
     J sum;
     if (w.energy != 0 || w.area != 0) {
         const auto p = profile_point(r, r1, r2, z1, z2);
-        const auto f = density(bending, p.H.v, p.K.v);
+        const auto f = density<Pack, added>(bending, p.H.v, p.K.v);
         sum = p.area * (w.energy * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK) + w.area);
     }
     if (w.volume != 0) sum += (w.volume * pi) * (r * r * z1);
@@ -99,87 +100,96 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
 
 template <int P>
 [[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const double* x, double* out) const {
-    const ProfileSpace& splines = space_.splines();
-    Pack smallest{std::numeric_limits<double>::infinity()}, rise{0.0};
-    for (int e = 0; e < splines.elements(); ++e) {
-        Pack sums[2][2] = {{Pack(0.0), Pack(0.0)}, {Pack(0.0), Pack(0.0)}};  // [field][half of the splines]
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const Local at(space_, e, g, x);
-            smallest = stdx::min(smallest, at.r);
-            const auto density = functional_density<1>(bending_, weights, at);
-            const Pack weight = images_ * load(basis.weight);
-            alignas(32) double c[5][lanes];
-            for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
-            rise += weight * density.d[first_variable[1]];
-            for (int q = 0; q < lanes; ++q)
-                for (int field = 0; field < 2; ++field)
-                    for (int d = first_derivative[field]; d < 3; ++d) {
-                        const double value = c[first_variable[field] + d - first_derivative[field]][q];
-                        sums[field][0] += value * load(basis.by_spline[q][d]);
-                        sums[field][1] += value * load(basis.by_spline[q][d] + lanes);
-                    }
+    const auto kernel = [&]<Added added>() -> bool {
+        const ProfileSpace& splines = space_.splines();
+        Pack smallest{std::numeric_limits<double>::infinity()}, rise{0.0};
+        for (int e = 0; e < splines.elements(); ++e) {
+            Pack sums[2][2] = {{Pack(0.0), Pack(0.0)}, {Pack(0.0), Pack(0.0)}};  // [field][half of the splines]
+            for (int g = 0; g < splines.groups(); ++g) {
+                const auto& basis = splines.basis(e, g);
+                const Local at(space_, e, g, x);
+                smallest = stdx::min(smallest, at.r);
+                const auto density = functional_density<1, added>(bending_, weights, at);
+                const Pack weight = images_ * load(basis.weight);
+                alignas(32) double c[5][lanes];
+                for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
+                rise += weight * density.d[first_variable[1]];
+                for (int q = 0; q < lanes; ++q)
+                    for (int field = 0; field < 2; ++field)
+                        for (int d = first_derivative[field]; d < 3; ++d) {
+                            const double value = c[first_variable[field] + d - first_derivative[field]][q];
+                            sums[field][0] += value * load(basis.by_spline[q][d]);
+                            sums[field][1] += value * load(basis.by_spline[q][d] + lanes);
+                        }
+            }
+            for (int field = 0; field < 2; ++field) {
+                const Field& f = field == 0 ? space_.r() : space_.z();
+                double* to = field == 0 ? out : out + space_.r().size();
+                alignas(32) double local[wide];
+                store(sums[field][0], local);
+                store(sums[field][1], local + lanes);
+                for (int a = 0; a <= P; ++a) to[f.dofs(e)[a]] += f.signs(e)[a] * local[a];
+            }
         }
-        for (int field = 0; field < 2; ++field) {
-            const Field& f = field == 0 ? space_.r() : space_.z();
-            double* to = field == 0 ? out : out + space_.r().size();
-            alignas(32) double local[wide];
-            store(sums[field][0], local);
-            store(sums[field][1], local + lanes);
-            for (int a = 0; a <= P; ++a) to[f.dofs(e)[a]] += f.signs(e)[a] * local[a];
-        }
-    }
-    if (space_.free_period()) out[space_.shape_size()] += stdx::reduce(rise);
-    return stdx::hmin(smallest) > 0;
+        if (space_.free_period()) out[space_.shape_size()] += stdx::reduce(rise);
+        return stdx::hmin(smallest) > 0;
+    };
+    return by_added(bending_, kernel);
 }
 
 template <int P>
 [[gnu::flatten]] void CurveForms::hessian_kernel(const Weights& weights, const double* x, double* values) const {
-    constexpr int w = P + 1;
-    const ProfileSpace& splines = space_.splines();
-    for (int e = 0; e < splines.elements(); ++e) {
-        alignas(32) Pack local[2][2][w][2];  // [field of column][field of row][column][half of the rows]
-        std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const auto density = functional_density<2>(bending_, weights, Local(space_, e, g, x));
-            const Pack weight = images_ * load(basis.weight);
-            alignas(32) double c[5][5][lanes];
-            for (int i = 0; i < 5; ++i)
-                for (int j = 0; j < 5; ++j) store(weight * density.dd[packed<5>(i, j)], c[i][j]);
-            for (int q = 0; q < lanes; ++q) {
-                const auto& s = basis.by_spline[q];
-                for (int field = 0; field < 2; ++field)
-                    for (int of = 0; of < 2; ++of)
-                        for (int half = 0; half * lanes <= P; ++half) {
-                            const int d0 = first_derivative[field], i0 = first_variable[field] - d0;
-                            const int k0 = first_derivative[of], j0 = first_variable[of] - k0;
-                            Pack rows[3];  // c contracted with the splines of the rows
-                            for (int d = d0; d < 3; ++d) {
-                                rows[d] = Pack(0.0);
-                                for (int k = k0; k < 3; ++k)
-                                    rows[d] += c[i0 + d][j0 + k][q] * load(s[k] + half * lanes);
+    const auto kernel = [&]<Added added>() -> void {
+        constexpr int w = P + 1;
+        const ProfileSpace& splines = space_.splines();
+        for (int e = 0; e < splines.elements(); ++e) {
+            alignas(32) Pack local[2][2][w][2];  // [field of column][field of row][column][half of the rows]
+            std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
+            for (int g = 0; g < splines.groups(); ++g) {
+                const auto& basis = splines.basis(e, g);
+                const auto density = functional_density<2, added>(bending_, weights, Local(space_, e, g, x));
+                const Pack weight = images_ * load(basis.weight);
+                alignas(32) double c[5][5][lanes];
+                for (int i = 0; i < 5; ++i)
+                    for (int j = 0; j < 5; ++j) store(weight * density.dd[packed<5>(i, j)], c[i][j]);
+                for (int q = 0; q < lanes; ++q) {
+                    const auto& s = basis.by_spline[q];
+                    for (int field = 0; field < 2; ++field)
+                        for (int of = 0; of < 2; ++of)
+                            for (int half = 0; half * lanes <= P; ++half) {
+                                const int d0 = first_derivative[field], i0 = first_variable[field] - d0;
+                                const int k0 = first_derivative[of], j0 = first_variable[of] - k0;
+                                Pack rows[3];  // c contracted with the splines of the rows
+                                for (int d = d0; d < 3; ++d) {
+                                    rows[d] = Pack(0.0);
+                                    for (int k = k0; k < 3; ++k)
+                                        rows[d] += c[i0 + d][j0 + k][q] * load(s[k] + half * lanes);
+                                }
+                                for (int b = 0; b < w; ++b)
+                                    for (int d = d0; d < 3; ++d) local[field][of][b][half] += s[d][b] * rows[d];
                             }
-                            for (int b = 0; b < w; ++b)
-                                for (int d = d0; d < 3; ++d) local[field][of][b][half] += s[d][b] * rows[d];
-                        }
+                }
             }
+            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+            for (int b = 0; b < 2 * w; ++b)
+                for (int of = 0; of < 2; ++of) {
+                    alignas(32) double column[wide];
+                    store(local[b / w][of][b % w][0], column);
+                    store(local[b / w][of][b % w][1], column + lanes);
+                    const double sign = (b < w ? space_.r() : space_.z()).signs(e)[b % w];
+                    const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
+                    for (int a = 0; a < w; ++a) values[slot[b * 2 * w + of * w + a]] += sign * signs[a] * column[a];
+                }
         }
-        const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
-        for (int b = 0; b < 2 * w; ++b)
-            for (int of = 0; of < 2; ++of) {
-                alignas(32) double column[wide];
-                store(local[b / w][of][b % w][0], column);
-                store(local[b / w][of][b % w][1], column + lanes);
-                const double sign = (b < w ? space_.r() : space_.z()).signs(e)[b % w];
-                const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
-                for (int a = 0; a < w; ++a) values[slot[b * 2 * w + of * w + a]] += sign * signs[a] * column[a];
-            }
-    }
+    };
+    return by_added(bending_, kernel);
 }
 
 bool CurveForms::add_gradient(const Weights& weights, const double* x, double* out) const {
-    return for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, x, out); });
+    const bool inside =
+        for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, x, out); });
+    return inside &&
+           (bending_.terms.empty() || std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
 
 void CurveForms::add_hessian(const Weights& weights, const double* x, double* values) const {
@@ -287,15 +297,28 @@ bool CurveForms::admissible(const Eigen::VectorXd& x) const {
             const Local at(space_, e, g, x.data());
             if (!(stdx::hmin(at.r) > 0 && stdx::hmin(at.r1 * at.r1 + at.z1 * at.z1) > 0)) return false;
         }
-    return true;
+    return domain(x).value > 0;
+}
+
+FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
+    const ProfileSpace& splines = space_.splines();
+    DensityDomain domain(bending_);
+    if (!domain.restricted()) return {};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(space_, e, g, x.data());
+            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
+            for (int i = 0; i < lanes; ++i) domain.look(p.H[i], p.K[i], splines.basis(e, g).z[i]);
+        }
+    return domain.margin();
 }
 
 CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
     const ProfileSpace& splines = space_.splines();
     const int n = splines.elements();
     CurveObservation o;
-    Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0}, terms[n_bending_terms];
-    for (auto& t : terms) t = Pack(0.0);
+    Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0};
+    std::vector<Pack> terms(count_terms(bending_), Pack(0.0));
     std::vector<double> stiffness(n, 0.0);
     for (int e = 0; e < n; ++e)
         for (int g = 0; g < splines.groups(); ++g) {
@@ -308,9 +331,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
             volume += pi * weight * at.r * at.r * at.z1;
             gauge += 0.5 * weight * q * q;
             length += weight * speed;
-            for_each_bending_term([&](std::size_t i, const auto& term) {
-                if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
-            });
+            for_each_value(bending_, p.H, p.K, [&](std::size_t i, const Pack& value) { terms[i] += value * dA; });
             const auto f = density(bending_, p.H, p.K);
             const Pack s = principal_symbol(f, p.kappa_theta);
             const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
@@ -331,7 +352,8 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     o.volume = images_ * stdx::reduce(volume);
     o.gauge = images_ * stdx::reduce(gauge);
     o.length = images_ * stdx::reduce(length);
-    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = images_ * stdx::reduce(terms[i]);
+    for (const Pack& term : terms) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
+    o.domain = domain(x);
     if (defect) *defect = spline_defect(x, stiffness);
     return o;
 }
@@ -368,17 +390,15 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
 
 double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
     const ProfileSpace& splines = space_.splines();
-    Pack magnitude{0.0};
+    double magnitude = 0;
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            for_each_bending_term([&](std::size_t i, const auto& term) {
-                magnitude += std::abs(bending_.k[i]) * term.magnitude(p.H, p.K, bending_.H0) * p.area *
-                             load(splines.basis(e, g).weight);
-            });
+            const Pack dA = p.area * load(splines.basis(e, g).weight);
+            for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, p.H[i], p.K[i]) * dA[i];
         }
-    return std::max(std::abs(observe(x).energy), images_ * stdx::reduce(magnitude));
+    return std::max(std::abs(observe(x).energy), images_ * magnitude);
 }
 
 }  // namespace tubule::axisym

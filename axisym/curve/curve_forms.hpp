@@ -26,7 +26,7 @@ struct Weights {
 // measurements, found in one pass, that share no rule.
 struct CurveObservation {
     double energy = 0;
-    std::array<double, n_bending_terms> energy_term{};
+    std::vector<double> energy_term;  // of each term, see term_names()
     double area = 0, volume = 0, gauge = 0;
     double length = 0;                                                  // of the meridian
     double r_min = std::numeric_limits<double>::infinity(), s_min = 0;  // not a pole, but possibly near one
@@ -36,6 +36,7 @@ struct CurveObservation {
     // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
     // curvatures: theory.md (2.14).
     double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
+    FormulaDomain::Margin domain;  // of the energy's formula; its place is s
 };
 
 class CurveForms {
@@ -49,7 +50,8 @@ public:
     // Not finite or meaningless unless r > 0 at all quadrature points: see admissible().
     double value(const Weights& weights, const Eigen::VectorXd& x) const;
     Eigen::VectorXd gradient(const Weights& weights, const Eigen::VectorXd& x) const;
-    // As above, added to `out` of space().size() numbers. False if r <= 0 at a quadrature point.
+    // As above, added to `out` of space().size() numbers. False if at a quadrature point r <= 0 or the energy is not
+    // defined.
     bool add_gradient(const Weights& weights, const double* x, double* out) const;
     Eigen::SparseMatrix<double> hessian(const Weights& weights, const Eigen::VectorXd& x) const;
     // As above, added to the values of a matrix with pattern().
@@ -60,7 +62,7 @@ public:
     // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
-    // r > 0 and |X'| > 0 at all quadrature points.
+    // r > 0, |X'| > 0 and the energy defined at all quadrature points.
     bool admissible(const Eigen::VectorXd& x) const;
     // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
     // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
@@ -73,6 +75,7 @@ private:
     bool gradient_kernel(const Weights& weights, const double* x, double* out) const;
     template <int P>
     void hessian_kernel(const Weights& weights, const double* x, double* values) const;
+    FormulaDomain::Margin domain(const Eigen::VectorXd& x) const;
     template <class Add>
     void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
     std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const;

@@ -62,22 +62,26 @@ Result read_start(const Case& c, const ResultFrame& from) {
     }
 }
 
+Record start_frame(const Case& c, const ResultFrame& from) {
+    const Result result = read_start(c, from);
+    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
+    if (number < 0 || number >= count)
+        throw complaint(c, "shape.frame",
+                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
+    return result.frames[number];
+}
+
 struct MakeMeridian {
     const Case& c;
     template <class Exact>
     Meridian operator()(const Exact& shape) const {
         return meridian(shape);
     }
+    Meridian operator()(const ProfileFile& file) const { return meridian(start_profile(c, file)); }
     Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
     Meridian operator()(const ResultFrame& from) const {
-        const Result result = read_start(c, from);
-        const int count = static_cast<int>(result.frames.size()),
-                  number = from.frame < 0 ? count + from.frame : from.frame;
-        if (number < 0 || number >= count)
-            throw complaint(c, "shape.frame",
-                            fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
         try {
-            return frame_meridian(result.frames[number]);
+            return frame_meridian(start_frame(c, from));
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }
@@ -121,6 +125,29 @@ Meridian frame_meridian(const Record& frame) {
     const double r_max = *std::max_element(r.begin(), r.end());
     const bool has_poles = std::abs(r.front()) < 1e-9 * r_max && std::abs(r.back()) < 1e-9 * r_max;
     return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
+}
+
+SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
+    try {
+        return read_profile(std::filesystem::path(c.path).parent_path() / file.path, file);
+    } catch (const ProfileError& error) {
+        throw CaseError(error.what());
+    }
+}
+
+std::optional<StartVelocity> start_velocity(const Case& c) {
+    if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
+    const Record frame = start_frame(c, std::get<ResultFrame>(c.shape));
+    const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
+                *around = find_array(frame, "u_theta");
+    if (!normal || !along || kind_of(frame) != RecordKind::curve)
+        throw complaint(c, "velocity.initial",
+                        "must not be \"result\": the frame of shape.path is no profile with a velocity");
+    const auto [r, z, length] = profile_points(frame);
+    StartVelocity out{profile_curve(r, z, length), {}, around != nullptr};
+    out.velocity =
+        profile_velocity(out.curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
+    return out;
 }
 
 Meridian start_meridian(const Case& c) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_measures.hpp"
+#include "common/run/energy_checks.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -30,6 +31,10 @@ std::span<const CurveGuard> curve_guards() {
                                fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
                                            s.o.s_symbol),
                                "refinement does not help: the energy does not resist short waves there"};
+         }},
+        {[](const Snapshot& s, double) { return s.o.domain.is_small() ? -1 : 1.0; },
+         [](const Snapshot& s, double time) {
+             return undefined_energy(s.o.domain, time, fmt::format("s = {:.4g}", s.o.domain.place));
          }},
         {[](const Snapshot& s, double) { return s.o.g_min / s.o.g_max - stretched; },
          [](const Snapshot& s, double time) {

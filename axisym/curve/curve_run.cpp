@@ -25,7 +25,7 @@ bool comparable(const StopReport& coarse, const StopReport& fine, double end) {
 // Whether a flow may have been ill-posed without being seen to be: the two runs of a pair are at least half as far
 // apart as the finer one is from that. A symbol that cannot change its sign may come as close to 0 as it likes.
 bool may_be_ill_posed(const Bending& energy, double coarse, double fine) {
-    return std::ranges::any_of(energy.k, [](double k) { return k < 0; }) && fine < 2 * std::abs(coarse - fine);
+    return symbol_may_vanish(energy) && fine < 2 * std::abs(coarse - fine);
 }
 
 class CurveRuns : public PairedRuns {

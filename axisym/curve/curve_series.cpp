@@ -33,7 +33,7 @@ SeriesTable<CurveRow> curve_series(const Case& c) {
                {"newton_iterations",
                 [](const CurveRow& r) { return static_cast<double>(r.flow.counters().newton_iterations); }},
                {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
-    table.add_family("energy_<kl>", energy_term_numbers(),
+    table.add_family("energy_<kl>", term_names(c.energy),
                      [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
     const MotionLaw law = motion_law(c.model);
     table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
@@ -55,8 +55,7 @@ SeriesTable<CurveRow> curve_series(const Case& c) {
                    {"lambda", lambda}});
     table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
                {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
-    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape))
-        table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
+    if (may_have_period(c.shape)) table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
     if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.period; }}});
     table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
                {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},

@@ -1,10 +1,13 @@
 #include "axisym/curve/curve_setup.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "axisym/curve/curve_frame.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 #include "common/run/output_times.hpp"
 #include "common/solve/sparse.hpp"
@@ -42,8 +45,7 @@ StartEnergy start_energy(const CurveForms& forms, const MotionLaw& law, const Ei
     const CurveObservation o = forms.observe(x);
     const double length = forms.space().length(x.data());
     const double energy = o.energy + loads_at(law, 0).energy(o.area, o.volume, length);
-    return {energy,
-            std::max(std::abs(energy), forms.reference_energy(x) + load_scale(law, o.area, o.volume, length))};
+    return {energy, std::max(std::abs(energy), forms.reference_energy(x) + load_scale(law, o.area, o.volume, length))};
 }
 
 // Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
@@ -78,20 +80,23 @@ std::unique_ptr<CurveSpace> space_of(const Case& c, const Meridian& meridian, co
 CurveLaw law_of(const Case& c) {
     CurveLaw law = motion_law(c.model);
     law.lagrangian = law.inextensible && c.discretisation.parametrisation != Parametrisation::even;
-    law.swirls = c.velocity.rotates;
+    law.swirls = c.velocity.initial == InitialVelocity::rotation;
     return law;
 }
 
 Beginning beginning_of(const Case& c) {
     Meridian whole = start_meridian(c);
-    if (c.discretisation.symmetry && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
+    std::optional<StartVelocity> velocity = start_velocity(c);
+    if (!velocity && c.discretisation.symmetry &&
+        (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
         } catch (const std::invalid_argument&) {  // not mirror-symmetric
         }
     }
     const auto [area, volume] = area_and_volume(whole);
-    return {std::move(whole), area, volume};
+    const auto* file = std::get_if<ProfileFile>(&c.shape);
+    return {std::move(whole), area, volume, std::move(velocity), file ? start_profile(c, *file).note() : ""};
 }
 
 int Beginning::images() const {
@@ -104,7 +109,10 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     space = space_of(c, start.meridian, first_breaks(arc, settings, c, least_seam));
     const CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
+    const FormulaDomain::Margin domain = forms.observe(x).domain;
+    require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
+    law.swirls = law.swirls || (start.velocity && start.velocity->swirls);
     const StartEnergy energy = start_energy(forms, law, x);
     magnitude = energy.magnitude;
     reference_energy = tubule::reference_energy(c, energy.energy, magnitude);
@@ -158,12 +166,35 @@ CurveObservation observe_start(const CurveSetup& setup) {
     return CurveForms(*space, setup.c.energy).observe(fit(*space, arc));
 }
 
+namespace {
+
+// The velocity of the frame that the run begins with; parameters are fractions of the arc length there and here.
+void set_velocity(const CurveSetup& setup, Eigen::VectorXd& y) {
+    const StartVelocity& start = *setup.start.velocity;
+    const CurveSpace& space = *setup.space;
+    const MotionLayout& at = setup.motion->layout();
+    const auto value = [&](const BlendedCurve& functions, double s, int component) {
+        const bool cell = start.curve.kind == ProfileCurve::Kind::cell;
+        const double found = value_at(functions, cell ? -std::cos(pi * s) : s)[component];
+        return cell && (component == 0) ? found * std::sin(pi * s) : found;
+    };
+    const auto project = [&](const Field& field, int offset, const BlendedCurve& functions, int component) {
+        y.segment(offset, field.size()) = field.project([&](double s) { return value(functions, s, component); });
+    };
+    project(space.r(), at.u_r, start.velocity.meridional, 0);
+    project(space.z(), at.u_z, start.velocity.meridional, 1);
+    if (at.swirl >= 0) project(space.r(), at.swirl, start.velocity.around, 0);
+}
+
+}  // namespace
+
 CurveBegin begin_state(const CurveSetup& setup) {
     const CurveSpace& space = *setup.space;
     const MotionLayout& at = setup.motion->layout();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(at.size);
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
+    if (setup.start.velocity) set_velocity(setup, y);
     std::optional<CurveMotion::Start> consistent;
     // Short, since a start that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).

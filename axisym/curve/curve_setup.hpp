@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_series.hpp"
 #include "axisym/curve/curve_settings.hpp"
@@ -18,6 +19,8 @@ CurveLaw law_of(const Case& c);
 struct Beginning {
     Meridian meridian;
     double area = 0, volume = 0;
+    std::optional<StartVelocity> velocity = {};
+    std::string note = {};  // what there is to say of it
 
     int images() const;  // of the meridian in the whole shape
 };

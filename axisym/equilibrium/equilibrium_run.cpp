@@ -36,8 +36,8 @@ double sphere_volume(double area, double reduced) {
 }
 
 SetParameter setter(int parameter) {
-    if (parameter < static_cast<int>(n_bending_terms))
-        return [parameter](StationaryProblem& p, double value) { p.bending.k[parameter] = value; };
+    if (parameter >= 0)
+        return [parameter](StationaryProblem& p, double value) { modulus(p.bending, parameter) = value; };
     switch (parameter) {
         case vary_H0:
             return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
@@ -62,7 +62,7 @@ SetParameter setter(int parameter) {
 }
 
 double start_of(int parameter, const StationaryProblem& p) {
-    if (parameter < static_cast<int>(n_bending_terms)) return p.bending.k[parameter];
+    if (parameter >= 0) return modulus(p.bending, parameter);
     const Constraints& c = p.constraints;
     switch (parameter) {
         case vary_H0:
@@ -169,7 +169,7 @@ SeriesTable<ShapeRow> shape_series(const Case& c) {
         table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
                    {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
-    table.add_family("energy_<kl>", energy_term_numbers(),
+    table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
@@ -343,6 +343,7 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
         stop.advice = "run the case again: equilibria are not resumed";
     }
     RunSummary s;
+    if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
     s.energy = write.last().observed.energy;
     s.reference_energy = write.last().reference_energy;
     s.elements = write.count() > 0 ? elements_of(write.last()) : 0;

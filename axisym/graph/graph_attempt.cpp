@@ -8,6 +8,7 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_start.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -267,6 +268,8 @@ StopReport GraphAttempt::failure(const std::string& what) const {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(good_.x.size());
     const Observation o = stage_->look(good_.x.data(), rest.data(), nullptr);
     if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
+    if (may_be_undefined(o.domain))
+        return undefined_energy(o.domain, good_.time, fmt::format("z = {:.6g}", stage_->place(o.domain.place)));
     return {Stop::solver_failed, good_.time, fmt::format("{} ({})", what, suspects()),
             "ask for more accuracy, or lower discretisation.time_order"};
 }

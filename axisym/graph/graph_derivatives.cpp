@@ -6,19 +6,22 @@ namespace tubule::axisym {
 
 std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x) {
     std::vector<TermCheck> checks;
-    for_each_bending_term([&](std::size_t i, const auto& term) {
-        if (forms.bending().k[i] == 0) return;
-        Bending alone{.k = {}, .H0 = forms.bending().H0};
-        alone.k[i] = forms.bending().k[i];
+    const Bending& all = forms.bending();
+    const std::vector<std::string> names = term_names(all);
+    for (std::size_t i = 0; i < count_terms(all); ++i) {
+        if (modulus(all, i) == 0) continue;
+        Bending alone = all;
+        for (std::size_t j = 0; j < count_terms(all); ++j)
+            if (j != i) modulus(alone, j) = 0;
         const Forms single(forms.space(), alone);
-        checks.push_back(
-            {term.key, check_derivatives([&](const Eigen::VectorXd& y) { return single.free_energy(y); },
-                                         [&](const Eigen::VectorXd& y) { return single.gradient(y); },
-                                         [&](const Eigen::VectorXd& y, const Eigen::VectorXd& w) -> Eigen::VectorXd {
-                                             return single.hessian(y) * w;
-                                         },
-                                         x)});
-    });
+        checks.push_back({(i < n_bending_terms || !all.terms[i - n_bending_terms].formula ? "k" : "") + names[i],
+                          check_derivatives([&](const Eigen::VectorXd& y) { return single.free_energy(y); },
+                                            [&](const Eigen::VectorXd& y) { return single.gradient(y); },
+                                            [&](const Eigen::VectorXd& y, const Eigen::VectorXd& w) -> Eigen::VectorXd {
+                                                return single.hessian(y) * w;
+                                            },
+                                            x)});
+    }
     return checks;
 }
 

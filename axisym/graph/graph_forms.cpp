@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -39,13 +40,13 @@ Pack gather(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
 }
 
 // The free energy per unit of z, with derivatives with respect to (r, r', r'').
-template <int Order>
+template <int Order, Added added>
 Jet<Pack, 3, Order> energy_density(const Bending& bending, const Loads& loads, const Pack& r, const Pack& r1,
                                    const Pack& r2, ProfilePoint<Jet<Pack, 3, Order>>& p) {
     using J = Jet<Pack, 3, Order>;
     const J radius = J::variable(r, 0);
     p = graph_point(radius, J::variable(r1, 1), J::variable(r2, 2));
-    const auto f = density(bending, p.H.v, p.K.v);
+    const auto f = density<Pack, added>(bending, p.H.v, p.K.v);
     return p.area * (chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK) + loads.tension) -
            (pi * loads.pressure) * (radius * radius);
 }
@@ -76,96 +77,104 @@ Forms::Forms(const ProfileSpace& space, const Bending& bending, const Loads& loa
 
 template <int P>
 [[gnu::flatten]] bool Forms::residual_kernel(const double* x, const double* v, double* out) const {
-    Pack smallest{std::numeric_limits<double>::infinity()};
-    for (int e = 0; e < space_.elements(); ++e) {
-        const int* dofs = space_.dofs(e);
-        Pack low{0.0}, high{0.0};
-        for (int g = 0; g < space_.groups(); ++g) {
-            const auto& basis = space_.basis(e, g);
-            const Local<P> at(basis, dofs, x);
-            smallest = stdx::min(smallest, at.r);
-            ProfilePoint<Jet<Pack, 3, 1>> p;
-            const auto energy = energy_density<1>(bending_, loads_, at.r, at.r1, at.r2, p);
-            const Pack weight = load(basis.weight);
-            const Pack drag = (2 * pi) * at.r * p.inverse_speed.v * gather<P>(basis, dofs, v);
-            // Through memory: a broadcast load is cheaper than taking a lane out of a register.
-            alignas(32) double c[3][lanes];
-            store(weight * (energy.d[0] + drag), c[0]);
-            store(weight * energy.d[1], c[1]);
-            store(weight * energy.d[2], c[2]);
-            for (int q = 0; q < lanes; ++q) {
-                const auto& s = basis.by_spline[q];
-                for (int d = 0; d < 3; ++d) {
-                    low += c[d][q] * load(s[d]);
-                    high += c[d][q] * load(s[d] + lanes);
+    const auto kernel = [&]<Added added>() -> bool {
+        Pack smallest{std::numeric_limits<double>::infinity()};
+        for (int e = 0; e < space_.elements(); ++e) {
+            const int* dofs = space_.dofs(e);
+            Pack low{0.0}, high{0.0};
+            for (int g = 0; g < space_.groups(); ++g) {
+                const auto& basis = space_.basis(e, g);
+                const Local<P> at(basis, dofs, x);
+                smallest = stdx::min(smallest, at.r);
+                ProfilePoint<Jet<Pack, 3, 1>> p;
+                const auto energy = energy_density<1, added>(bending_, loads_, at.r, at.r1, at.r2, p);
+                const Pack weight = load(basis.weight);
+                const Pack drag = (2 * pi) * at.r * p.inverse_speed.v * gather<P>(basis, dofs, v);
+                // Through memory: a broadcast load is cheaper than taking a lane out of a register.
+                alignas(32) double c[3][lanes];
+                store(weight * (energy.d[0] + drag), c[0]);
+                store(weight * energy.d[1], c[1]);
+                store(weight * energy.d[2], c[2]);
+                for (int q = 0; q < lanes; ++q) {
+                    const auto& s = basis.by_spline[q];
+                    for (int d = 0; d < 3; ++d) {
+                        low += c[d][q] * load(s[d]);
+                        high += c[d][q] * load(s[d] + lanes);
+                    }
                 }
             }
+            alignas(32) double local[wide];
+            store(low, local);
+            store(high, local + lanes);
+            for (int a = 0; a <= P; ++a) out[dofs[a]] += images_ * local[a];
         }
-        alignas(32) double local[wide];
-        store(low, local);
-        store(high, local + lanes);
-        for (int a = 0; a <= P; ++a) out[dofs[a]] += images_ * local[a];
-    }
-    return stdx::hmin(smallest) > 0;
+        return stdx::hmin(smallest) > 0;
+    };
+    return by_added(bending_, kernel);
 }
 
 template <int P>
 [[gnu::flatten]] void Forms::jacobian_kernel(const Bending& bending, const Loads& loads, const double* x,
                                              const double* v, double cj, double* values) const {
-    const int w = P + 1;
-    for (int e = 0; e < space_.elements(); ++e) {
-        const int* dofs = space_.dofs(e);
-        Pack local[P + 1][2];
-        for (auto& row : local) row[0] = row[1] = Pack(0.0);
-        for (int g = 0; g < space_.groups(); ++g) {
-            const auto& basis = space_.basis(e, g);
-            const Local<P> at(basis, dofs, x);
-            ProfilePoint<Jet<Pack, 3, 2>> p;
-            const auto energy = energy_density<2>(bending, loads, at.r, at.r1, at.r2, p);
-            const Pack weight = load(basis.weight), rate = gather<P>(basis, dofs, v);
-            // Drag 2 pi (r/g) v and its derivatives in r, r', v.
-            const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
-            const Pack drag_r = drag * rate, drag_r1 = (2 * pi) * weight * at.r * rate * p.inverse_speed.d[1];
-            alignas(32) double c[3][3][lanes];
-            store(weight * energy.dd[0] + drag_r + cj * at.r * drag, c[0][0]);
-            store(weight * energy.dd[1] + drag_r1, c[0][1]);
-            store(weight * energy.dd[1], c[1][0]);
-            store(weight * energy.dd[2], c[0][2]);
-            store(weight * energy.dd[2], c[2][0]);
-            store(weight * energy.dd[3], c[1][1]);
-            store(weight * energy.dd[4], c[1][2]);
-            store(weight * energy.dd[4], c[2][1]);
-            store(weight * energy.dd[5], c[2][2]);
-            for (int q = 0; q < lanes; ++q) {
-                const auto& s = basis.by_spline[q];
+    const auto kernel = [&]<Added added>() -> void {
+        const int w = P + 1;
+        for (int e = 0; e < space_.elements(); ++e) {
+            const int* dofs = space_.dofs(e);
+            Pack local[P + 1][2];
+            for (auto& row : local) row[0] = row[1] = Pack(0.0);
+            for (int g = 0; g < space_.groups(); ++g) {
+                const auto& basis = space_.basis(e, g);
+                const Local<P> at(basis, dofs, x);
+                ProfilePoint<Jet<Pack, 3, 2>> p;
+                const auto energy = energy_density<2, added>(bending, loads, at.r, at.r1, at.r2, p);
+                const Pack weight = load(basis.weight), rate = gather<P>(basis, dofs, v);
+                // Drag 2 pi (r/g) v and its derivatives in r, r', v.
+                const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
+                const Pack drag_r = drag * rate, drag_r1 = (2 * pi) * weight * at.r * rate * p.inverse_speed.d[1];
+                alignas(32) double c[3][3][lanes];
+                store(weight * energy.dd[0] + drag_r + cj * at.r * drag, c[0][0]);
+                store(weight * energy.dd[1] + drag_r1, c[0][1]);
+                store(weight * energy.dd[1], c[1][0]);
+                store(weight * energy.dd[2], c[0][2]);
+                store(weight * energy.dd[2], c[2][0]);
+                store(weight * energy.dd[3], c[1][1]);
+                store(weight * energy.dd[4], c[1][2]);
+                store(weight * energy.dd[4], c[2][1]);
+                store(weight * energy.dd[5], c[2][2]);
+                for (int q = 0; q < lanes; ++q) {
+                    const auto& s = basis.by_spline[q];
 #pragma GCC unroll 8
-                for (int half = 0; half * lanes <= P; ++half) {
-                    Pack column[3];  // c contracted with the splines a, the rows of the local matrix
+                    for (int half = 0; half * lanes <= P; ++half) {
+                        Pack column[3];  // c contracted with the splines a, the rows of the local matrix
 #pragma GCC unroll 8
-                    for (int d = 0; d < 3; ++d) {
-                        column[d] = c[0][d][q] * load(s[0] + half * lanes);
-                        for (int k = 1; k < 3; ++k) column[d] += c[k][d][q] * load(s[k] + half * lanes);
+                        for (int d = 0; d < 3; ++d) {
+                            column[d] = c[0][d][q] * load(s[0] + half * lanes);
+                            for (int k = 1; k < 3; ++k) column[d] += c[k][d][q] * load(s[k] + half * lanes);
+                        }
+#pragma GCC unroll 8
+                        for (int b = 0; b <= P; ++b)
+                            local[b][half] += s[0][b] * column[0] + s[1][b] * column[1] + s[2][b] * column[2];
                     }
-#pragma GCC unroll 8
-                    for (int b = 0; b <= P; ++b)
-                        local[b][half] += s[0][b] * column[0] + s[1][b] * column[1] + s[2][b] * column[2];
                 }
             }
-        }
-        const int* slot = &slots_[static_cast<std::size_t>(e) * w * w];
-        alignas(32) double column[wide];
+            const int* slot = &slots_[static_cast<std::size_t>(e) * w * w];
+            alignas(32) double column[wide];
 #pragma GCC unroll 8
-        for (int b = 0; b <= P; ++b) {
-            store(local[b][0], column);
-            store(local[b][1], column + lanes);
-            for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * column[a];
+            for (int b = 0; b <= P; ++b) {
+                store(local[b][0], column);
+                store(local[b][1], column + lanes);
+                for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * column[a];
+            }
         }
-    }
+    };
+    return by_added(bending, kernel);
 }
 
 bool Forms::residual(const double* x, const double* v, double* out) const {
     std::fill_n(out, space_.size(), 0.0);
-    return for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, out); });
+    const bool inside = for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, out); });
+    return inside &&
+           (bending_.terms.empty() || std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
 
 void Forms::jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
@@ -191,7 +200,7 @@ double Forms::axial_force(const Eigen::VectorXd& x) const {
                 const auto& basis = space_.basis(e, g);
                 const Local<P()> at(basis, space_.dofs(e), x.data());
                 ProfilePoint<Jet<Pack, 3, 1>> p;
-                const auto f = energy_density<1>(bending_, loads_, at.r, at.r1, at.r2, p);
+                const auto f = energy_density<1, Added::any>(bending_, loads_, at.r, at.r1, at.r2, p);
                 sum += load(basis.weight) * (f.v - at.r1 * f.d[1] - 2 * at.r2 * f.d[2]);
             }
         return images_ * stdx::reduce(sum) / space_.cell().period();
@@ -227,48 +236,54 @@ Eigen::VectorXd Forms::rate(const Eigen::VectorXd& x) const {
 
 template <int P>
 [[gnu::flatten]] Observation Forms::observe_kernel(const double* x, const double* v, double* stiffness) const {
-    Observation o;
-    o.r_min = o.symbol = o.symbol_3d = std::numeric_limits<double>::infinity();
-    o.r_max = -o.r_min;
-    Pack dissipation{0.0}, area{0.0}, volume{0.0}, terms[n_bending_terms];
-    for (auto& t : terms) t = Pack(0.0);
-    for (int e = 0; e < space_.elements(); ++e) {
-        if (stiffness) stiffness[e] = 0;
-        for (int g = 0; g < space_.groups(); ++g) {
-            const auto& basis = space_.basis(e, g);
-            const Local<P> at(basis, space_.dofs(e), x);
-            const auto p = graph_point(at.r, at.r1, at.r2);
-            const Pack weight = load(basis.weight), rate = gather<P>(basis, space_.dofs(e), v);
-            const Pack dA = weight * p.area;
-            area += dA;
-            volume += pi * weight * at.r * at.r;
-            dissipation += (2 * pi) * weight * at.r * p.inverse_speed * rate * rate;
-            for_each_bending_term([&](std::size_t i, const auto& term) {
-                if (bending_.k[i] != 0) terms[i] += bending_.k[i] * term.value(p.H, p.K, bending_.H0) * dA;
-            });
-            const auto f = density(bending_, p.H, p.K);
-            const Pack s = principal_symbol(f, p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
-            const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
-            if (stiffness) {
-                const Pack ig2 = p.inverse_speed * p.inverse_speed;
-                stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
-            }
-            for (int q = 0; q < lanes; ++q) {
-                if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];
-                if (at.r[q] > o.r_max) o.r_max = at.r[q], o.z_max = basis.z[q];
-                if (steep[q] > o.steepness) o.steepness = steep[q], o.z_steep = basis.z[q];
-                if (s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
+    const auto kernel = [&]<Added added>() -> Observation {
+        Observation o;
+        o.r_min = o.symbol = o.symbol_3d = std::numeric_limits<double>::infinity();
+        o.r_max = -o.r_min;
+        Pack dissipation{0.0}, area{0.0}, volume{0.0}, listed[n_bending_terms];
+        for (Pack& term : listed) term = Pack(0.0);
+        std::vector<Pack> more(bending_.terms.size(), Pack(0.0));
+        for (int e = 0; e < space_.elements(); ++e) {
+            if (stiffness) stiffness[e] = 0;
+            for (int g = 0; g < space_.groups(); ++g) {
+                const auto& basis = space_.basis(e, g);
+                const Local<P> at(basis, space_.dofs(e), x);
+                const auto p = graph_point(at.r, at.r1, at.r2);
+                const Pack weight = load(basis.weight), rate = gather<P>(basis, space_.dofs(e), v);
+                const Pack dA = weight * p.area;
+                area += dA;
+                volume += pi * weight * at.r * at.r;
+                dissipation += (2 * pi) * weight * at.r * p.inverse_speed * rate * rate;
+                for_each_value<Pack, added>(bending_, p.H, p.K, [&](std::size_t i, const Pack& value) {
+                    (i < n_bending_terms ? listed[i] : more[i - n_bending_terms]) += value * dA;
+                });
+                const auto f = density<Pack, added>(bending_, p.H, p.K);
+                const Pack s = principal_symbol(f, p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
+                const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
+                o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+                if (stiffness) {
+                    const Pack ig2 = p.inverse_speed * p.inverse_speed;
+                    stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
+                }
+                for (int q = 0; q < lanes; ++q) {
+                    if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];
+                    if (at.r[q] > o.r_max) o.r_max = at.r[q], o.z_max = basis.z[q];
+                    if (steep[q] > o.steepness) o.steepness = steep[q], o.z_steep = basis.z[q];
+                    if (s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
+                }
             }
         }
-    }
-    o.steepness *= o.r_min;
-    o.area = images_ * stdx::reduce(area);
-    o.volume = images_ * stdx::reduce(volume);
-    o.dissipation = images_ * stdx::reduce(dissipation);
-    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = images_ * stdx::reduce(terms[i]);
-    o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
-    return o;
+        o.steepness *= o.r_min;
+        o.area = images_ * stdx::reduce(area);
+        o.volume = images_ * stdx::reduce(volume);
+        o.dissipation = images_ * stdx::reduce(dissipation);
+        o.energy_term.reserve(count_terms(bending_));
+        for (const Pack& term : listed) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
+        for (const Pack& term : more) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
+        o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
+        return o;
+    };
+    return by_added(bending_, kernel);
 }
 
 Observation Forms::observe(const double* x, const double* v, std::vector<double>* defect) const {
@@ -277,7 +292,8 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
         defect->resize(space_.elements());
         stiffness = defect->data();
     }
-    const Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
+    Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
+    o.domain = domain(x);
     if (!defect) return o;
     const int n = space_.elements();
     const auto& breaks = space_.breaks();
@@ -298,6 +314,19 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
     return o;
 }
 
+FormulaDomain::Margin Forms::domain(const double* x) const {
+    DensityDomain domain(bending_);
+    if (!domain.restricted()) return {};
+    for (int e = 0; e < space_.elements(); ++e)
+        for (int g = 0; g < space_.groups(); ++g)
+            for (const double z : space_.basis(e, g).z) {
+                const auto [r, r1, r2] = space_.evaluate(x, e, z);
+                const auto p = graph_point(r, r1, r2);
+                domain.look(p.H, p.K, z);
+            }
+    return domain.margin();
+}
+
 double Forms::reference_energy(const Eigen::VectorXd& x) const {
     double magnitude = 0;
     for (int e = 0; e < space_.elements(); ++e)
@@ -306,10 +335,7 @@ double Forms::reference_energy(const Eigen::VectorXd& x) const {
                 const auto& basis = space_.basis(e, g);
                 const auto [r, r1, r2] = space_.evaluate(x.data(), e, basis.z[q]);
                 const auto p = graph_point(r, r1, r2);
-                for_each_bending_term([&](std::size_t i, const auto& term) {
-                    magnitude +=
-                        std::abs(bending_.k[i]) * term.magnitude(p.H, p.K, bending_.H0) * p.area * basis.weight[q];
-                });
+                magnitude += tubule::magnitude(bending_, p.H, p.K) * p.area * basis.weight[q];
             }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
     const Observation o = observe(x.data(), rest.data());

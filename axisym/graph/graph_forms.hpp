@@ -16,14 +16,15 @@ namespace tubule::axisym {
 // Diagnostics of a state, integrated or extremised over the whole period.
 struct Observation {
     double energy = 0, free_energy = 0;
-    std::array<double, n_bending_terms> energy_term{};
-    double dissipation = 0;  // INT b^2 dS of the rate handed in: -dF/dt along the flow
+    std::vector<double> energy_term;  // of each term, see term_names()
+    double dissipation = 0;           // INT b^2 dS of the rate handed in: -dF/dt along the flow
     double area = 0, volume = 0;
     double r_min = 0, z_min = 0;  // smallest radius at quadrature points, and where
     double r_max = 0, z_max = 0;
     double steepness = 0, z_steep = 0;  // largest |r'| r_min / r: O(1) on a catenoidal neck, unbounded at an overhang
     double symbol = 0, z_symbol = 0;    // smallest principal symbol, theory.md (2.14), for x = kappa_theta
     double symbol_3d = 0;               // the same over all x between the principal curvatures
+    FormulaDomain::Margin domain;       // of the energy's formula; its place is z
 };
 
 class Forms {
@@ -43,7 +44,7 @@ public:
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
 
     // M(x) v + grad F(x), which vanishes for the rate v of the gradient flow. Arrays of space().size() numbers.
-    // False, with `out` unusable, if the radius is not positive at a quadrature point.
+    // False, with `out` unusable, if at a quadrature point the radius is not positive or the energy is not defined.
     bool residual(const double* x, const double* v, double* out) const;
     // Its derivative in x + cj that in v, into the values of a matrix with pattern().
     void jacobian(const double* x, const double* v, double cj, double* values) const;
@@ -71,6 +72,7 @@ private:
     template <int P>
     void jacobian_kernel(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
                          double* values) const;
+    FormulaDomain::Margin domain(const double* x) const;
     template <int P>
     Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
     void jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/run/energy_checks.hpp"
+
 namespace tubule::axisym {
 namespace {
 
@@ -30,7 +32,11 @@ std::span<const GraphGuard> graph_guards() {
                  fmt::format("the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to "
                              "{:.3g} at x = kappa_theta",
                              stage.place(o.z_symbol), o.symbol),
-                 "refinement does not help; k40 or k42 is too negative for the curvatures of this shape"};
+                 "refinement does not help: the energy does not resist short waves there"};
+         }},
+        {[](const Observation& o, const GraphLimits&) { return o.domain.is_small() ? -1 : 1.0; },
+         [](const Observation& o, const GraphStage& stage, const double*, double time) {
+             return undefined_energy(o.domain, time, fmt::format("z = {:.6g}", stage.place(o.domain.place)));
          }}};
     return list;
 }
@@ -49,7 +55,7 @@ bool is_about_to_overhang(const Observation& o) {
 
 // A symbol that cannot change its sign may come as close to 0 as it likes.
 double least_symbol_of(const Bending& energy, const Observation& o) {
-    return std::ranges::any_of(energy.k, [](double k) { return k < 0; }) ? symbol_lost * o.symbol : 0;
+    return symbol_may_vanish(energy) ? symbol_lost * o.symbol : 0;
 }
 
 }  // namespace tubule::axisym

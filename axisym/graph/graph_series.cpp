@@ -13,7 +13,7 @@ SeriesTable<GraphRow> graph_series(const Case& c) {
                {"order", [](const GraphRow& r) { return static_cast<double>(r.flow.order()); }},
                {"newton_iterations", [](const GraphRow& r) { return static_cast<double>(r.newton_iterations); }},
                {"energy", [](const GraphRow& r) { return r.o.energy; }}});
-    table.add_family("energy_<kl>", energy_term_numbers(),
+    table.add_family("energy_<kl>", term_names(c.energy),
                      [](const GraphRow& r, std::size_t term) { return r.o.energy_term[term]; });
     table.add({{"free_energy", [](const GraphRow& r) { return r.o.free_energy; }},
                {"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},

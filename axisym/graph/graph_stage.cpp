@@ -1,11 +1,14 @@
 #include "axisym/graph/graph_stage.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <set>
 
 #include "axisym/graph/graph_start.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
@@ -64,6 +67,9 @@ FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& c
         const ProfileSpace space = space_of(cell, out.breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(start);
+        const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
+        const FormulaDomain::Margin domain = forms.observe(x.data(), rest.data()).domain;
+        require_defined(c, domain, fmt::format("z = {:.6g}", domain.place));
         out.reference_energy = reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
         const double allowed = settings.defect * out.reference_energy;
         if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return out;

@@ -14,7 +14,9 @@
 #include "common/shapes/capsule.hpp"
 #include "common/shapes/dumbbell.hpp"
 #include "common/shapes/ellipsoid.hpp"
+#include "common/shapes/formula_shape.hpp"
 #include "common/shapes/mesh_file.hpp"
+#include "common/shapes/profile_file.hpp"
 #include "common/shapes/result_frame.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
@@ -26,12 +28,29 @@ namespace tubule {
 
 enum class Tier { axisym, surface3d, automatic };
 
-using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, MeshFile, ResultFrame>;
+using Shape =
+    std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, FormulaShape, ProfileFile, MeshFile, ResultFrame>;
+
+inline bool is_tube(const Shape& shape) {
+    return std::holds_alternative<Tube>(shape);
+}
+// A tube of any kind; of a result only reading it tells.
+inline bool may_have_period(const Shape& shape) {
+    const auto* formula = std::get_if<FormulaShape>(&shape);
+    const auto* profile = std::get_if<ProfileFile>(&shape);
+    return is_tube(shape) || std::holds_alternative<ResultFrame>(shape) || (formula && formula->length) ||
+           (profile && profile->length);
+}
 
 // How a model with inertia begins.
+enum class InitialVelocity {
+    rest,
+    rotation,  // about the z axis, rigidly
+    result     // that of the frame which is the shape
+};
 struct Velocity {
-    bool rotates = false;  // about the z axis, rigidly; else at rest
-    double omega = 0;      // angular velocity
+    InitialVelocity initial = InitialVelocity::rest;
+    double omega = 0;  // angular velocity of a rotation
 };
 
 // What the parameter of a profile is.

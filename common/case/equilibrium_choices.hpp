@@ -18,10 +18,9 @@ namespace tubule {
 // What is held fixed while the energy becomes stationary.
 enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
 
-// What a branch is followed in: the moduli by the index of their term, then these.
-inline constexpr int vary_H0 = static_cast<int>(n_bending_terms), vary_area = vary_H0 + 1, vary_volume = vary_H0 + 2,
-                     vary_reduced_volume = vary_H0 + 3, vary_tension = vary_H0 + 4, vary_pressure = vary_H0 + 5,
-                     vary_force = vary_H0 + 6;
+// What a branch is followed in: the moduli by the number of their term, or these.
+inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
+                     vary_pressure = -6, vary_force = -7;
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -75,9 +74,10 @@ inline std::string held_against(const Model& model, Held held) {
     return {};
 }
 
-// The keys of [equilibrium] under this model; see common/case/keys.hpp. Long: a line for each key and each condition.
+// The keys of [equilibrium] for this model and energy; see common/case/keys.hpp. Long: a line for each key and each
+// condition.
 template <class Keys>
-void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
+void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& energy) {
     k.choice("held", e.held,
              {{"area-and-volume", Held::area_and_volume},
               {"area", Held::area},
@@ -106,9 +106,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model) {
     });
     k.table("branch", [&](auto& k) {
         std::vector<std::pair<std::string, int>> parameters;
-        for_each_bending_term([&](std::size_t i, const auto& term) {
-            parameters.emplace_back(std::string("energy.") + term.key, static_cast<int>(i));
-        });
+        for (std::size_t i = 0; i < count_terms(energy); ++i)
+            parameters.emplace_back(term_key(energy, i), static_cast<int>(i));
         parameters.insert(parameters.end(), {{"energy.H0", vary_H0},
                                              {"equilibrium.area", vary_area},
                                              {"equilibrium.volume", vary_volume},

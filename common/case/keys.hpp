@@ -2,6 +2,7 @@
 // Reader (reader.hpp) reads and checks a file with it, Writer (write.cpp) writes one. The verbs:
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
 //   ramp       a number, or a table of times and values                    key, target
+//   formula    a text that is a formula                                    key, target, its variables
 //   absent     a key that belongs to other cases, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
 //   table, optional_table, tables (a list of tables), entries (tables under open names)    key, target, description
@@ -10,6 +11,7 @@
 #pragma once
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -54,6 +56,35 @@ struct OpenNames {
 };
 
 template <class Keys>
+void keys(Keys& k, EnergyTerm& term) {
+    k.number("modulus", term.modulus, {}, k.required);
+    k.formula("formula", term.formula, EnergyTerm::variables);
+    for (const auto& [key, power] : {std::pair{"H", &term.H}, {"K", &term.K}})
+        if (term.formula)
+            k.absent(key, "must be absent: the formula says how H and K enter");
+        else
+            k.integer(key, *power, {.from = 0, .to = most_power});
+    k.check("", [&] {
+        return term.formula || term.H + term.K > 0
+                   ? ""
+                   : "needs a power of H - H0 or of K, or a formula; a constant energy per area is model.tension";
+    });
+}
+
+// What makes the term with this number one too many; else empty.
+inline std::string repeated_term(const Bending& energy, std::size_t number) {
+    const EnergyTerm& term = energy.terms[number];
+    const std::size_t listed = listed_as(term);
+    if (listed < n_bending_terms && energy.k[listed] != 0)
+        return fmt::format("is the term of {}: give one of the two", term_key(energy, listed));
+    for (std::size_t i = 0; i < number; ++i)
+        if (term_name(energy.terms[i]) == term_name(term))
+            return term.formula ? "must be the only formula: write the sum of both"
+                                : fmt::format("has the powers of energy.term.{}: add the moduli", i);
+    return {};
+}
+
+template <class Keys>
 void keys(Keys& k, Bending& energy) {
     std::string moduli;
     for_each_bending_term([&](std::size_t i, const auto& term) {
@@ -61,10 +92,15 @@ void keys(Keys& k, Bending& energy) {
         moduli += (moduli.empty() ? "" : ", ") + std::string(term.key);
     });
     k.number("H0", energy.H0);
+    k.tables("term", energy.terms, [](auto& k, EnergyTerm& term) { keys(k, term); });
+    for (std::size_t i = 0; i < energy.terms.size(); ++i) {
+        energy.terms[i].entry = i;
+        k.check(fmt::format("term.{}", i), [&] { return repeated_term(energy, i); });
+    }
     k.check("", [&]() -> std::string {
-        for (const double modulus : energy.k)
-            if (modulus != 0) return {};
-        return "needs a modulus other than zero: " + moduli;
+        for (std::size_t i = 0; i < count_terms(energy); ++i)
+            if (modulus(energy, i) != 0) return {};
+        return "needs a modulus other than zero: " + moduli + ", or that of a term [[energy.term]]";
     });
 }
 
@@ -123,8 +159,11 @@ void keys(Keys& k, Velocity& velocity, const Model& model) {
     if (!model_entry(model.kind).inertia)
         return k.absent("initial", "must be absent: only model.kind = " + quoted_names(&ModelEntry::inertia) +
                                        " has a velocity at the start");
-    k.choice("initial", velocity.rotates, {{"rest", false}, {"rotation", true}});
-    if (velocity.rotates)
+    k.choice("initial", velocity.initial,
+             {{"rest", InitialVelocity::rest},
+              {"rotation", InitialVelocity::rotation},
+              {"result", InitialVelocity::result}});
+    if (velocity.initial == InitialVelocity::rotation)
         k.number("omega", velocity.omega, {}, k.required);
     else
         k.absent("omega", "must be absent: only valid with initial = \"rotation\"");
@@ -286,8 +325,17 @@ void keys(Keys& k, Expect& expect, double end) {
         }
 }
 
-inline bool is_tube(const Shape& shape) {
-    return std::holds_alternative<Tube>(shape);
+// Parts of the energy are expected of terms that the case has.
+template <class Keys>
+void check_expected_terms(Keys& k, const Case& c) {
+    const std::vector<std::string> names = term_names(c.energy);
+    for (const Expectation& value : c.expect.values)
+        k.check("expect", [&]() -> std::string {
+            const std::string_view part = energy_part(value.series);
+            if (part.empty() || std::ranges::find(names, part) != names.end()) return {};
+            return fmt::format("has {}, but the energy has no such term; its parts are energy_{}", value.series,
+                               fmt::join(names, ", energy_"));
+        });
 }
 
 // Why tier "axisym" cannot use a start.
@@ -326,7 +374,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_tension) return loads.tension;
     if (parameter == vary_pressure) return loads.pressure;
     if (parameter == vary_force) return loads.force;
-    return parameter == vary_H0 ? c.energy.H0 : c.energy.k[parameter];
+    return parameter == vary_H0 ? c.energy.H0 : modulus(c.energy, parameter);
 }
 
 // Of equilibria of tier axisym.
@@ -371,9 +419,13 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
+    k.check("velocity.initial", [&] {
+        return c.velocity.initial == InitialVelocity::result && !std::holds_alternative<ResultFrame>(c.shape)
+                   ? "must not be \"result\": only shape.kind = \"result\" has a velocity"
+                   : "";
+    });
     k.check("model.period", [&] {
-        const bool period = is_tube(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
-        return law.free_period && !period ? "must not be \"free\": only a tube has a period" : "";
+        return law.free_period && !may_have_period(c.shape) ? "must not be \"free\": only a tube has a period" : "";
     });
     const SchemeEntry scheme = c.surface.scheme ? entry(*c.surface.scheme) : SchemeEntry{};
     if (c.tier == Tier::automatic) {
@@ -402,7 +454,7 @@ void check_together(Keys& k, const Case& c) {
                                    : law.free_period ? "period = \"free\""
                                                      : "pressure");
             if (const auto key = term_beyond_paper(c.energy); !key.empty())
-                return fmt::format("must not be \"{}\" with energy.{}: it has k20, k40 and k42 only", scheme.name, key);
+                return fmt::format("must not be \"{}\" with {}: it has k20, k40 and k42 only", scheme.name, key);
             return {};
         });
         return;
@@ -447,7 +499,8 @@ void automatic_keys(Keys& k, Case& c) {
 template <class Keys>
 void motion_keys(Keys& k, Case& c) {
     k.table("model", [&](auto& k) { keys(k, c.model); });
-    k.optional_table("equilibrium", c.equilibrium, [&](auto& k, EquilibriumChoices& e) { keys(k, e, c.model); });
+    k.optional_table("equilibrium", c.equilibrium,
+                     [&](auto& k, EquilibriumChoices& e) { keys(k, e, c.model, c.energy); });
     if (c.equilibrium)
         k.absent("velocity", "must be absent: nothing moves in a case with [equilibrium]");
     else
@@ -510,6 +563,7 @@ void keys(Keys& k, Case& c) {
     // The shapes of a branch are numbered as if that were their time.
     const double end = c.equilibrium ? std::numeric_limits<int>::max() : c.time.end;
     k.table("expect", [&](auto& k) { keys(k, c.expect, end); });
+    check_expected_terms(k, c);
     check_together(k, c);
 }
 

@@ -12,8 +12,22 @@ namespace {
 void note_places(const toml::node& node, const std::string& path, std::map<std::string, std::string>& places) {
     if (!path.empty()) places[path] = place(node.source());
     const std::string prefix = path.empty() ? "" : path + ".";
+    if (const auto* list = node.as_array())
+        for (std::size_t i = 0; i < list->size(); ++i) note_places(*list->get(i), prefix + std::to_string(i), places);
     if (const auto* table = node.as_table())
         for (const auto& [key, value] : *table) note_places(value, prefix + std::string(key.str()), places);
+}
+
+// Terms of the case that are those of the list, with the branch that varies one of them.
+void merge_terms(Case& c) {
+    std::optional<int> none, &varied = c.equilibrium ? c.equilibrium->branch.parameter : none;
+    std::optional<EnergyTerm> term;
+    if (varied >= static_cast<int>(n_bending_terms)) term = c.energy.terms[*varied - n_bending_terms];
+    merge_listed_terms(c.energy);
+    if (!term) return;
+    std::size_t number = listed_as(*term);
+    while (number >= n_bending_terms && c.energy.terms[number - n_bending_terms].entry != term->entry) ++number;
+    varied = static_cast<int>(number);
 }
 
 }  // namespace
@@ -35,6 +49,12 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         throw CaseErrors(std::move(complaints.found));
     }
     note_places(root, "", c.places);
+    merge_terms(c);
+    std::visit(
+        [](auto& shape) {
+            if constexpr (requires { make_noise(shape); }) make_noise(shape);
+        },
+        c.shape);
     if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;
     if (!c.model.area && !c.equilibrium) c.model.area = area_rule(c.model);
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;

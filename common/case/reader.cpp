@@ -154,6 +154,31 @@ void Reader::text(const std::string& key, std::string& target, bool needed) {
     });
 }
 
+void Reader::formula(const std::string& key, std::shared_ptr<const Formula>& target,
+                     std::span<const std::string_view> variables, bool needed) {
+    const std::string what = "a formula, such as " + toml_string("0.1*" + std::string(variables.front()) + "^2");
+    const toml::node* node = find(key, what, needed);
+    if (!node) return;
+    collect([&] {
+        if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
+        try {
+            target = std::make_shared<const Formula>(parse_formula(node->as_string()->get(), variables));
+        } catch (const FormulaError& error) {
+            throw CaseErrors({{where_in(*node, error.column), path_of(key),
+                               fmt::format("{}, character {}: {}", path_of(key), error.column, error.what()), ""}});
+        }
+    });
+}
+
+// Of a character of a string, if it stands in the file as it is, in quotes on one line.
+std::string Reader::where_in(const toml::node& node, std::size_t character) const {
+    toml::source_region at = node.source();
+    const std::size_t length = node.as_string()->get().size();
+    if (at.end.line == at.begin.line && at.end.column == at.begin.column + length + 2)
+        at.begin.column += static_cast<toml::source_index>(character);
+    return place(at);
+}
+
 void Reader::increasing(const std::string& key, std::vector<double>& target, const Range& range, bool needed) {
     const std::string what = "a list of increasing numbers";
     const toml::node* node = find(key, what, needed);

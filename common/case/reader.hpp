@@ -3,6 +3,8 @@
 
 #include <toml++/toml.h>
 
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -68,6 +70,9 @@ public:
 
     // A number, or {time = [...], value = [...]}.
     void ramp(const std::string& key, Ramp& target);
+
+    void formula(const std::string& key, std::shared_ptr<const Formula>& target,
+                 std::span<const std::string_view> variables, bool needed = false);
 
     void absent(const std::string& key, const std::string& complaint) {
         if (pass_ == Pass::names)
@@ -186,6 +191,7 @@ private:
     void ramp_in(const toml::table& table, const std::string& key, Ramp& target);
     std::string path_of(const std::string& key) const;
     std::string where(const toml::node& node) const;
+    std::string where_in(const toml::node& node, std::size_t character) const;
 
     bool allows(double x, Range range) const;
     double number_in(const toml::node& node, const std::string& path, const Range& range) const;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "common/energy/bending.hpp"
@@ -72,15 +73,14 @@ constexpr Scheme default_scheme(bool inertia) {
     return Scheme{i};
 }
 
-// The first term in use that the paper's scheme has no force for; "" if there is none.
-inline std::string_view term_beyond_paper(const Bending& energy) {
-    std::string_view beyond;
-    for_each_bending_term([&](std::size_t i, const auto& term) {
-        const std::string_view key = term.key;
-        const bool known = key == "k20" || key == "k40" || key == "k42";
-        if (!known && energy.k[i] != 0 && beyond.empty()) beyond = key;
-    });
-    return beyond;
+// The modulus of the first term in use that the paper's scheme has no force for; "" if there is none.
+inline std::string term_beyond_paper(const Bending& energy) {
+    for (std::size_t i = 0; i < count_terms(energy); ++i) {
+        const std::string key = term_key(energy, i);
+        const bool known = key == "energy.k20" || key == "energy.k40" || key == "energy.k42";
+        if (!known && modulus(energy, i) != 0) return key;
+    }
+    return {};
 }
 
 }  // namespace tubule

@@ -62,6 +62,11 @@ public:
                       : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()), toml_list(ramp.values())));
     }
 
+    void formula(const std::string& key, const std::shared_ptr<const Formula>& formula,
+                 std::span<const std::string_view>, bool = false) {
+        if (formula) line(key, toml_string(formula->text));
+    }
+
     void absent(const std::string&, const std::string&) {}
 
     template <class... Kinds>

@@ -1,13 +1,21 @@
 // The bending energy density f(H,K) as a list of terms. This is the one place that knows its form:
-// partial derivatives, case keys, series names and picture labels are derived from the list below.
+// partial derivatives, case keys, series names and picture labels are derived from the list below, and from the further
+// terms that a case has.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <utility>
+#include <vector>
+
+#include "common/formula/formula.hpp"
 
 namespace tubule {
 
@@ -80,14 +88,136 @@ consteval std::size_t term_number(std::string_view key) {
     return found < n_bending_terms ? found : throw "no term has this key";
 }
 
-// Moduli of the terms in their order, and the spontaneous curvature; dimensionless.
+// A term of a case beyond the list: modulus (H-H0)^H K^K, or the modulus times a formula of H, K and H0.
+struct EnergyTerm {
+    double modulus = 0;
+    int H = 0, K = 0;                             // powers of H - H0 and of K
+    std::shared_ptr<const Formula> formula = {};  // instead of powers
+    std::size_t entry = 0;                        // which entry of the case file it is, from 0
+
+    static constexpr std::array<std::string_view, 3> variables{"H", "K", "H0"};
+};
+inline constexpr int most_power = 20;
+
+// Moduli of the listed terms in their order, the spontaneous curvature, and what a case adds; dimensionless.
 struct Bending {
     std::array<double, n_bending_terms> k{};
     double H0 = 0;
+    std::vector<EnergyTerm> terms = {};
 };
 
-// The density and its derivatives in H and K, summed over the terms in use.
+// The terms together are counted: first those of the list, then those of the case.
+inline std::size_t count_terms(const Bending& bending) {
+    return n_bending_terms + bending.terms.size();
+}
+inline double& modulus(Bending& bending, std::size_t term) {
+    return term < n_bending_terms ? bending.k[term] : bending.terms[term - n_bending_terms].modulus;
+}
+inline double modulus(const Bending& bending, std::size_t term) {
+    return term < n_bending_terms ? bending.k[term] : bending.terms[term - n_bending_terms].modulus;
+}
+
+// What follows energy_ in the series of a term: 41 for (H-H0)^2 K, of geometric order 4 with K to the power 1.
+std::string term_name(const EnergyTerm& term);
+// In mathtext for pictures, as BendingTerm::label.
+std::string term_label(const EnergyTerm& term);
+// Of all terms, in order.
+std::vector<std::string> term_names(const Bending& bending);
+// The modulus of a term in case files: energy.k20, energy.term.0.modulus.
+std::string term_key(const Bending& bending, std::size_t term);
+// The number of the listed term that is the same; n_bending_terms if there is none.
+std::size_t listed_as(const EnergyTerm& term);
+// Moves terms of the case to those of the list that are the same.
+void merge_listed_terms(Bending& bending);
+
+// Where the formula of a density is defined: see FormulaDomain.
+class DensityDomain {
+public:
+    explicit DensityDomain(const Bending& bending) : H0_(bending.H0) {
+        for (const EnergyTerm& term : bending.terms)
+            if (term.formula && term.modulus != 0) domain_.emplace(*term.formula);
+    }
+    bool restricted() const { return domain_ && domain_->restricted(); }
+    void look(double H, double K, double place) {
+        const double variables[]{H, K, H0_};
+        domain_->look(variables, place);
+    }
+    FormulaDomain::Margin margin() const { return domain_ ? domain_->margin() : FormulaDomain::Margin(); }
+
+private:
+    double H0_;
+    std::optional<FormulaDomain> domain_;
+};
+
+// Whether the principal symbol, theory.md (2.14), may change its sign: not if it is a sum of squares.
+bool symbol_may_vanish(const Bending& bending);
+// Words if the density has no lower bound, so that a membrane may gain energy without end; else empty.
+std::string unbounded_below(const Bending& bending);
+
+// x^n for whole n >= 0
 template <class T>
+T raised(const T& x, int n) {
+    return n == 0 ? T(1.0) : whole_power(x, n);
+}
+
+template <class T>
+const T& inner(const CurvatureJet<T>& x) {
+    return x.f;
+}
+// F(a) given F, F', F'' at a.f.
+template <class T>
+CurvatureJet<T> chain(const CurvatureJet<T>& a, const T& f, const T& f1, const T& f2) {
+    return {f, f1 * a.H, f1 * a.K, f1 * a.HH + f2 * a.H * a.H, f1 * a.HK + f2 * a.H * a.K, f1 * a.KK + f2 * a.K * a.K};
+}
+
+// Of a term with modulus 1. T is a number or a pack of them, or what formulas are evaluated on.
+template <class T>
+T value_of(const EnergyTerm& term, const T& H, const T& K, double H0) {
+    if (!term.formula) return raised(T(H - T(H0)), term.H) * raised(K, term.K);
+    const T variables[]{H, K, T(H0)};
+    return evaluate(*term.formula, variables);
+}
+// The sum of the sizes of what a formula adds up, (|H|+|H0|)^H |K|^K of powers: see BendingTerm.
+inline double magnitude_of(const EnergyTerm& term, double H, double K, double H0) {
+    return value_of(term, Sized(H), Sized(K), H0).size;
+}
+
+// Which terms of a case a kernel is made for. A call that is not taken costs as much as the rest of a residual: it
+// empties all vector registers.
+enum class Added { none, powers, any };
+inline Added added_to(const Bending& bending) {
+    const auto has_formula = [](const EnergyTerm& term) { return term.formula != nullptr; };
+    if (bending.terms.empty()) return Added::none;
+    return std::ranges::any_of(bending.terms, has_formula) ? Added::any : Added::powers;
+}
+
+template <class T>
+[[gnu::noinline]] T formula_value(const EnergyTerm& term, const T& H, const T& K, double H0) {
+    return value_of(term, H, K, H0);
+}
+template <class T>
+[[gnu::noinline]] CurvatureJet<T> formula_density(const EnergyTerm& term, const T& H, const T& K, double H0) {
+    const CurvatureJet<T> variables[]{{H, T(1.0)}, {K, T(0.0), T(1.0)}, {T(H0)}};
+    return term.modulus * evaluate(*term.formula, variables);
+}
+
+// Adds a term of powers, c x^a K^b with x = H - H0, and its derivatives.
+template <class T>
+void add_powers(const EnergyTerm& term, const T& x, const T& K, CurvatureJet<T>& sum) {
+    const double a = term.H, b = term.K;
+    const T p2 = term.H > 1 ? raised(x, term.H - 2) : T(0.0), q2 = term.K > 1 ? raised(K, term.K - 2) : T(0.0);
+    const T p1 = term.H > 1 ? p2 * x : T(a), q1 = term.K > 1 ? q2 * K : T(b);  // of the powers 1 and 0: 1 and 0
+    const T p = a > 0 ? p1 * x : T(1.0), q = term.modulus * (b > 0 ? q1 * K : T(1.0)), slope = (term.modulus * b) * q1;
+    sum.f += p * q;
+    sum.H += a * (p1 * q);
+    sum.K += p * slope;
+    sum.HH += (a * (a - 1)) * (p2 * q);
+    sum.HK += a * (p1 * slope);
+    sum.KK += (term.modulus * b * (b - 1)) * (p * q2);
+}
+
+// The density and its derivatives in H and K, summed over the terms in use.
+template <class T, Added added = Added::any>
 CurvatureJet<T> density(const Bending& bending, const T& H, const T& K) {
     CurvatureJet<T> h, k, sum;
     h.f = H, h.H = T(1.0);
@@ -95,6 +225,45 @@ CurvatureJet<T> density(const Bending& bending, const T& H, const T& K) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         if (bending.k[i] != 0) sum = sum + bending.k[i] * term.value(h, k, bending.H0);
     });
+    if constexpr (added == Added::none) return sum;
+    for (const EnergyTerm& term : bending.terms) {
+        if (term.modulus == 0) continue;
+        if constexpr (added == Added::any)
+            if (term.formula) {
+                sum = sum + formula_density(term, H, K, bending.H0);
+                continue;
+            }
+        add_powers(term, T(H - bending.H0), K, sum);
+    }
+    return sum;
+}
+
+// Calls visit(number, modulus times value) for each term in use.
+template <class T, Added added = Added::any, class Visit>
+void for_each_value(const Bending& bending, const T& H, const T& K, Visit&& visit) {
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        if (bending.k[i] != 0) visit(i, T(bending.k[i] * term.value(H, K, bending.H0)));
+    });
+    if constexpr (added == Added::none) return;
+    for (std::size_t i = 0; i < bending.terms.size(); ++i) {
+        const EnergyTerm& term = bending.terms[i];
+        if (term.modulus == 0) continue;
+        T value;
+        if (added == Added::any && term.formula)
+            value = formula_value(term, H, K, bending.H0);
+        else
+            value = raised(T(H - bending.H0), term.H) * raised(K, term.K);
+        visit(n_bending_terms + i, T(term.modulus * value));
+    }
+}
+
+// SUM |modulus| magnitude, which E_ref is made of.
+inline double magnitude(const Bending& bending, double H, double K) {
+    double sum = 0;
+    for_each_bending_term(
+        [&](std::size_t i, const auto& term) { sum += std::abs(bending.k[i]) * term.magnitude(H, K, bending.H0); });
+    for (const EnergyTerm& term : bending.terms)
+        if (term.modulus != 0) sum += std::abs(term.modulus) * magnitude_of(term, H, K, bending.H0);
     return sum;
 }
 

@@ -25,6 +25,7 @@ void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
 }  // namespace
 
 RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
+    if (const std::string endless = unbounded_below(c.energy); !endless.empty()) watch.note(endless);
     for (int number = 1;; ++number) {
         watch.next_run(number, number);
         RunSummary& s = runs.next();

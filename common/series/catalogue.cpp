@@ -17,12 +17,23 @@ bool is_number(std::string_view digits) {
     return error == std::errc{} && n >= 0 && digits == std::to_string(n);
 }
 
+// 41 or 12_3: the geometric order of a term and its power of K.
+bool is_order_and_power(std::string_view name) {
+    const std::size_t bar = name.find('_');
+    if (bar == name.npos && name.size() != 2) return false;
+    const std::string_view order = name.substr(0, bar == name.npos ? 1 : bar),
+                           power = name.substr(bar == name.npos ? 1 : bar + 1);
+    if (!is_number(order) || !is_number(power) || (bar != name.npos && order.size() < 2)) return false;
+    return std::stoi(std::string(order)) >= std::max(1, 2 * std::stoi(std::string(power)));
+}
+
 bool is_member(const SeriesEntry& family, std::string_view name) {
     if (!name.starts_with(family.stem())) return false;
     const std::string_view number = name.substr(family.stem().size());
     if (family.name != energy_terms) return is_number(number);
-    const std::vector<std::string> terms = energy_term_numbers();
-    return std::find(terms.begin(), terms.end(), number) != terms.end();
+    bool listed = false;
+    for_each_bending_term([&](std::size_t, const auto& term) { listed = listed || number == term.name; });
+    return listed || is_order_and_power(number);
 }
 
 }  // namespace
@@ -52,15 +63,17 @@ std::vector<std::string> expectable_series() {
         if (entry.name != energy_terms)
             out.emplace_back(entry.name);
         else
-            for (const std::string& number : energy_term_numbers()) out.push_back(std::string(entry.stem()) + number);
+            for_each_bending_term(
+                [&](std::size_t, const auto& term) { out.push_back(std::string(entry.stem()) + term.name); });
     }
     return out;
 }
 
-std::vector<std::string> energy_term_numbers() {
-    std::vector<std::string> out;
-    for_each_bending_term([&](std::size_t, const auto& term) { out.emplace_back(term.name); });
-    return out;
+std::string_view energy_part(std::string_view name) {
+    const SeriesEntry* entry = find_series(name);
+    const std::string_view stem = SeriesName("energy_<kl>").entry().stem();
+    const bool part = entry && (entry->name == energy_terms || entry->name == "energy_formula");
+    return part ? name.substr(stem.size()) : std::string_view();
 }
 
 }  // namespace tubule

@@ -33,6 +33,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"newton_iterations", "1", "Newton iterations so far", SeriesUse::effort},
     {"energy", "energy", "bending energy E", SeriesUse::energy},
     {"energy_<kl>", "energy", "part of the term with modulus k<kl> in E", SeriesUse::energy},
+    {"energy_formula", "energy", "part of the term given by a formula in E", SeriesUse::energy},
     {"free_energy", "energy", "F = E + tension A - pressure V - force L", SeriesUse::energy},
     {"work", "energy", "work of tension, pressure and force that change in time", SeriesUse::energy},
     {"dissipation", "energy/time", "dissipation, at which F and the kinetic energy fall"},
@@ -89,8 +90,8 @@ std::string meaning_of(const SeriesEntry& entry, std::string_view name);
 bool is_expectable(std::string_view name);
 std::vector<std::string> expectable_series();
 
-// The numbers <kl> of the energy terms, in their order.
-std::vector<std::string> energy_term_numbers();
+// What follows energy_ in the name of a part of the energy, such as 42 or formula; empty for other series.
+std::string_view energy_part(std::string_view name);
 
 // A name or family of the catalogue: any other does not compile.
 class SeriesName {

@@ -74,6 +74,16 @@ Asymmetry wave_around(const std::vector<Mode>& modes) {
     return {};
 }
 
+template <class Noise>
+Asymmetry noise_around(const std::vector<Noise>& noise) {
+    for (std::size_t i = 0; i < noise.size(); ++i)
+        if (noise[i].around != 0)
+            return {fmt::format("shape.noise.{}.m", i),
+                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no waves around the axis",
+                                noise[i].around)};
+    return {};
+}
+
 // Throws std::invalid_argument where the shape has no meridian.
 template <class Shape>
 void require_axisymmetric(const Shape& shape) {

@@ -16,7 +16,9 @@ double harmonic_scale(int l, int m) {
     return scale;
 }
 
-std::string complaint(const Sphere& sphere) {
+std::string complaint(const Sphere& given) {
+    Sphere sphere = given;
+    make_noise(sphere);
     int waves = 1;
     double most = 0;  // of the modes together, as |Y_l^m| <= Y_l^0(pole)
     for (const SphereMode& mode : sphere.modes) {

@@ -7,6 +7,7 @@
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
 #include "common/shapes/meridian.hpp"
+#include "common/shapes/noise.hpp"
 
 namespace tubule {
 
@@ -19,6 +20,7 @@ struct Sphere {
     static constexpr const char* kind = "sphere";
     double radius = 1;
     std::vector<SphereMode> modes;
+    std::vector<ShapeNoise> noise = {};  // becomes modes once the case is read
 };
 
 // sqrt((2l+1)/(4 pi) (l-m)!/(l+m)!), negative for odd m (Condon and Shortley), times 1 3 5 ... (2m-1).
@@ -55,7 +57,8 @@ inline UnitSphere base(const Sphere&) {
     return {};
 }
 inline Asymmetry asymmetry(const Sphere& sphere) {
-    return wave_around(sphere.modes);
+    const Asymmetry noise = noise_around(sphere.noise);
+    return noise.first.empty() ? wave_around(sphere.modes) : noise;
 }
 inline Meridian meridian(const Sphere& sphere) {
     require_axisymmetric(sphere);
@@ -73,6 +76,7 @@ void keys(Keys& k, Sphere& sphere) {
         k.integer("l", mode.l, {.from = 0, .to = 1000}, k.required);
         k.integer("m", mode.m, {.from = 0, .to = static_cast<double>(mode.l), .note = "l"});
     });
+    k.tables("noise", sphere.noise, [](auto& k, ShapeNoise& noise) { keys(k, noise, "l", 2); });
     k.check("", [&] { return complaint(sphere); });
 }
 

@@ -52,7 +52,9 @@ Neck narrowest(const Tube& tube) {
     return best;
 }
 
-std::string complaint(const Tube& tube) {
+std::string complaint(const Tube& given) {
+    Tube tube = given;
+    make_noise(tube);
     int around = 0, along = 0;
     double most = 0;  // of the modes together
     for (const TubeMode& mode : tube.modes) {

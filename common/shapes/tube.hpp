@@ -9,6 +9,7 @@
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
 #include "common/shapes/meridian.hpp"
+#include "common/shapes/noise.hpp"
 
 namespace tubule {
 
@@ -24,6 +25,7 @@ struct Tube {
     double radius = 1;
     double length = 2;
     std::vector<TubeMode> modes;
+    std::vector<ShapeNoise> noise = {};  // becomes modes once the case is read
 };
 
 // r0 at z on the meridian theta = 0 (any meridian, as long as all modes have m = 0). T is double or any
@@ -71,7 +73,8 @@ inline Cylinder base(const Tube& tube) {
     return {tube.radius, tube.length};
 }
 inline Asymmetry asymmetry(const Tube& tube) {
-    return wave_around(tube.modes);
+    const Asymmetry noise = noise_around(tube.noise);
+    return noise.first.empty() ? wave_around(tube.modes) : noise;
 }
 inline Meridian meridian(const Tube& tube) {
     require_axisymmetric(tube);
@@ -101,6 +104,7 @@ void keys(Keys& k, Tube& tube) {
         k.integer("m", mode.m, {.from = -10000, .to = 10000});
         k.number("phase", mode.phase);
     });
+    k.tables("noise", tube.noise, [](auto& k, ShapeNoise& noise) { keys(k, noise, "n", 1); });
     k.check("", [&] { return complaint(tube); });
 }
 

@@ -17,6 +17,7 @@ namespace tubule {
     reason(pinch_off, "pinch-off", 3, "a neck reached the floor `accuracy.r_min`") \
     reason(overhang, "overhang", 3, "a graph r(z) has a vertical tangent") \
     reason(ill_posed, "ill-posed", 3, "the flow is no longer parabolic: refinement does not help") \
+    reason(undefined, "undefined", 3, "the formula of the energy is no longer defined") \
     reason(self_intersection, "self-intersection", 3, "the surface touches itself") \
     reason(resolution_lost, "resolution-lost", 4, "the discretisation can no longer represent the shape") \
     reason(mesh_lost, "mesh-lost", 4, "elements degenerated beyond repair") \

@@ -10,32 +10,28 @@ namespace tubule::surface3d {
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
                     const Bending& bending) {
     // Summed up cell by cell, so that the answer does not depend on the number of threads.
-    constexpr int n = static_cast<int>(n_bending_terms) + 5;
-    Eigen::Matrix<double, n, Eigen::Dynamic> of_cell(n, space.cells());
+    const int terms = static_cast<int>(count_terms(bending));
+    Eigen::MatrixXd of_cell(terms + 5, space.cells());
     const Tabulation& table = space.tabulation();
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
         const auto H = space.gather(curvature.H, cell), K = space.gather(curvature.K, cell);
-        Eigen::Matrix<double, n, 1> sum = Eigen::Matrix<double, n, 1>::Zero();
+        auto sum = of_cell.col(cell);
+        sum.setZero();
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
             const double dS = table.weight[q] * p.area, h = H.dot(table.value.col(q)), k = K.dot(table.value.col(q));
-            double magnitude = 0;
-            for_each_bending_term([&](std::size_t i, const auto& term) {
-                sum[i] += dS * bending.k[i] * term.value(h, k, bending.H0);
-                magnitude += std::abs(bending.k[i]) * term.magnitude(h, k, bending.H0);
-            });
+            for_each_value(bending, h, k, [&](std::size_t i, double value) { sum[i] += dS * value; });
             // The flux of (x, y, 0)/2, which also holds for a period of a tube.
             const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
-            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude);
+            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude(bending, h, k));
         }
-        of_cell.col(cell) = sum;
     });
-    const Eigen::Matrix<double, n, 1> total = of_cell.rowwise().sum();
+    const Eigen::VectorXd total = of_cell.rowwise().sum();
     Observables o;
-    for (std::size_t i = 0; i < n_bending_terms; ++i) o.energy += o.energy_term[i] = total[i];
-    o.area = total[n - 5], o.volume = total[n - 4], o.integral_H2 = total[n - 3], o.integral_K = total[n - 2];
-    o.magnitude = total[n - 1];
+    for (int i = 0; i < terms; ++i) o.energy += o.energy_term.emplace_back(total[i]);
+    o.area = total[terms], o.volume = total[terms + 1], o.integral_H2 = total[terms + 2];
+    o.integral_K = total[terms + 3], o.magnitude = total[terms + 4];
     return o;
 }
 

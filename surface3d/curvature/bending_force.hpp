@@ -1,7 +1,7 @@
 // Energies of a curved mesh and the bending force on it, from recovered curvatures.
 #pragma once
 
-#include <array>
+#include <vector>
 
 #include "common/energy/bending.hpp"
 #include "surface3d/curvature/curvature.hpp"
@@ -10,7 +10,7 @@ namespace tubule::surface3d {
 
 // Integrals over the surface; of one period where it is periodic.
 struct Observables {
-    std::array<double, n_bending_terms> energy_term{};
+    std::vector<double> energy_term;  // of each term, see term_names()
     double energy = 0, area = 0, volume = 0;
     double integral_H2 = 0, integral_K = 0;
     double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this

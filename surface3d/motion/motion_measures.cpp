@@ -70,6 +70,14 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
     }
 }
 
+void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
+    DensityDomain domain(bending);
+    if (!domain.restricted()) return;
+    for (int i = 0; i < mesh.size(); ++i) domain.look(m.fields.H[i], m.fields.K[i], i);
+    m.domain = domain.margin();
+    m.least_defined = mesh.nodes[static_cast<std::size_t>(m.domain.place)];
+}
+
 }  // namespace
 
 double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
@@ -132,6 +140,7 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
     measure_neck(mesh, m);
     measure_symbol(mesh, bending, m);
+    measure_domain(mesh, bending, m);
     m.smoothness = smoothness_of(mesh, m.fields.H);
     return m;
 }

@@ -30,6 +30,8 @@ struct MotionMeasures {
     double smoothness = 0;         // order with which H is interpolated on this mesh, see smoothness_of()
     double symbol = 0;             // smallest principal symbol, theory.md (2.14), x between the principal curvatures
     Eigen::Vector3d least_symbol;  // where it is
+    FormulaDomain::Margin domain;  // of the energy's formula, with the node as its place
+    Eigen::Vector3d least_defined = Eigen::Vector3d::Zero();  // where that node is
 };
 
 // Of a state on the mesh of `surface`, whose projection is brought there. `before`: where the step that led to it

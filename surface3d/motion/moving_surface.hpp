@@ -2,6 +2,7 @@
 // volume and momenta. Time schemes and measurements are built on it.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "common/energy/bending.hpp"
@@ -27,6 +28,12 @@ struct MotionControl {
     double smoothing = 0;  // of schemes that smooth curvatures: eps of a - eps Lap a = a_h, a length squared
 };
 
+// What the linear systems of steps took.
+struct LinearWork {
+    std::int64_t solves = 0, iterations = 0;  // of GMRES
+    std::int64_t lu = 0;                      // solved by LU factors, since GMRES did not converge
+};
+
 class MovingSurface {
 public:
     // A law that does not resist rigid motions gets a slight friction, and rigid motions are set to zero.
@@ -45,6 +52,7 @@ public:
     const MotionControl& control() const { return control_; }
     const Projection& projection() const { return *projection_; }  // of the mesh of the last fields()
     int nodes() const { return space_.size(); }
+    LinearWork& linear_work() { return linear_work_; }
 
     const CurvedMesh& mesh() const { return mesh_; }
     CurvedMesh mesh(const VectorField& X, double period) const;
@@ -102,6 +110,7 @@ private:
     MotionControl control_;
     MeshMotion mesh_motion_;
     bool holds_rigid_motions_ = false;
+    LinearWork linear_work_;
     std::optional<Projection> projection_;
 };
 

@@ -1,5 +1,9 @@
 #include "surface3d/motion/step_solver.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
 #include "common/solve/parallel.hpp"
 
 namespace tubule::surface3d {
@@ -8,9 +12,10 @@ namespace {
 // H of a mesh answers to waves of its own size by up to .06, .07, .08 |B| (width of a triangle) more than L_H for k =
 // 2, 3, 4; what little damps would grow in long steps.
 constexpr double curvature_stabilisation = 0.08;
-constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
-constexpr int most_iterations = 20;      // of that, before it is factored
-constexpr int most_multipliers = 4;      // lambda, tension, supply, stretch
+constexpr double flux_tolerance = 1e-7;    // how well the mesh follows the surface, relative
+constexpr int most_iterations = 20;        // of that, before it is factored
+constexpr int most_multipliers = 4;        // lambda, tension, supply, stretch
+constexpr double least_eigenvalue = 1e-2;  // of a Hessian, of the other one: else rows nearly vanish
 
 }  // namespace
 
@@ -60,24 +65,61 @@ KeptExtent StepSolver::keep_extent(const StageSolution& solved, MotionState& to)
     return {work(by, to, solved.fields), by.lacking};
 }
 
-// The evolution of H and K, times -f_HH/te and -f_KK/te, is the transpose of the force but for terms without
-// derivatives, the variation of these factors, what is carried along the surface, and the stabilisation of L_H.
+namespace {
+
+// The Hessian of the density in (H, K), or a regular matrix near it where it is singular: an eigenvalue that is small,
+// in units of the curvature, takes a least size.
+Eigen::Matrix2d regular_hessian(const CurvatureJet<double>& f, double H, double K) {
+    const double curvature = std::sqrt(std::max(H * H - 2 * K, 0.0)), unit = curvature > 0 ? curvature : 1;
+    if (f.HK == 0) return Eigen::Vector2d(f.HH != 0 ? f.HH : 1, f.KK != 0 ? f.KK : 1).asDiagonal();
+    Eigen::Matrix2d scaled;
+    scaled << f.HH, f.HK * unit, f.HK * unit, f.KK * unit * unit;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(scaled);
+    Eigen::Vector2d values = solver.eigenvalues();
+    const double least = least_eigenvalue * values.cwiseAbs().maxCoeff();
+    for (double& value : values) value = std::copysign(std::max(std::abs(value), least), value);
+    scaled = solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
+    return (Eigen::Matrix2d() << scaled(0, 0), scaled(0, 1) / unit, scaled(1, 0) / unit, scaled(1, 1) / (unit * unit))
+        .finished();
+}
+
+}  // namespace
+
+// The evolution of H and K, times -1/te times the Hessian of the density in (H, K) at each node, is the transpose of
+// the force but for terms without derivatives, the variation of the Hessian, what is carried along the surface, and the
+// stabilisation of L_H: theory.md (10.7), (10.8).
 void StepSolver::make_symmetric(const StepBase& base) {
-    const Bending& bending = surface_.bending();
-    Eigen::VectorXd scale = Eigen::VectorXd::Ones(unknowns_.size());
-    for (int i = 0; i < surface_.nodes(); ++i) {
-        const CurvatureJet<double> f = density(bending, base.fields.H[i], base.fields.K[i]);
-        const auto factor = [&](double second) { return second > 0 ? -second / base.te : -1 / base.te; };
-        if (unknowns_.H >= 0) scale[unknowns_.H + i] = factor(f.HH);
-        if (unknowns_.K >= 0) scale[unknowns_.K + i] = factor(f.KK);
+    const int n = surface_.nodes(), H = unknowns_.H, K = unknowns_.K;
+    std::vector<Eigen::Matrix2d> factor(n);
+    for (int i = 0; i < n; ++i) {
+        const double h = base.fields.H[i], k = base.fields.K[i];
+        factor[i] = -regular_hessian(density(surface_.bending(), h, k), h, k) / base.te;
     }
+    // Pairs of rows, or the one that there is: their entries in a column.
+    const auto scale = [&](int i, double* of_H, double* of_K) {
+        const Eigen::Vector2d old(of_H ? *of_H : 0, of_K ? *of_K : 0), out = factor[i] * old;
+        if (of_H) *of_H = of_K ? out[0] : factor[i](0, 0) * old[0];
+        if (of_K) *of_K = of_H ? out[1] : factor[i](1, 1) * old[1];
+    };
     Eigen::SparseMatrix<double>& A = system_.A;
     parallel_for(static_cast<std::size_t>(A.cols()), [&](std::size_t j) {
-        for (int k = A.outerIndexPtr()[j]; k < A.outerIndexPtr()[j + 1]; ++k)
-            A.valuePtr()[k] *= scale[A.innerIndexPtr()[k]];
+        const int *begin = A.innerIndexPtr() + A.outerIndexPtr()[j],
+                  *end = A.innerIndexPtr() + A.outerIndexPtr()[j + 1];
+        double* value = A.valuePtr() + A.outerIndexPtr()[j];
+        // Nodes that a column meets are the same for all fields.
+        const auto first = [&](int field) { return field < 0 ? nullptr : std::lower_bound(begin, end, field); };
+        const int *rows_H = first(H), *rows_K = first(K), *rows = rows_H ? rows_H : rows_K;
+        if (!rows) return;
+        const int field = rows_H ? H : K;
+        for (int k = 0; rows + k < end && rows[k] < field + n; ++k)
+            scale(rows[k] - field, rows_H ? value + (rows_H - begin) + k : nullptr,
+                  rows_K ? value + (rows_K - begin) + k : nullptr);
     });
-    system_.b.array() *= scale.array();
-    if (surface_.law().free_period) system_.stretch.column.array() *= scale.array();
+    const auto scale_vector = [&](Eigen::VectorXd& v) {
+        for (int i = 0; i < n; ++i) scale(i, H >= 0 ? &v[H + i] : nullptr, K >= 0 ? &v[K + i] : nullptr);
+    };
+    scale_vector(system_.b);
+    if (surface_.law().free_period) scale_vector(system_.stretch.column);
 }
 
 // With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
@@ -121,7 +163,11 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     }
     border.C.conservativeResize(Eigen::NoChange, n), border.R.conservativeResize(Eigen::NoChange, n);
     border.D.conservativeResize(n, n), border.d.conservativeResize(n);
+    const int before = solver_.fallbacks();
     const auto [x, y] = solver_.solve(system_.A, system_.b, border);
+    LinearWork& work = surface_.linear_work();
+    const bool by_lu = solver_.fallbacks() > before;
+    ++work.solves, work.lu += by_lu, work.iterations += by_lu ? 0 : solver_.iterations();
     if (lambda >= 0) out.lambda = y[lambda];
     if (stretch >= 0) out.stretch = y[stretch];
     if (tension >= 0) out.tension = y[tension];

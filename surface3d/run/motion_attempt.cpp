@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/meshing/remesh.hpp"
@@ -148,11 +149,15 @@ std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& nex
 std::optional<MotionAttempt::Refusal> MotionAttempt::attempt(double tau) {
     const double t = state_.time;
     const auto failed = [&](const std::string& what) {
+        if (may_be_undefined(now_.domain)) return Refusal{0.25, undefined_energy(now_, t)};
         return Refusal{0.25,
                        {Stop::solver_failed, t, what, "try another discretisation.elements or discretisation.order"}};
     };
     try {
+        surface().linear_work() = {};
         const MotionStep next = scheme_->step(state_, tau);
+        linear_work_.solves += surface().linear_work().solves, linear_work_.lu += surface().linear_work().lu;
+        linear_work_.iterations += surface().linear_work().iterations;
         if (!is_finite(next.state)) return failed("the step overflows");
         const double error = next.error / (memory_.settings.tolerance * memory_.scale.length());
         if (!case_.surface.step && error > 2)
@@ -375,9 +380,10 @@ void MotionAttempt::warn_of_drift() {
 
 void MotionAttempt::write_row() {
     if (!out_.wants_row(state_.time)) return;
-    out_.row(state_.time, motion_series().values({state_, now_, memory_.balance.work, volume_drift(),
-                                                  memory_.balance.defect_at(total()), memory_.balance.corrected,
-                                                  error_now_, summary.elements, out_.seconds()}));
+    out_.row(state_.time,
+             motion_series(case_.energy)
+                 .values({state_, now_, memory_.balance.work, volume_drift(), memory_.balance.defect_at(total()),
+                          memory_.balance.corrected, error_now_, summary.elements, out_.seconds()}));
 }
 
 void MotionAttempt::write_frame() {
@@ -412,6 +418,9 @@ void MotionAttempt::summarise(const StopReport& stop) {
                                                      {"order", std::int64_t{element_order(case_)}},
                                                      {"steps", std::int64_t{memory_.count.steps}},
                                                      {"rejected_steps", std::int64_t{memory_.count.rejected}},
+                                                     {"linear_solves", linear_work_.solves},
+                                                     {"gmres_iterations", linear_work_.iterations},
+                                                     {"lu_solves", linear_work_.lu},
                                                      {"time_tolerance", memory_.settings.tolerance},
                                                      {"meshes", std::int64_t{memory_.count.meshes}},
                                                      {"relaxation", memory_.scale.relaxation},

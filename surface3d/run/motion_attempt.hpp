@@ -116,6 +116,7 @@ private:
     std::optional<StopReport> stop_;
     double until_ = HUGE_VAL;  // no step goes farther
     double error_now_ = 0;
+    LinearWork linear_work_;
 };
 
 }  // namespace tubule::surface3d

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/run/energy_checks.hpp"
 #include "surface3d/run/guards.hpp"
 
 namespace tubule::surface3d {
@@ -24,11 +25,16 @@ std::string where(const Eigen::Vector3d& x) {
 
 }  // namespace
 
+StopReport undefined_energy(const MotionMeasures& m, double time) {
+    return tubule::undefined_energy(m.domain, time, where(m.least_defined));
+}
+
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
     if (!(m.symbol > 0))
         return StopReport{Stop::ill_posed, time,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
                           "refinement does not help: the energy does not resist short waves there"};
+    if (m.domain.is_small()) return undefined_energy(m, time);
     if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),

@@ -10,8 +10,12 @@
 
 namespace tubule::surface3d {
 
+// Where the formula of the energy is hardly defined.
+StopReport undefined_energy(const MotionMeasures& m, double time);
+
 // Faults of the shape and its triangles, which no shorter step would remedy: an energy that does not resist short
-// waves, a neck thinner than r_min, normals that turn too far from node to node, a degenerate triangle.
+// waves or is hardly defined, a neck thinner than r_min, normals that turn too far from node to node, a degenerate
+// triangle.
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time);
 
 // The energy, kinetic energy included, can only fall. A step that raises it by more than a quarter of the accuracy

@@ -1,16 +1,15 @@
 #include "surface3d/run/motion_series.hpp"
 
 namespace tubule::surface3d {
-namespace {
 
-SeriesTable<MotionRow> make_table() {
+SeriesTable<MotionRow> motion_series(const Bending& energy) {
     SeriesTable<MotionRow> table;
     table.add({
         {"time", [](const MotionRow& r) { return r.state.time; }},
         {"step_size", [](const MotionRow& r) { return r.state.step; }},
         {"energy", [](const MotionRow& r) { return r.measures.bending.energy; }},
     });
-    table.add_family("energy_<kl>", energy_term_numbers(),
+    table.add_family("energy_<kl>", term_names(energy),
                      [](const MotionRow& r, std::size_t term) { return r.measures.bending.energy_term[term]; });
     table.add({
         {"free_energy", [](const MotionRow& r) { return r.measures.free_energy; }},
@@ -45,13 +44,6 @@ SeriesTable<MotionRow> make_table() {
         {"elements", [](const MotionRow& r) { return static_cast<double>(r.elements); }},
         {"wall_seconds", [](const MotionRow& r) { return r.wall_seconds; }},
     });
-    return table;
-}
-
-}  // namespace
-
-const SeriesTable<MotionRow>& motion_series() {
-    static const SeriesTable<MotionRow> table = make_table();
     return table;
 }
 

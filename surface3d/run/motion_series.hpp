@@ -15,6 +15,6 @@ struct MotionRow {
     double wall_seconds;
 };
 
-const SeriesTable<MotionRow>& motion_series();
+SeriesTable<MotionRow> motion_series(const Bending& energy);
 
 }  // namespace tubule::surface3d

@@ -1,8 +1,11 @@
 #include "surface3d/run/motion_start.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
 namespace tubule::surface3d {
@@ -36,7 +39,7 @@ double begin_time(const Case& c) {
 }
 
 VectorField start_velocity(const Case& c, const StartMesh& start) {
-    if (start.velocity.size() > 0 || !c.velocity.rotates) return start.velocity;
+    if (start.velocity.size() > 0 || c.velocity.initial != InitialVelocity::rotation) return start.velocity;
     VectorField u = VectorField::Zero(3, start.mesh.size());
     for (int i = 0; i < start.mesh.size(); ++i) {
         const Eigen::Vector3d& x = start.mesh.nodes[i];
@@ -71,9 +74,19 @@ double reference_energy(const Case& c, const Observables& o, double period) {
     return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
 }
 
+void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K) {
+    DensityDomain domain(c.energy);
+    if (!domain.restricted()) return;
+    for (int i = 0; i < mesh.size(); ++i) domain.look(H[i], K[i], i);
+    const FormulaDomain::Margin margin = domain.margin();
+    const Eigen::Vector3d& x = mesh.nodes[static_cast<std::size_t>(margin.place)];
+    tubule::require_defined(c, margin, fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]));
+}
+
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
+    require_defined(c, start.mesh, fields.H, fields.K);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
     memory.balance.work = c.handover ? c.handover->work : 0;
     memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);

@@ -22,6 +22,9 @@ double error_of_start(const Case& c, const Start& start, int elements, double en
 double reference_energy(const Case& c, const Observables& start, double period);
 
 // Area, volume, reference energy, relaxation of the mesh, how well H is known.
+// Throws CaseError where the formula of the energy is not defined for H and K at the nodes of the start.
+void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K);
+
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);
 
 }  // namespace tubule::surface3d

@@ -15,6 +15,7 @@
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/motion_series.hpp"
+#include "surface3d/run/motion_start.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -50,6 +51,7 @@ Measured measure(const Case& c, StartMesh start, Recovery recovery) {
         out.stop = StopReport{Stop::solver_failed, 0, fmt::format("curvature: {}", error.what()), "use another mesh"};
         return out;
     }
+    require_defined(c, mesh, out.curvature.H, out.curvature.K);
     out.o = observe(space, mesh, out.curvature, c.energy);
     out.stop = find_impossible_curvature(out.o, mesh);
     return out;
@@ -214,13 +216,13 @@ struct RestRow {
     double energy_error, wall_seconds;
 };
 
-SeriesTable<RestRow> rest_series() {
+SeriesTable<RestRow> rest_series(const Case& c) {
     SeriesTable<RestRow> table;
     table.add({
         {"time", [](const RestRow&) { return 0.0; }},
         {"energy", [](const RestRow& r) { return r.o.energy; }},
     });
-    table.add_family("energy_<kl>", energy_term_numbers(),
+    table.add_family("energy_<kl>", term_names(c.energy),
                      [](const RestRow& r, std::size_t term) { return r.o.energy_term[term]; });
     table.add({
         {"area", [](const RestRow& r) { return r.o.area; }},
@@ -256,8 +258,8 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
 }  // namespace
 
 std::vector<std::string> series_names(const Case& c) {
-    if (c.moves()) return motion_series().names();
-    return rest_series().names();
+    if (c.moves()) return motion_series(c.energy).names();
+    return rest_series(c).names();
 }
 
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
@@ -271,7 +273,8 @@ RunSummary run(const Case& c, const Start& start, RunObserver& observer, const R
     RunSummary s = clock.pausing([&] { return drive(c, observer, clock, *meshes); });
     if (!meshes->measured()) return s;
     const Measured& m = *meshes->measured();
-    if (m.has_curvature()) observer.row(rest_series().values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
+    if (m.has_curvature())
+        observer.row(rest_series(c).values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });
     return s;

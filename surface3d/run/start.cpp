@@ -178,6 +178,21 @@ struct Prepare {
         if (curve.kind == ProfileCurve::Kind::cell) return on(profile_of(UnitSphere{}), map);
         return on(profile_of(Cylinder{curve.mean_radius, curve.length}), map);
     }
+    Prepared operator()(const FormulaShape& shape) const {
+        const auto map = [shape](const auto& p) { return position(shape, p); };
+        if (shape.length) return on(Cylinder{mean_radius(shape), *shape.length}, map);
+        return on(UnitSphere{}, map);
+    }
+    Prepared operator()(const ProfileFile& file) const {
+        try {
+            const SmoothProfile profile = read_profile(beside(c, file.path), file);
+            Prepared out = (*this)(WavedProfile{profile_curve(profile), {}, {}});
+            out.notes.push_back(profile.note());
+            return out;
+        } catch (const ProfileError& error) {
+            throw CaseError(error.what());
+        }
+    }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
         const std::string blame = complaint(c, "shape.path", "cannot be used").what();
@@ -203,19 +218,52 @@ struct Prepare {
         if (frame.mesh) {
             refuse_what_needs_a_shape();
             const CurvedMesh mesh = frame_surface(frame, result.meshes.at(*frame.mesh));
-            return {[mesh](int, int order) {
-                        return StartMesh{mesh.order == order ? mesh : with_order(mesh, order), {}, {}};
+            return {[mesh, moves = velocities(frame, mesh)](int, int order) {
+                        if (mesh.order == order) return StartMesh{mesh, {}, moves ? columns(*moves) : VectorField()};
+                        return StartMesh{
+                            with_order(mesh, order), {}, moves ? columns(with_order(*moves, order)) : VectorField()};
                     },
                     false};
         }
         try {
             const auto profile = profile_of(frame);
-            if (const auto* spline = std::get_if<Revolution>(&profile)) return of_spline(*spline);
+            if (const auto* spline = std::get_if<Revolution>(&profile)) {
+                if (asks_for_velocity()) throw without_velocity();
+                return of_spline(*spline);
+            }
             const auto& [r, z, length] = std::get<ProfilePoints>(profile);
-            return (*this)(WavedProfile{profile_curve(r, z, length), {}, {}});
+            WavedProfile start{profile_curve(r, z, length), {}, {}};
+            if (asks_for_velocity()) start.velocity = profile_velocities(frame, start.curve);
+            return (*this)(start);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}: {}", from.path, error.what()));
         }
+    }
+    bool asks_for_velocity() const { return c.velocity.initial == InitialVelocity::result; }
+    CaseError without_velocity() const {
+        return complaint(c, "velocity.initial", "must not be \"result\": the frame of shape.path has no velocity");
+    }
+    // Those of a frame at the nodes of its mesh, as positions of nodes of a mesh alike.
+    std::optional<CurvedMesh> velocities(const Record& frame, const CurvedMesh& mesh) const {
+        if (!asks_for_velocity()) return std::nullopt;
+        const Array* u = find_array(frame, "u");
+        if (!u || u->data.size() != 3 * mesh.nodes.size()) throw without_velocity();
+        CurvedMesh out = mesh;
+        out.period = 0;
+        for (std::size_t i = 0; i < out.nodes.size(); ++i)
+            out.nodes[i] = Eigen::Map<const Eigen::Vector3d>(u->data.data() + 3 * i);
+        return out;
+    }
+    static VectorField columns(const CurvedMesh& mesh) {
+        VectorField out(3, mesh.size());
+        for (int i = 0; i < mesh.size(); ++i) out.col(i) = mesh.nodes[i];
+        return out;
+    }
+    ProfileVelocity profile_velocities(const Record& frame, const ProfileCurve& curve) const {
+        const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
+                    *around = find_array(frame, "u_theta");
+        if (!normal || !along) throw without_velocity();
+        return profile_velocity(curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
     }
     Prepared of_spline(const Revolution& tube) const {
         double radius = 0;

@@ -9,6 +9,18 @@
 #include <tuple>
 #include <utility>
 
+#include "common/formula/formula.hpp"
+
+namespace term_first {
+using namespace tubule;
+}
+namespace term_in_the_middle {
+using namespace tubule;
+}
+namespace term_last {
+using namespace tubule;
+}
+
 #define tubule term_first
 #include "first/common/energy/bending.hpp"
 #undef tubule

@@ -18,6 +18,18 @@ inline Bending bending(double k20, double H0 = 0, double k40 = 0, double k42 = 0
     return {.k = {k20, k40, k42}, .H0 = H0};
 }
 
+// With terms that a case adds: by powers, and by a formula.
+inline Bending with_terms(Bending energy, std::vector<EnergyTerm> terms) {
+    energy.terms = std::move(terms);
+    return energy;
+}
+inline EnergyTerm powers(double modulus, int H, int K) {
+    return {.modulus = modulus, .H = H, .K = K};
+}
+inline EnergyTerm formula(double modulus, const std::string& text) {
+    return {.modulus = modulus, .formula = std::make_shared<const Formula>(parse_formula(text, EnergyTerm::variables))};
+}
+
 // r0 = radius + SUM amplitude cos(2 pi n z/length + phase)
 inline Case tube_case(const Bending& energy, double radius, double length, std::vector<TubeMode> modes, double end,
                       std::vector<double> output = {}) {

@@ -30,8 +30,14 @@ MotionLaw law_of(ModelKind kind, double Re = 1, double gamma = 0) {
 TEST(Dispersion, theGraphsLinearisedOperator) {
     // Closed forms, theory.md (5.6) (m = 0, q = 0 included: d(dR/dt)/dR), against the eigenvalues of the discrete
     // Jacobian at a tube, whose radius drifts: dF/dx w + s M w = 0. Errors are relative to the rate, or to 1.
-    for (const UniformTube& tube : {UniformTube{bending(0.3, -0.4, 0.02, 0.15), 0.8}, UniformTube{bending(0.2), 1},
-                                    UniformTube{bending(0.2, -1.5, 0, 0.06), 0.6}}) {
+    // The last four: terms that a case adds, whose Hessian in (H, K) is definite, indefinite, that are odd, a formula.
+    for (const UniformTube& tube :
+         {UniformTube{bending(0.3, -0.4, 0.02, 0.15), 0.8}, UniformTube{bending(0.2), 1},
+          UniformTube{bending(0.2, -1.5, 0, 0.06), 0.6},
+          UniformTube{with_terms(bending(0.2, -1.5), {powers(0.02, 6, 0), powers(0.1, 4, 2)}), 0.6},
+          UniformTube{with_terms(bending(0.2, -0.4), {powers(0.05, 2, 1)}), 0.8},
+          UniformTube{with_terms(bending(0.2, -0.5), {powers(-0.03, 3, 0), powers(0.02, 1, 1)}), 0.8},
+          UniformTube{with_terms(bending(0.2, -0.5), {formula(0.3, "sqrt(1 + (H - H0)^2 + K^2) + exp(H)*K")}), 0.8}}) {
         const double length = 3;
         const Cell cell{0, length, false, 1};
         const ProfileSpace space(cell, uniform_breaks(cell, 32), 7, 6);
@@ -56,12 +62,17 @@ TEST(Dispersion, theGraphsLinearisedOperator) {
 
 TEST(Dispersion, spectraOfTubesAndSpheres) {
     // Closed forms of all m against the numerical spectrum of the same shape.
-    const Bending energy = bending(0.3, -0.4, 0.02, 0.15);
+    const Bending listed = bending(0.3, -0.4, 0.02, 0.15);
+    const Bending more = with_terms(bending(0.3, -0.4, 0.02, 0.15),
+                                    {powers(0.02, 2, 1), powers(-0.01, 3, 0), formula(0.1, "sqrt(1 + H^2 + K^2)")});
     const double R = 0.8, length = 3;
     const Meridian tube = meridian(Tube{R, length, {}});
     const Meridian sphere = meridian(Sphere{1.2, {}});
-    for (const MotionLaw& law :
-         {law_of(ModelKind::gradient_flow), law_of(ModelKind::overdamped), law_of(ModelKind::stokes, 2, 0.3)}) {
+    for (const auto& [energy, law] : {std::pair{listed, law_of(ModelKind::gradient_flow)},
+                                      {listed, law_of(ModelKind::overdamped)},
+                                      {listed, law_of(ModelKind::stokes, 2, 0.3)},
+                                      {more, law_of(ModelKind::gradient_flow)},
+                                      {more, law_of(ModelKind::stokes, 2, 0.3)}}) {
         SpectrumSettings settings;
         settings.accuracy = 1e-8;
         const Spectrum found = spectrum(energy, law, held_by(law), tube, settings);

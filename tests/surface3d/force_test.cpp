@@ -115,5 +115,38 @@ TEST(BendingForce, IsThePapersTermByTerm) {
     }
 }
 
+TEST(BendingForce, OfTermsThatACaseAdds) {
+    // On a sphere b = -(2/R) (f + f_H/R - f_K/R^2), theory.md (2.13), by hand: f = h^2 K, h K^3 and log(1 + h^2 K).
+    const double R = 1.5, H = -2 / R, K = 1 / (R * R), H0 = -0.5, h = H - H0;
+    const CurvedMesh mesh = mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(4), 4);
+    const SurfaceSpace space(mesh);
+    const CurvatureField curvature = recover(space, mesh);
+    const Formula log = parse_formula("log(1 + (H - H0)^2*K)", EnergyTerm::variables);
+    const double inside = 1 + h * h * K;
+    const auto expect = [&](const EnergyTerm& term, double f, double f_H, double f_K) {
+        const Bending bending{.k = {}, .H0 = H0, .terms = {term}};
+        const double area = 4 * pi * R * R, b = -(2 / R) * (f + f_H / R - f_K / (R * R));
+        const double paired = bending_force(space, mesh, curvature, bending).cwiseProduct(curvature.normal).sum();
+        EXPECT_NEAR(paired / area, b, 1e-6 * std::abs(b));
+        const Observables o = observe(space, mesh, curvature, bending);
+        ASSERT_EQ(o.energy_term.size(), 4u);
+        EXPECT_NEAR(o.energy_term[3] / (f * area), 1, 1e-6);
+        EXPECT_EQ(o.energy, o.energy_term[3]);
+    };
+    expect({.modulus = 1, .H = 2, .K = 1}, h * h * K, 2 * h * K, h * h);
+    expect({.modulus = 1, .H = 1, .K = 3}, h * K * K * K, K * K * K, 3 * h * K * K);
+    expect({.modulus = 1, .formula = std::make_shared<const Formula>(log)}, std::log(inside), 2 * h * K / inside,
+           h * h / inside);
+}
+
+TEST(BendingForce, OfGaussianCurvatureAloneIsZero) {
+    // f_K is constant, and H K f_K = H f: to rounding on any mesh.
+    const Sphere wavy{.radius = 1, .modes = {{0.3, 3, 2}}};
+    const CurvedMesh mesh = mesh_of(wavy, icosphere(2), 3);
+    const SurfaceSpace space(mesh);
+    const Bending bending{.k = {}, .H0 = -1, .terms = {{.modulus = 2, .H = 0, .K = 1}}};
+    EXPECT_LT(bending_force(space, mesh, recover(space, mesh), bending).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace tubule::surface3d

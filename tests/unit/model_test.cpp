@@ -98,7 +98,7 @@ TEST(Model, isNamedInCaseFilesAndTakesItsKeys) {
         else
             EXPECT_THROW(parse_case(viscous, {}, "case.toml"), CaseError) << m.name;
         if (m.inertia)
-            EXPECT_TRUE(parse_case(spinning, {}, "case.toml").velocity.rotates);
+            EXPECT_EQ(parse_case(spinning, {}, "case.toml").velocity.initial, InitialVelocity::rotation);
         else
             EXPECT_THROW(parse_case(spinning, {}, "case.toml"), CaseError) << m.name;
     }

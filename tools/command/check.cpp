@@ -60,6 +60,7 @@ struct Checked {
     std::vector<std::string> chosen;   // in words
     std::optional<Forecast> expected;  // with --quick nothing
     std::string unknown;               // why nothing is expected
+    std::string warning;               // of its energy
     bool valid() const { return complaints.empty(); }
 };
 
@@ -71,6 +72,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         const Case c = read_case(path, options.sets);
         out.toml = effective_toml(c);
         out.chosen = chosen(c);
+        out.warning = unbounded_below(c.energy);
         engine_for(c);
         if (!options.quick) out.expected = forecast(c);
     } catch (const CaseErrors& error) {
@@ -92,6 +94,7 @@ void tell(const Checked& c, bool quick) {
     std::string answer = fmt::format("# OK {}\n{}", shown_path(c.path), c.toml);
     for (const std::string& words : c.chosen) add(answer, "\n# by default: {}", words);
     print_answer(answer + "\n");
+    if (!c.warning.empty()) say(stderr, "{}: warning: {}\n", shown_path(c.path), c.warning);
     // For people: the answer itself is the case, the same at each call.
     if (c.expected)
         say(stderr, "{}: expected: {}\n", shown_path(c.path), words(*c.expected));

@@ -49,6 +49,18 @@ bool is_plane(const std::string& text) {
     return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
+// NAME=LABEL of the terms that the cases of results add. A result that cannot be read is complained of by the script.
+std::vector<std::string> labels_of_added_terms(const std::vector<std::string>& results) {
+    std::vector<std::string> out;
+    for (const std::string& result : results) try {
+            const CaseText of = read_case_text(result);
+            for (const EnergyTerm& term : parse_case(of.text, of.sets, result).energy.terms)
+                out.push_back(fmt::format("{}={}", term_name(term), term_label(term)));
+        } catch (const std::runtime_error&) {
+        }
+    return out;
+}
+
 std::vector<std::string> script_arguments(const PlotOptions& options) {
     std::vector<std::string> arguments = plot_command("plot", "plot.py");
     arguments.push_back("--kind=" + options.kind);
@@ -72,6 +84,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     for_each_bending_term([&](std::size_t, const auto& term) {
         arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
     });
+    for (const std::string& label : labels_of_added_terms(options.results)) arguments.push_back("--term=" + label);
     arguments.push_back("--");
     arguments.insert(arguments.end(), options.results.begin(), options.results.end());
     return arguments;

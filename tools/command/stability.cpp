@@ -121,6 +121,9 @@ std::optional<TubeSubject> tube_of(const Case& c) {
             out.tube.radius += mode.amplitude * std::cos(mode.phase);
         else if (mode.amplitude != 0)
             out.waves.push_back(mode);
+    if (!std::isfinite(density(out.tube.energy, -1 / out.tube.radius, 0.0).f))
+        throw complaint(c, "energy.term",
+                        fmt::format("is not defined on the straight tube of radius {:.6g}", out.tube.radius));
     std::sort(out.waves.begin(), out.waves.end(),
               [](const TubeMode& a, const TubeMode& b) { return std::abs(a.amplitude) > std::abs(b.amplitude); });
     return out;

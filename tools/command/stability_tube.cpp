@@ -232,6 +232,9 @@ std::string moduli(const Bending& energy) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         if (energy.k[i] != 0) text += fmt::format("{} = {:g}, ", term.key, energy.k[i]);
     });
+    for (const EnergyTerm& term : energy.terms)
+        text += term.formula ? fmt::format("{:g} ({}), ", term.modulus, term.formula->text)
+                             : fmt::format("k{} = {:g}, ", term_name(term), term.modulus);
     return text + fmt::format("H0 = {:g}", energy.H0);
 }
 

@@ -126,7 +126,7 @@ class Result:
 
     def terms(self, known):
         """Names of the energy terms in the series, "20" for energy_20: the known ones first, in their order."""
-        others = [name[7:] for name in self.series if re.fullmatch(r"energy_\d+", name)]
+        others = [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula)", name)]
         return list(dict.fromkeys([*(name for name in known if f"energy_{name}" in self.series), *others]))
 
 

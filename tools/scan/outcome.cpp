@@ -44,6 +44,7 @@ Outcome outcome_of(Stop reason, const EndShape& end) {
         case Stop::overhang:
             return Outcome::overhang;
         case Stop::ill_posed:
+        case Stop::undefined:
             return Outcome::ill_posed;
         case Stop::self_intersection:
             return Outcome::self_intersection;

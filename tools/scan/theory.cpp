@@ -33,6 +33,7 @@ std::optional<double> delaunay_period(const Case& c) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only_k20 = only_k20 && (std::string_view(term.key) == "k20" ? c.energy.k[i] > 0 : c.energy.k[i] == 0);
     });
+    only_k20 = only_k20 && c.energy.terms.empty();
     const int waves = repeats(*tube);
     if (!only_k20 || waves == 0) return std::nullopt;
     return tube->length / waves;

@@ -20,11 +20,7 @@ CurvatureJet<double> on_tube(const Bending& energy, double R) {
 }
 
 double energy_scale(const Bending& energy, double R) {
-    double scale = 0;
-    for_each_bending_term([&](std::size_t i, const auto& term) {
-        scale += std::abs(energy.k[i]) * term.magnitude(-1 / R, 0.0, energy.H0);
-    });
-    return scale;
+    return magnitude(energy, -1 / R, 0);
 }
 
 }  // namespace
