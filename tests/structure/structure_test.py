@@ -16,7 +16,7 @@ layers = {
     'common': [{'geometry', 'model'}, {'formula'}, {'energy'}, {'solve', 'series'}, {'shapes'}, {'case'}, {'theory', 'result'}, {'run'}],
     'axisym': [{'splines'}, {'integration'}, {'graph'}, {'curve'}, {'equilibrium'}, {''}],
     'surface3d': [{'mesh'}, {'fem'}, {'curvature'}, {'meshing', 'import', 'motion'}, {'run'}],
-    'tools': [{'auto', 'compare'}, {'run'}, {'scan'}, {'confirm'}, {'command'}],
+    'tools': [{'auto', 'compare'}, {'run'}, {'scan'}, {'confirm'}, {'command'}, {'python'}],
 }
 knows = {'common': set(), 'axisym': {'common'}, 'surface3d': {'common'}, 'tools': {'common', 'axisym', 'surface3d'}}
 

@@ -249,9 +249,7 @@ py::dict scan(const Case& c, const std::vector<std::string>& over, const std::op
     return out;
 }
 
-}  // namespace
-
-PYBIND11_MODULE(_core, m) {
+void add_errors(py::module_& m) {
     const auto add_error = [&](py::object type, const char* meaning) {
         type.attr("__doc__") = meaning;
         type.attr("__module__") = "tubule";
@@ -260,7 +258,9 @@ PYBIND11_MODULE(_core, m) {
               "Bad input: where it is, what is wrong, what is allowed, and what was probably meant.");
     add_error(py::register_exception<SolveError>(m, "SolveError", PyExc_RuntimeError),
               "The numerics failed before there was anything to return.");
+}
 
+void add_cases(py::module_& m) {
     py::class_<Case>(m, "Case")
         .def_readonly("path", &Case::path)
         .def_readonly("text", &Case::text)
@@ -270,7 +270,9 @@ PYBIND11_MODULE(_core, m) {
         .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
     m.def("parse_case", &parse_case, py::arg("text"), py::arg("sets"), py::arg("path"));
     m.def("read_case", &read_case, py::arg("path"), py::arg("sets"));
+}
 
+void add_results(py::module_& m) {
     py::class_<Results>(m, "Results")
         .def_property_readonly("about", [](const Results& r) { return dictionary(r.result->about); })
         .def_property_readonly("series_names", [](const Results& r) { return r.result->series_names; })
@@ -289,7 +291,9 @@ PYBIND11_MODULE(_core, m) {
     m.def("read_result", [](const std::filesystem::path& file) {
         return Results{std::make_shared<const Result>(read_result(file))};
     });
+}
 
+void add_closed_forms(py::module_& m) {
     m.def("density", &density_at);
     m.def("growth_rates", &growth_rates);
     m.def("profile_curvatures", [](const Numbers& r, const Numbers& r1, const Numbers& r2, const Numbers& z1,
@@ -307,7 +311,9 @@ PYBIND11_MODULE(_core, m) {
         out["resolution"] = f.resolution, out["steps"] = f.steps, out["seconds"] = f.seconds, out["bytes"] = f.bytes;
         return out;
     });
+}
 
+void add_answers(py::module_& m) {
     py::class_<StabilityOptions>(m, "StabilityOptions")
         .def(py::init<>())
         .def_readwrite("model", &StabilityOptions::model)
@@ -337,6 +343,16 @@ PYBIND11_MODULE(_core, m) {
     });
     m.def("scan", &scan);
     m.def("build_info", &build_info);
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, m) {
+    add_errors(m);
+    add_cases(m);
+    add_results(m);
+    add_closed_forms(m);
+    add_answers(m);
 }
 
 }  // namespace tubule
