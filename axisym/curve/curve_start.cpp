@@ -51,6 +51,17 @@ Meridian bowl(double thickness, double opening) {
     return m;
 }
 
+Meridian scaled(const Meridian& meridian, double factor) {
+    Meridian m = meridian;
+    m.length *= factor;
+    m.at = [at = meridian.at, factor](double t) {
+        auto p = at(t);
+        for (double& value : p) value *= factor;
+        return p;
+    };
+    return m;
+}
+
 namespace {
 
 Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::VectorXd& x) {

@@ -18,6 +18,8 @@ namespace tubule::axisym {
 // from its bottom, with a round rim.
 Meridian spheroid(double reduced_volume, bool prolate);
 Meridian bowl(double thickness, double opening);
+// The curve times a factor.
+Meridian scaled(const Meridian& meridian, double factor);
 // An existing curve, which is copied.
 Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x);
 // Through points (r, z) from end to end, by a quintic spline of the chord length. Closed cells begin and end with

@@ -31,6 +31,8 @@ struct Task {
     EquilibriumSettings settings;
 };
 
+constexpr double largest_of_family = 0.99;  // reduced volume of a start
+
 double sphere_volume(double area, double reduced) {
     return reduced * area * std::sqrt(area) / (6 * std::sqrt(pi));
 }
@@ -82,6 +84,19 @@ double start_of(int parameter, const StationaryProblem& p) {
     }
 }
 
+// The first shape of a family, of this reduced volume and about this area.
+Meridian start_of(Family family, double reduced, double area) {
+    // Spheres have no family: nearly all of them are found from a little below.
+    const double v = std::min(reduced, largest_of_family);
+    const Meridian shape = family == Family::stomatocyte ? bowl(0.3, 2.3) : spheroid(v, family == Family::prolate);
+    return scaled(shape, std::sqrt(area / area_and_volume(shape)[0]));
+}
+
+// What the constraints ask for.
+double wanted_reduced_volume(const Constraints& held) {
+    return held.reduced_volume ? *held.reduced_volume : reduced_volume(*held.area, *held.volume);
+}
+
 Task task_of(const Case& c) {
     const EquilibriumChoices& e = *c.equilibrium;
     Task task;
@@ -102,6 +117,11 @@ Task task_of(const Case& c) {
     if (is_held == Held::area_and_volume && e.reduced_volume)
         held.volume = sphere_volume(*held.area, *e.reduced_volume);
     if (is_held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    if (e.family) {
+        if (task.start.topology != Topology::cell)
+            throw CaseError(fmt::format("{}: equilibrium.family: is of closed cells, and [shape] is none", c.path));
+        task.start = start_of(*e.family, wanted_reduced_volume(held), held.area.value_or(area));
+    }
     task.settings.accuracy = c.accuracy.energy;
     task.settings.degree = c.discretisation.order;
     task.settings.descend = e.descend;
@@ -328,6 +348,15 @@ std::vector<std::string> equilibrium_series_names(const Case& c) {
 
 void check_equilibrium(const Case& c) {
     task_of(c);
+}
+
+CaseShape find_shape(const Case& c, RunObserver& observer) {
+    const RunClock clock(c, observer);
+    const Task task = task_of(c);
+    CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}};
+    if (out.shape.stop == Stop::finished && c.equilibrium->modes)
+        out.modes = mode_stability(task.problem, out.shape, *c.equilibrium->modes, motion_law(c.model));
+    return out;
 }
 
 RunSummary run_equilibrium(const Case& c, RunObserver& observer) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/case.hpp"
 #include "common/run/run.hpp"
 
@@ -17,5 +18,12 @@ void check_equilibrium(const Case& c);
 // One row and one frame for each shape, numbered from 0 instead of by time: a single shape, or those of the
 // branch at its steps, its folds and its bifurcations, in order. Throws as check_equilibrium().
 RunSummary run_equilibrium(const Case& c, RunObserver& observer);
+
+// The shape of a case without a branch, with the growth rates of its modes, and nothing written.
+struct CaseShape {
+    Equilibrium shape;
+    std::vector<ModeRates> modes;  // of a shape that was found, if asked for
+};
+CaseShape find_shape(const Case& c, RunObserver& observer);
 
 }  // namespace tubule::axisym

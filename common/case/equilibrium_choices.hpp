@@ -18,6 +18,9 @@ namespace tubule {
 // What is held fixed while the energy becomes stationary.
 enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
 
+// Families of vesicles, by which the search may begin instead of at the shape of the case.
+enum class Family { prolate, oblate, stomatocyte };
+
 // What a branch is followed in: the moduli by the number of their term, or these.
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
                      vary_pressure = -6, vary_force = -7;
@@ -39,6 +42,7 @@ inline std::string wrong_branch(double from, double to, double step) {
 struct EquilibriumChoices {
     std::optional<Held> held;                            // by default what [model] leaves: see held_of()
     std::optional<double> area, volume, reduced_volume;  // where absent: those of the start
+    std::optional<Family> family;                        // where the search begins; absent: at [shape]
     bool descend = true;                                 // to a minimum; if not, to a stationary shape near the start
     std::optional<int> modes;  // stability against e^{i m theta}, m = 0 ... modes, by the dissipation of [model]
     BranchChoices branch;
@@ -87,6 +91,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
     k.number("area", e.area, {.above = 0});
     k.number("volume", e.volume, {.above = 0});
     k.number("reduced_volume", e.reduced_volume, {.above = 0, .to = 1});
+    k.choice("family", e.family,
+             {{"prolate", Family::prolate}, {"oblate", Family::oblate}, {"stomatocyte", Family::stomatocyte}});
     k.flag("descend", e.descend);
     k.integer("modes", e.modes, {.from = model.free_period ? 1.0 : 0.0, .to = 100});
     const Held held = e.held.value_or(default_held(model));
@@ -104,6 +110,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         if (e.reduced_volume && !reduced) return not_held;
         return e.reduced_volume && e.volume ? "cannot be combined with equilibrium.volume" : "";
     });
+    k.check("family",
+            [&] { return e.family && !reduced ? "needs area and volume, or the reduced volume, to be held" : ""; });
     k.table("branch", [&](auto& k) {
         std::vector<std::pair<std::string, int>> parameters;
         for (std::size_t i = 0; i < count_terms(energy); ++i)

@@ -1,16 +1,23 @@
 #!/usr/bin/python3
 """`tubule confirm`: points of a scan again in three dimensions, few triangles, short.
 
-confirm_test.py TUBULE
+confirm_test.py TUBULE [MPIRUN]
 """
 import csv
 import io
 import json
 import math
+import os
+import signal
+import subprocess
 import sys
+import time
 import unittest
+from pathlib import Path
 
-from program import ProgramTest
+MPIRUN = sys.argv[2] if len(sys.argv) > 2 else None
+
+from program import PROGRAM, ProgramTest
 
 # A tube with the area of a short wave too many, at fixed area and volume: with c = H0 R = -1 it keeps that wave, with
 # H0 = 0 it stores the area better by flattening, m = 2, which tier 1 cannot see.
@@ -112,6 +119,49 @@ class Confirm(ProgramTest):
         self.assertEqual((ring["verdict"], ring["n"], ring["m"]), ("symmetry-broken", "0", "2"))
         self.assertAlmostEqual(float(ring["linear_rate"]), 2.4, delta=1e-3)
         self.assertAlmostEqual(float(ring["rate"]) / 2.4, 1, delta=0.1)
+
+
+@unittest.skipUnless(MPIRUN, "built without MPI")
+class Ranks(ProgramTest):
+    """Across the processes of an mpirun: the same points, and none is lost when a rank dies."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("case.toml", CASE)
+        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.1", "-o", "scan.hdf")
+
+    def command(self, ranks, folder):
+        return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "confirm", "scan.hdf",
+                "--elements", "60", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
+
+    def figures(self, text):
+        return [{key: value for key, value in row.items() if key != "file"} for row in csv.DictReader(io.StringIO(text))]
+
+    def test_killed_it_goes_on_and_says_the_same(self):
+        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        alone, _ = self.tubule("confirm", "scan.hdf", *self.command(1, "alone")[8:])
+        with subprocess.Popen(self.command(3, "ranks"), cwd=self.folder, env=environment,
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:  # fmt: skip
+            self.addCleanup(process.kill)
+            while not list(self.folder.glob("ranks/*.hdf")):
+                self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+                time.sleep(0.01)
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            os.kill(int(children[-1]), signal.SIGKILL)
+        self.assertNotEqual(process.returncode, 0)
+        done = subprocess.run(self.command(2, "ranks"), cwd=self.folder, env=environment, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for row, other in zip(self.figures(done.stdout), self.figures(alone), strict=True):
+            for key in ("point", "outcome", "verdict", "stop", "n", "m"):
+                self.assertEqual(row[key], other[key], key)
+            self.assertAlmostEqual(float(row["energy_difference"]), float(other["energy_difference"]), delta=1e-4)
+
+    def test_bad_input_ends_all_ranks(self):
+        command = self.command(2, "ranks")
+        command[command.index("scan.hdf")] = "case.toml"
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(done.stderr.count("not a result of tubule scan"), 1)
 
 
 if __name__ == "__main__":

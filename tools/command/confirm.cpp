@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,10 +18,12 @@
 
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
+#include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/ranked.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 #include "tools/confirm/picks.hpp"
@@ -191,6 +194,7 @@ std::vector<Point> plan(const ConfirmOptions& options, const ScanResult& result)
         p.c = result.scan.case_of(pick.point);
         p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
+        if (p.c.equilibrium) throw CaseError(options.scan + ": is a scan of equilibria: nothing moves there");
         if (p.c.tier != Tier::axisym)
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");
         p.surface_case = confirm::surface_case(p.c, p.axisymmetric, options.choices);
@@ -218,30 +222,122 @@ bool holds(const fs::path& result, const std::string& case_text) {
     }
 }
 
-// Runs the point, or goes on with it, or finds it done by an earlier call that asked the same. The exit status.
-int run_in_3d(Point& p, const fs::path& folder) {
-    const fs::path toml = folder / fmt::format("point_{:06}.toml", p.pick.point),
-                   hdf = fs::path(toml).replace_extension(".hdf");
-    RunOptions run{.cases = {toml.string()}, .sets = {}, .output = hdf.string()};
+// A run in three dimensions and how it ended: the exit status, and the result if there is one.
+struct SurfaceRun {
+    std::string case_text, toml;
+};
+struct SurfaceRunEnd {
+    int status = 0;
+    std::string file;
+};
+
+// Runs it, or goes on with it, or finds it done by an earlier call that asked the same.
+SurfaceRunEnd run_in_3d(const SurfaceRun& task) {
+    const fs::path hdf = fs::path(task.toml).replace_extension(".hdf");
+    RunOptions run{.cases = {task.toml}, .sets = {}, .output = hdf.string()};
     run.overwrite = true;
-    run.resume = holds(hdf, p.surface_case);
+    run.resume = holds(hdf, task.case_text);
     run.quiet = run.silent = true;
-    std::ofstream(toml, std::ios::binary) << p.surface_case;
-    p.file = run.resume ? hdf.string() : "";
-    run.written = [&](const fs::path& file) { p.file = file.string(); };
-    return run_cases(run);  // which says so if the case could not be written
+    std::ofstream(task.toml, std::ios::binary) << task.case_text;
+    SurfaceRunEnd end;
+    end.file = run.resume ? hdf.string() : "";
+    run.written = [&](const fs::path& file) { end.file = file.string(); };
+    try {
+        end.status = run_cases(run);
+    } catch (const std::exception& error) {  // the case could not be written
+        say(stderr, "tubule: {}\n", explanation(error));
+        end.status = 2;
+    }
+    return end;
 }
 
-int confirm_scan(const ConfirmOptions& options) {
+// ---- on several ranks
+
+Packet packet_of(const std::vector<std::string>& texts) {
+    Packet out;
+    for (const std::string& text : texts) {
+        out.insert(out.end(), text.begin(), text.end());
+        out.push_back('\0');
+    }
+    return out;
+}
+
+std::vector<std::string> texts_in(const Packet& bytes) {
+    std::vector<std::string> out;
+    for (std::size_t at = 0; at < bytes.size(); at += out.back().size() + 1) out.emplace_back(bytes.data() + at);
+    return out;
+}
+
+// A task is the number of a point and its run, a result the number and the end of the run.
+Packet run_task(const Packet& task) {
+    const auto words = texts_in(task);
+    const SurfaceRunEnd end = run_in_3d({words[1], words[2]});
+    return packet_of({words[0], std::to_string(end.status), end.file});
+}
+
+// The runs of all points, in order, whoever asks for one.
+class SurfaceRuns : public RankTasks {
+public:
+    SurfaceRuns(std::vector<Point>& points, const fs::path& folder, bool quiet)
+        : points_(points), folder_(folder), quiet_(quiet) {}
+
+    Answer take(Packet& task, bool) override {
+        const std::lock_guard lock(mutex_);
+        if (next_ == points_.size() || status_ != 0 || interrupted()) return Answer::over;
+        const Point& p = points_[next_];
+        if (!quiet_)
+            say(stderr, "{} of {}: point {}, {}\n", next_ + 1, points_.size(), p.pick.point, fmt::join(p.sets, ", "));
+        const fs::path toml = folder_ / fmt::format("point_{:06}.toml", p.pick.point);
+        task = packet_of({std::to_string(next_), p.surface_case, toml.string()});
+        ++next_;
+        return Answer::task;
+    }
+    void give(const Packet& result) override {
+        const std::lock_guard lock(mutex_);
+        const auto words = texts_in(result);
+        const int status = std::stoi(words[1]);
+        if (status == exit_code(Stop::interrupted) || status == 2) status_ = status;
+        points_[std::stoul(words[0])].file = words[2];
+    }
+    void fail(std::exception_ptr error) override {
+        const std::lock_guard lock(mutex_);
+        error_ = std::move(error);
+        status_ = exit_code(Stop::solver_failed);
+    }
+
+    // When all is over: 0, or that of what ended it early. Throws what failed.
+    int status() const {
+        if (error_) std::rethrow_exception(error_);
+        return interrupted() ? exit_code(Stop::interrupted) : status_;
+    }
+
+private:
+    std::mutex mutex_;
+    std::vector<Point>& points_;
+    fs::path folder_;
+    bool quiet_;
+    std::size_t next_ = 0;
+    int status_ = 0;
+    std::exception_ptr error_;
+};
+
+int run_all(SurfaceRuns& runs, Ranks* ranks) {
+    if (ranks) {
+        ranks->run(runs, packet_of({"confirm"}), run_task);
+    } else {
+        for (Packet task; runs.take(task, true) == RankTasks::Answer::task;) runs.give(run_task(task));
+    }
+    const int status = runs.status();
+    if (ranks && status == exit_code(Stop::interrupted)) abort_interrupted(*ranks);
+    return status;
+}
+
+int confirm_scan(const ConfirmOptions& options, Ranks* ranks) {
     check(options);
     std::vector<Point> points = plan(options, read_scan_result(options.scan));
-    const fs::path folder = make_folder(options);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        Point& p = points[i];
-        if (!options.quiet)
-            say(stderr, "{} of {}: point {}, {}\n", i + 1, points.size(), p.pick.point, fmt::join(p.sets, ", "));
-        const int status = run_in_3d(p, folder);
-        if (status == exit_code(Stop::interrupted) || status == 2) return status;
+    SurfaceRuns runs(points, make_folder(options), options.quiet);
+    if (const int status = run_all(runs, ranks); status != 0) return status;
+    for (Point& p : points) {
         if (p.file.empty()) {
             say(stderr, "point {}: the run failed at its start, and an earlier result was left as it was\n",
                 p.pick.point);
@@ -256,6 +352,12 @@ int confirm_scan(const ConfirmOptions& options) {
     const std::string out = options.csv ? csv(points) : options.json ? json_text(options, points) : words(points);
     print_answer(out);
     return std::all_of(points.begin(), points.end(), agrees) ? 0 : disagreement;
+}
+
+int confirm_ranked(const ConfirmOptions& options) {
+    catch_interrupts();
+    return run_ranked([&](Ranks* ranks) { return confirm_scan(options, ranks); },
+                      [](Ranks& ranks) { ranks.serve([](const Packet&) { return run_task; }); });
 }
 
 }  // namespace
@@ -284,7 +386,7 @@ void add_confirm(CLI::App& app, int& exit_status) {
               {4},
               {130, "interrupted; the same command continues"}},
              {"scans"});
-    command->callback([o, &exit_status] { exit_status = confirm_scan(*o); });
+    command->callback([o, &exit_status] { exit_status = confirm_ranked(*o); });
 }
 
 }  // namespace tubule

@@ -15,10 +15,11 @@
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/ranked.hpp"
 #include "tools/command/text.hpp"
 #include "tools/scan/dispatcher.hpp"
 #include "tools/scan/extension.hpp"
-#include "tools/scan/ranks.hpp"
+#include "tools/scan/rank_scan.hpp"
 
 namespace tubule {
 
@@ -135,7 +136,7 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
     ScanEffort effort;
     {
         Dispatcher dispatcher(writer, options.quiet);
-        workers = ranks ? ranks->run_scan(dispatcher, scan) : run_scan(dispatcher, scan, jobs);
+        workers = ranks ? run_scan(*ranks, dispatcher, scan) : run_scan(dispatcher, scan, jobs);
         was_interrupted = dispatcher.was_interrupted();
         effort = dispatcher.effort();
     }
@@ -148,31 +149,13 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
                        {"points_run", static_cast<std::int64_t>(effort.points)},
                        {"workers", std::int64_t{workers}}});
     if (!options.quiet) report(writer.result(), file, was_interrupted, effort, seconds);
-    if (was_interrupted && ranks) {
-        std::fflush(nullptr);
-        ranks->abort(exit_code(stop));
-    }
+    if (was_interrupted && ranks) abort_interrupted(*ranks);
     return exit_code(stop);
 }
 
 int scan(const ScanOptions& options) {
     catch_interrupts();
-    std::optional<Ranks> ranks = Ranks::join();
-    if (!ranks) return scan_by(options, nullptr);
-    if (ranks->rank() > 0) {
-        ranks->serve();
-        return 0;
-    }
-    try {
-        return scan_by(options, &*ranks);
-    } catch (const CaseError&) {
-        ranks->dismiss();  // thrown before any work was handed out
-        throw;
-    } catch (const std::exception& error) {
-        say(stderr, "tubule: {}\n", explanation(error));
-        std::fflush(nullptr);
-        ranks->abort(exit_code(Stop::solver_failed));
-    }
+    return run_ranked([&](Ranks* ranks) { return scan_by(options, ranks); }, serve_scan);
 }
 
 }  // namespace

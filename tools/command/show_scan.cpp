@@ -19,7 +19,7 @@ namespace tubule {
 namespace {
 
 // One letter an outcome, for maps in a terminal.
-constexpr std::string_view letters = " UWSCPOIXF?";
+constexpr std::string_view letters = " UWSCPOIXF?losp";
 static_assert(letters.size() == n_outcomes);
 
 std::string ends_of(const Axis& axis) {
@@ -27,16 +27,39 @@ std::string ends_of(const Axis& axis) {
                        fmt::join(axis.values.back(), ", "), axis.size(), axis.logarithmic ? ", logarithmic" : "");
 }
 
-// The first axis to the right, the second upwards.
+// The first axis to the right, the second upwards; of several starts the shape of least energy. Nothing for other
+// numbers of axes.
 void add_map(std::string& out, const ScanResult& result) {
-    const auto& axes = result.scan.axes;
-    add(out, "\nright: {}; up: {}\n", axes[0].keys.front(), axes[1].keys.front());
-    for (std::size_t j = axes[1].size(); j-- > 0;) {
+    const Nodes nodes(result.scan);
+    const auto starts = start_axis(result.scan);
+    std::vector<const Axis*> axes;
+    for (std::size_t a = 0; a < result.scan.axes.size(); ++a)
+        if (a != starts) axes.push_back(&result.scan.axes[a]);
+    if (axes.size() != 2 || axes[0]->size() > 160) return;
+    add(out, "\nright: {}; up: {}{}\n", axes[0]->keys.front(), axes[1]->keys.front(),
+        starts ? "; the shapes of least energy" : "");
+    for (std::size_t j = axes[1]->size(); j-- > 0;) {
         add(out, "    ");
-        for (std::size_t i = 0; i < axes[0].size(); ++i)
-            out += letters[static_cast<std::size_t>(result.points[i * axes[1].size() + j].outcome)];
+        for (std::size_t i = 0; i < axes[0]->size(); ++i) {
+            const std::size_t node = i * axes[1]->size() + j, start = best_start(nodes, node, result.points);
+            out += letters[static_cast<std::size_t>(result.points[nodes.point_of(node, start)].outcome)];
+        }
         add(out, "\n");
     }
+}
+
+// Where energies of two kinds are equal, as entries of a JSON array.
+std::string equal_energies(const ScanResult& result) {
+    const Nodes nodes(result.scan);
+    std::string out;
+    for (const auto& [number, p] : result.crossings) {
+        const EnergyCrossing c = crossing_of(result.scan, number);
+        add(out, "{}\n{{\"points\": [{}, {}], \"key\": {}, \"value\": {}, \"kinds\": [{}, {}], \"energy\": {}}}",
+            out.empty() ? "" : ",", nodes.point_of(c.node, 0), nodes.point_of(c.node + nodes.stride(c.axis), 0),
+            json(result.scan.axes[c.axis].keys.front()), json(p.value), json(std::string(name(c.kinds[0]))),
+            json(std::string(name(c.kinds[1]))), json(p[Measure::energy]));
+    }
+    return out;
 }
 
 // ---- CSV and JSON
@@ -86,7 +109,7 @@ std::string scan_summary(const std::filesystem::path& file) {
     add(out, "\n{:>10}     outcome\n", "points");
     for (std::size_t i = 0; i < counts.size(); ++i)
         if (counts[i] > 0) add(out, "{:>10}  {}  {}\n", counts[i], letters[i], name(static_cast<Outcome>(i)));
-    if (scan.axes.size() == 2 && scan.axes[0].size() <= 160) add_map(out, result);
+    add_map(out, result);
     return out;
 }
 
@@ -129,7 +152,9 @@ std::string scan_json(const std::filesystem::path& file) {
         for (std::size_t m = 0; m < n_measures; ++m) add(out, ", \"{}\": {}", measure_names[m], json(p.measures[m]));
         add(out, ", \"message\": {}}}", json(p.message));
     }
-    add(out, "\n]\n}}\n");
+    add(out, "\n]");
+    if (start_axis(scan)) add(out, ",\n\"equal_energies\": [{}\n]", equal_energies(result));
+    add(out, "\n}}\n");
     return out;
 }
 

@@ -29,6 +29,10 @@ COLOURS = {
     "self-intersection": "#b5651d",
     "failed": "#ff00ff",
     "undecided": "#9aa5ad",
+    "prolate": "#d6e4f0",
+    "oblate": "#f6c667",
+    "stomatocyte": "#8fc18f",
+    "pear": "#c6b5dc",
 }
 VERDICTS = {
     "agrees": {"marker": "o", "color": "black", "markerfacecolor": "white", "markersize": 6, "mew": 1.2},
@@ -47,13 +51,20 @@ QUANTITIES = {
     "r_max": "largest radius",
     "area": "area",
     "volume": "volume",
+    "height": "height",
+    "tension": "tension",
+    "pressure": "pressure",
+    "growth": "largest growth rate",
+    "free_energy": "energy with that of loads",
     "steps": "steps",
     "elements": "elements",
     "wall_seconds": "wall time in s",
     "cpu_seconds": "CPU time in s",
 }
+AT_REST = ("uniform-tube", "unduloid", "sphere", "closed", "prolate", "oblate", "stomatocyte", "pear")
 THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
+    "equilibrium.reduced_volume": "reduced volume",
     "energy.H0": "spontaneous curvature " + formula("H_0"),
     "shape.length": "length L",
     "model.tension": "tension " + formula("\\sigma"),
@@ -118,13 +129,15 @@ def read(path):
         points = {name: data[()] for name, data in file["points"].items()}
         names = list(file["points/outcome"].attrs["names"])
         title = file["scan"].attrs["title"]
+        starts = file["scan"].attrs.get("start_axis")
         boundary = file["boundary"][()]
         crossings = file["crossing"][()].mean(axis=1) if "crossing" in file else []
         thresholds = [
             (line.attrs["label"], line["first"][()], line["second"][()], line["values"][()])
             for line in file["thresholds"].values()
         ]
-    return axes, points, names, title, boundary, crossings, thresholds
+        equal = {name: data[()] for name, data in file["equal_energies"].items()} if starts is not None else None
+    return axes, points, names, title, boundary, crossings, thresholds, starts, equal
 
 
 def positions(path, axes, slices):
@@ -144,13 +157,48 @@ def positions(path, axes, slices):
     return places
 
 
+def lowest(points, names, starts):
+    """Of several starts the shape of the least energy, the first one where there is none; an axis of length 1 is left."""
+    at_rest = np.isin(points["outcome"], [k for k, name in enumerate(names) if name in AT_REST])
+    energy = np.where(at_rest, points["free_energy"], np.inf)
+    best = np.expand_dims(np.argmin(energy, axis=starts), starts)
+    return {name: np.take_along_axis(data, best, starts) for name, data in points.items()}
+
+
+def differing(outcome):
+    """Pairs of neighbours whose outcomes differ, by their numbers."""
+    number = np.arange(outcome.size).reshape(outcome.shape)
+    pairs = []
+    for axis in range(outcome.ndim):
+        a, b = [slice(None)] * outcome.ndim, [slice(None)] * outcome.ndim
+        a[axis], b[axis] = slice(None, -1), slice(1, None)
+        a, b = tuple(a), tuple(b)
+        differ = (outcome[a] != outcome[b]) & (outcome[a] > 0) & (outcome[b] > 0)
+        pairs += zip(number[a][differ], number[b][differ])
+    return pairs
+
+
+def equal_energies(axes, equal, shape, kept):
+    """Places where the energies of two kinds are equal: (places of the two neighbours, axis, value, kinds, lowest)."""
+    out = []
+    for ends, axis, kinds, value, is_lowest in zip(
+        equal["points"], equal["axis"], equal["kinds"], equal["value"], equal["lowest"]
+    ):
+        if np.isfinite(value):
+            places = [tuple(np.unravel_index(end, shape)[i] for i in kept) for end in ends]
+            out.append((*places, kept.index(axis), value, tuple(kinds), bool(is_lowest)))
+    return out
+
+
 class Slice:
     """The part of a scan that is drawn: two axes or one, the others at one value each."""
 
     def __init__(self, path, scan, slices):
-        axes, points, self.names, self.title, boundary, crossings, thresholds = scan
+        axes, points, self.names, self.title, boundary, crossings, thresholds, starts, equal = scan
         cut = positions(path, axes, slices)
-        kept = [i for i in range(len(axes)) if i not in cut]
+        self.all_starts, self.equal = None, []
+        best_of_starts = starts is not None and starts not in cut
+        kept = [i for i in range(len(axes)) if i not in cut and not (best_of_starts and i == starts)]
         if len(kept) > 2:
             more = " ".join(f"--slice {axes[i].key}={axes[i].texts[0]}" for i in kept[2:])
             raise BadInput(f"{path}: a picture has one or two axes, this scan {len(kept)} axes: "
@@ -159,9 +207,20 @@ class Slice:
             raise BadInput(f"{path}: a picture has one or two axes: cut fewer")
         shape = points["outcome"].shape
         self.axes = [axes[i] for i in kept]
+        if best_of_starts:
+            if not cut:
+                self.equal = equal_energies(axes, equal, shape, kept)
+            self.all_starts = [{name: data[tuple(cut.get(i, start if i == starts else slice(None)) for i in range(len(axes)))]
+                                for name, data in points.items()} for start in range(shape[starts])]  # fmt: skip
+            points = lowest(points, self.names, starts)
+            cut[starts] = 0
         self.points = {name: data[tuple(cut.get(i, slice(None)) for i in range(len(axes)))] for name, data in points.items()}
-        self.thresholds = [] if cut else thresholds
-        self.boundary, self.crossings = [], []
+        self.thresholds = [] if set(cut) - {starts} else thresholds
+        if starts is not None:
+            self.boundary, self.crossings = differing(self.points["outcome"]), []
+            boundary = []
+        else:
+            self.boundary, self.crossings = [], []
         for number, ends in enumerate(boundary):
             places = [np.unravel_index(end, shape) for end in ends]
             if any(place[i] != at for place in places for i, at in cut.items()):
@@ -170,6 +229,8 @@ class Slice:
             self.boundary.append([np.ravel_multi_index([place[i] for i in kept], inside) for place in places])
             if len(crossings):
                 self.crossings.append(crossings[number])
+        if best_of_starts:
+            del cut[starts]
         if cut:
             where = ", ".join(f"{axes[i].key} = {axes[i].texts[place]}" for i, place in sorted(cut.items()))
             self.title = f"{self.title}: {where}" if self.title else where
@@ -197,6 +258,55 @@ def refined(axes, boundary, crossings, shape):
     return np.transpose(places)
 
 
+def lines_of_equal_energy(part):
+    """Through the places where energies are equal, cell by cell: {lowest: [[(x, y), (x, y)], ...]}."""
+    x, y = part.axes[0].values, part.axes[1].values
+    cells = {}  # (kinds, cell): [(place, lowest)]
+    for (i, j), _, axis, value, kinds, is_lowest in part.equal:
+        place = (value, y[j]) if axis == 0 else (x[i], value)
+        for cell in ((i, j), (i, j - 1) if axis == 0 else (i - 1, j)):
+            cells.setdefault((kinds, cell), []).append((place, is_lowest))
+    lines = {True: [], False: []}
+    for ends in cells.values():
+        if len(ends) == 2:
+            lines[ends[0][1] and ends[1][1]].append([ends[0][0], ends[1][0]])
+    return lines
+
+
+def draw_equal_energies(part, panel):
+    handles = []
+    for is_lowest, look, label in (
+        (True, {"color": "black", "linewidth": 1.8, "linestyle": "-"}, "equal energies"),
+        (False, {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (2, 2))}, "the same, a third is lower"),
+    ):
+        if lines := lines_of_equal_energy(part)[is_lowest]:
+            panel.add_collection(LineCollection(lines, capstyle="round" if is_lowest else "butt", **look))
+            handles.append(Line2D([], [], label=label, **look))
+    return handles
+
+
+def draw_lost_starts(part, panel):
+    """Dots where the search from one of the starts found no shape: one of lower energy may be missing there."""
+    lost = np.zeros(part.points["outcome"].shape, bool)
+    at_rest = [k for k, name in enumerate(part.names) if k == 0 or name in AT_REST]
+    for points in part.all_starts or []:
+        lost |= ~np.isin(points["outcome"], at_rest)
+    if not lost.any():
+        return []
+    i, j = np.nonzero(lost)
+    look = {"color": "0.35", "marker": ".", "markersize": 2.5, "linestyle": ""}
+    panel.plot(part.axes[0].values[i], part.axes[1].values[j], **look)
+    return [Line2D([], [], label=f"a start leads to no shape ({lost.sum()})", **look)]
+
+
+def without_lines(part):
+    """Borders between outcomes where no line of equal energies passes."""
+    shape = part.points["outcome"].shape
+    crossed = {(np.ravel_multi_index(a, shape), np.ravel_multi_index(b, shape))
+               for a, b, _, _, _, is_lowest in part.equal if is_lowest}  # fmt: skip
+    return [pair for pair in part.boundary if tuple(pair) not in crossed]
+
+
 def draw_outcomes(part, panel):
     colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names])
     norm = BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))
@@ -217,12 +327,14 @@ def draw_map(part, quantity, panel):
         draw_outcomes(part, panel)
     else:
         draw_values(part, quantity, panel)
-    panel.add_collection(LineCollection(border_lines(axes, part.boundary, shape), colors="black", linewidths=0.8))
-    handles = []
+    borders = border_lines(axes, without_lines(part), shape)
+    panel.add_collection(LineCollection(borders, colors="black", linewidths=0.8))
+    handles = draw_equal_energies(part, panel)
     if len(part.crossings):
         x, y = refined(axes, part.boundary, part.crossings, shape)
         panel.plot(x, y, ".", color="black", markersize=3)
         handles.append(Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="refined"))
+    handles += draw_lost_starts(part, panel)
     for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, part.thresholds):
         panel.contour(axes[0].values[first], axes[1].values[second], values.T, [0], colors="#c0392b",
                       linestyles=[dashes], linewidths=1.2)
@@ -235,11 +347,14 @@ def draw_map(part, quantity, panel):
 
 
 def draw_line(part, quantity, panel):
-    for k, name in enumerate(part.names):
-        here = part.points["outcome"] == k
-        if k > 0 and here.any():
-            panel.plot(part.axes[0].values[here], part.points[quantity][here], "o", color=COLOURS.get(name),
-                       markeredgecolor="0.3", markeredgewidth=0.4)
+    for points in part.all_starts or [part.points]:
+        for k, name in enumerate(part.names):
+            here = points["outcome"] == k
+            if k > 0 and here.any():
+                panel.plot(part.axes[0].values[here], points[quantity][here], "o", color=COLOURS.get(name),
+                           markeredgecolor="0.3", markeredgewidth=0.4)
+    for *_, value, _, is_lowest in part.equal:
+        panel.axvline(value, color="black", linewidth=0.8, linestyle="-" if is_lowest else ":")
     panel.set(xlabel=part.axes[0].label, ylabel=QUANTITIES[quantity])
     return []
 

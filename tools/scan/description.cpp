@@ -12,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "tools/scan/starts.hpp"
 
 namespace tubule {
 namespace {
@@ -175,6 +176,15 @@ void refuse_words_between(const Scan& scan) {
                                             setting.front()));
 }
 
+// Lines between kinds of shapes are where their energies are equal, and found as such.
+void refuse_refined_starts(const Scan& scan) {
+    if (scan.boundary && scan.boundary->refine > 0 && start_axis(scan))
+        throw CaseError(
+            fmt::format("{}: refine must be absent: from several starts, the places where energies are equal "
+                        "are found anyway",
+                        scan.path));
+}
+
 void refuse_doubled_keys(const Scan& scan) {
     std::set<std::string> keys;
     for (const Axis& axis : scan.axes)
@@ -192,9 +202,11 @@ void check_points(const Scan& scan) {
         stride /= axis.size();
         for (std::size_t i = 0; i < axis.size(); ++i) {
             const Case c = scan.case_of(i * stride);
-            if (c.equilibrium)
+            if (c.equilibrium && c.equilibrium->branch.parameter)
                 throw CaseError(
-                    fmt::format("{}: a scan runs motions; follow equilibria by equilibrium.branch", scan.path));
+                    fmt::format("{}: a point of a scan is one shape: equilibrium.branch must be absent, and "
+                                "--over KEY=values varies the same",
+                                scan.path));
         }
     }
 }
@@ -337,6 +349,7 @@ void refuse_no_points_and_too_many(const Scan& scan) {
 void check_scan(const Scan& scan) {
     refuse_no_points_and_too_many(scan);
     refuse_doubled_keys(scan);
+    refuse_refined_starts(scan);
     refuse_words_between(scan);
     check_points(scan);
 }

@@ -23,14 +23,14 @@ Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
     progress_.begin(plan_.known());
 }
 
-Dispatcher::Answer Dispatcher::take(std::size_t& point, bool may_wait) {
+Dispatcher::Answer Dispatcher::take(Work& work, bool may_wait) {
     std::unique_lock lock(mutex_);
     while (true) {
         if (error_ || interrupted()) return Answer::over;
         if (const auto next = plan_.next()) {
-            point = *next;
+            work = *next;
             ++running_;
-            return Answer::point;
+            return Answer::work;
         }
         if (running_ == 0) return Answer::over;
         if (!may_wait) return Answer::wait;
@@ -49,7 +49,7 @@ void Dispatcher::give(const PointResult& result) {
         error_ = std::current_exception();
         return;
     }
-    plan_.done(result.point, result.outcome);
+    plan_.done(result);
     ++effort_.points;
     if (result[Measure::cpu_seconds] > 0) effort_.cpu_seconds += result[Measure::cpu_seconds];
     progress_(plan_.known(), plan_.wanted(), plan_.follows());
@@ -66,14 +66,16 @@ bool Dispatcher::was_interrupted() const {
     return interrupted();
 }
 
-PointResult run_one(const Scan& scan, std::size_t point) {
+PointResult run_one(const Scan& scan, const Work& work) {
+    const auto stopped = [] { return interrupted(); };
     PointResult result;
     try {
-        result = run_point(scan.case_of(point), scan.to_the_end, [] { return interrupted(); });
+        result = work.crossing ? find_crossing(scan, *work.crossing, stopped)
+                               : run_point(scan.case_of(work.number), scan.to_the_end, stopped);
     } catch (const CaseError& error) {
         result = refused_point(error.what());
     }
-    result.point = point;
+    result.point = work.number;
     return result;
 }
 
@@ -83,8 +85,8 @@ int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
     const auto work = [&] {
         omp_set_num_threads(std::max(1, processors / jobs));  // of this thread: points share the processors
         try {
-            for (std::size_t point = 0; dispatcher.take(point, true) == Dispatcher::Answer::point;)
-                dispatcher.give(run_one(scan, point));
+            for (Work work; dispatcher.take(work, true) == Dispatcher::Answer::work;)
+                dispatcher.give(run_one(scan, work));
         } catch (...) {
             dispatcher.fail(std::current_exception());
         }

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <optional>
 
-#include "tools/scan/plan.hpp"
 #include "tools/scan/scan_file.hpp"
+#include "tools/scan/scan_plan.hpp"
 #include "tools/scan/scan_progress.hpp"
 
 namespace tubule {
@@ -24,10 +24,10 @@ public:
     // Points that `writer` has already are not run again.
     Dispatcher(ScanWriter& writer, bool quiet);
 
-    enum class Answer { point, wait, over };
-    // A point to run; `wait` while it depends on others that are being run; `over` when there is nothing left to do, an
+    enum class Answer { work, wait, over };
+    // Work to do; `wait` while it depends on other work that is being done; `over` when there is nothing left, an
     // interrupt came, or something failed. With `may_wait`, waits instead of saying so.
-    Answer take(std::size_t& point, bool may_wait);
+    Answer take(Work& work, bool may_wait);
     void give(const PointResult& result);  // saves it; a failure to do so ends the scan
     void fail(std::exception_ptr error);
 
@@ -39,7 +39,7 @@ private:
     ScanWriter& writer_;
     std::mutex mutex_;
     std::condition_variable changed_;
-    Plan plan_;
+    ScanPlan plan_;
     std::size_t running_ = 0;
     ScanEffort effort_;
     std::exception_ptr error_;
@@ -50,7 +50,7 @@ private:
 // 256. How many it had.
 int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs);
 
-// One point, from its keys to its result.
-PointResult run_one(const Scan& scan, std::size_t point);
+// One point, from its keys to its result, or one crossing.
+PointResult run_one(const Scan& scan, const Work& work);
 
 }  // namespace tubule

@@ -13,6 +13,7 @@
 
 #include "common/case/read.hpp"
 #include "tools/run/continuation.hpp"
+#include "tools/scan/scan_plan.hpp"
 
 namespace tubule {
 namespace {
@@ -147,10 +148,25 @@ void add_axes_of(Scan& scan, const Scan& other) {
     }
 }
 
+// A point of the grid, between two of them, or a crossing, if it is known.
+std::optional<PointResult> known_result(const ScanResult& result, std::size_t number) {
+    if (number < result.points.size()) {
+        const PointResult& p = result.points[number];
+        return p.outcome == Outcome::not_run ? std::nullopt : std::optional(p);
+    }
+    if (const auto crossing = result.crossings.find(number); crossing != result.crossings.end())
+        return crossing->second;
+    const auto between = result.between.find(number);
+    if (between == result.between.end()) return std::nullopt;
+    PointResult p = unknown_point(number);
+    p.outcome = between->second;
+    return p;
+}
+
 }  // namespace
 
 ScanResult with_known(const Extension& extension) {
-    ScanResult out{.scan = extension.scan, .about = {}, .points = {}, .between = {}};
+    ScanResult out{.scan = extension.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
     for (std::size_t i = 0; i < out.scan.size(); ++i) out.points.push_back(unknown_point(i));
     for (const PointResult& p : extension.known) out.points[p.point] = p;
     return out;
@@ -189,23 +205,19 @@ Extension merged(const ScanResult& a, const ScanResult& b) {
 }
 
 void drop_unwanted(ScanResult& result) {
-    const auto& boundary = result.scan.boundary;
-    if (!boundary) return;
-    Plan plan(result.shape(), boundary->seeds, boundary->around, boundary->refine);
+    if (!result.scan.boundary) return;
+    ScanPlan plan(result.scan);
     std::set<std::size_t> wanted;
-    while (const auto point = plan.next()) {
-        const bool on_grid = *point < result.points.size();
-        const auto between = result.between.find(*point);
-        const Outcome outcome = on_grid                           ? result.points[*point].outcome
-                                : between != result.between.end() ? between->second
-                                                                  : Outcome::not_run;
-        if (outcome == Outcome::not_run) return;  // unfinished: all that is known may be of use
-        wanted.insert(*point);
-        plan.done(*point, outcome);
+    while (const auto work = plan.next()) {
+        const auto known = known_result(result, work->number);
+        if (!known) return;  // unfinished: all that is known may be of use
+        wanted.insert(work->number);
+        plan.done(*known);
     }
     for (PointResult& p : result.points)
         if (!wanted.contains(p.point)) p = unknown_point(p.point);
     std::erase_if(result.between, [&](const auto& entry) { return !wanted.contains(entry.first); });
+    std::erase_if(result.crossings, [&](const auto& entry) { return !wanted.contains(entry.first); });
 }
 
 }  // namespace tubule

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,9 +22,14 @@ enum class Outcome {
     ill_posed,          // the flow is no longer well-posed
     self_intersection,  // the surface meets itself
     failed,             // the numerics failed, or the point is not a valid case
-    undecided           // still moving at time.end, or out of time
+    undecided,          // still moving at time.end, or out of time
+    // Cells at rest of a scan of equilibria, by their profile:
+    prolate,      // mirror symmetric, longer than wide
+    oblate,       // mirror symmetric, at least as wide as long
+    stomatocyte,  // without mirror symmetry, and dented: a pole lies inside its height
+    pear          // without mirror symmetry otherwise
 };
-inline constexpr int n_outcomes = static_cast<int>(Outcome::undecided) + 1;
+inline constexpr int n_outcomes = static_cast<int>(Outcome::pear) + 1;
 
 // "uniform-tube" for Outcome::uniform_tube, and so on.
 std::string_view name(Outcome outcome);
@@ -39,7 +45,13 @@ struct EndShape {
 // A tube counts as uniform if its radii differ by less than this part of their sum; a cell as a sphere if its reduced
 // volume is within this of 1.
 inline constexpr double waves_of_uniform_tube = 0.01, volume_off_sphere = 1e-3;
+// Of a cell at rest, relative to its largest radius: a profile that differs less from its mirror image is symmetric,
+// and a pole that lies less below the rim is not dented.
+inline constexpr double asymmetry_of_mirrored = 0.02, smallest_dent = 1e-3;
 
 Outcome outcome_of(Stop reason, const EndShape& end);
+
+// Of a cell at rest, by points (r, z) along its profile from pole to pole.
+Outcome cell_at_rest(std::span<const double> r, std::span<const double> z, double area, double volume);
 
 }  // namespace tubule

@@ -178,7 +178,7 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
     const double cpu = cpu_seconds();
     PointResult p;
     try {
-        p = computed(c, to_the_end, interrupted);
+        p = c.equilibrium ? equilibrium_point(c, interrupted) : computed(c, to_the_end, interrupted);
     } catch (const Paused& pause) {
         const StopReport stop = paused_at_start(pause).stop;
         p = refused_point(stop.message);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 namespace tubule {
 
 // Of the last state, but for energy_error, which is that of the whole run. What a run does not tell is not a number.
+// height to free_energy are those of an equilibrium; growth is the largest rate of all m, with equilibrium.modes.
 enum class Measure {
     energy,
     time,
@@ -22,20 +24,26 @@ enum class Measure {
     r_max,
     area,
     volume,
+    height,
+    tension,
+    pressure,
+    growth,
+    free_energy,
     steps,
     elements,
     wall_seconds,
     cpu_seconds
 };
-inline constexpr std::array measure_names{"energy", "time",     "energy_error", "E_ref",
-                                          "r_min",  "r_max",    "area",         "volume",
-                                          "steps",  "elements", "wall_seconds", "cpu_seconds"};
+inline constexpr std::array measure_names{
+    "energy",  "time",     "energy_error", "E_ref",       "r_min", "r_max",    "area",         "volume",     "height",
+    "tension", "pressure", "growth",       "free_energy", "steps", "elements", "wall_seconds", "cpu_seconds"};
 inline constexpr std::size_t n_measures = measure_names.size();
 
 struct PointResult {
     std::size_t point = 0;
     Outcome outcome = Outcome::not_run;
-    int stop = 0;  // of stop_words()
+    int stop = 0;                                             // of stop_words()
+    double value = std::numeric_limits<double>::quiet_NaN();  // between points of the grid: of the axis' key
     std::array<double, n_measures> measures{};
     std::string message;
 
@@ -54,6 +62,9 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
 
 // A point that was not run.
 PointResult unknown_point(std::size_t point);
+
+// Of a case with [equilibrium]: the shape that is found. Throws as the search.
+PointResult equilibrium_point(const Case& c, const std::function<bool()>& interrupted);
 
 // The result of a point whose keys are not a valid case.
 PointResult refused_point(const std::string& message);

@@ -1,11 +1,29 @@
-// A scan across the processes of one mpirun: rank 0 holds the queue and the result file, all ranks compute.
+// Work across the processes of one mpirun: rank 0 hands out tasks and takes in results, all ranks compute.
 #pragma once
 
+#include <exception>
+#include <functional>
 #include <optional>
-
-#include "tools/scan/dispatcher.hpp"
+#include <vector>
 
 namespace tubule {
+
+using Packet = std::vector<char>;  // what ranks send each other
+
+// What rank 0 hands out and takes in, from two threads.
+class RankTasks {
+public:
+    virtual ~RankTasks() = default;
+    enum class Answer { task, wait, over };
+    // A task; `wait` while it depends on others that are being done; `over` when there is nothing left to do. With
+    // `may_wait`, waits instead of saying so.
+    virtual Answer take(Packet& task, bool may_wait) = 0;
+    virtual void give(const Packet& result) = 0;
+    virtual void fail(std::exception_ptr error) = 0;  // of a task on rank 0; the tasks are then over
+};
+
+// From a task to its result. Throws nothing on ranks other than 0.
+using Compute = std::function<Packet(const Packet& task)>;
 
 // The other processes of the mpirun that started this one. Only where MPI was built in and it was mpirun that did.
 class Ranks {
@@ -18,12 +36,13 @@ public:
     int rank() const { return rank_; }
     int count() const { return count_; }
 
-    // Of rank 0: runs the scan on all ranks, one point at a time each. How many they are.
-    int run_scan(Dispatcher& dispatcher, const Scan& scan);
-    // Of rank 0 in place of run_scan: there is nothing to do.
+    // Of rank 0: does the tasks on all ranks, one at a time each, until they are over or an interrupt comes. `header`,
+    // not empty, is what all of them need. How many ranks there are.
+    int run(RankTasks& tasks, const Packet& header, const Compute& compute);
+    // Of rank 0 in place of run: there is nothing to do.
     void dismiss();
-    // Of the others: computes what rank 0 hands out, until it says that all is over.
-    void serve();
+    // Of the others: computes what rank 0 hands out, until it says that all is over. `begin` reads the header.
+    void serve(const std::function<Compute(const Packet& header)>& begin);
     // Ends all ranks at once with this exit status: none waits for what another is doing.
     [[noreturn]] void abort(int status);
 

@@ -11,11 +11,11 @@ std::optional<Ranks> Ranks::join() {
 }
 Ranks::Ranks(Ranks&&) noexcept = default;
 Ranks::~Ranks() = default;
-int Ranks::run_scan(Dispatcher&, const Scan&) {
+int Ranks::run(RankTasks&, const Packet&, const Compute&) {
     return 0;
 }
 void Ranks::dismiss() {}
-void Ranks::serve() {}
+void Ranks::serve(const std::function<Compute(const Packet&)>&) {}
 void Ranks::abort(int status) {
     std::exit(status);
 }

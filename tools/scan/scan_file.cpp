@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -48,6 +49,7 @@ std::vector<std::byte> to_bytes(const PointResult& p) {
     put(out, std::uint64_t{p.point});
     put(out, static_cast<std::int32_t>(p.outcome));
     put(out, static_cast<std::int32_t>(p.stop));
+    put(out, p.value);
     put(out, p.measures);
     const auto text = std::as_bytes(std::span(p.message));
     out.insert(out.end(), text.begin(), text.end());
@@ -68,6 +70,7 @@ PointResult from_bytes(std::span<const std::byte> in) {
     p.point = take<std::uint64_t>(in);
     p.outcome = static_cast<Outcome>(take<std::int32_t>(in));
     p.stop = take<std::int32_t>(in);
+    p.value = take<double>(in);
     p.measures = take<decltype(p.measures)>(in);
     p.message.assign(reinterpret_cast<const char*>(in.data()), in.size());
     return p;
@@ -135,13 +138,20 @@ void put_points(hid_t file, const ScanResult& result) {
     put_texts(group, "message", shape, messages);
 }
 
+// Of each node of the grid: that of the least energy, if there are several starts.
+std::vector<Outcome> outcomes_of_nodes(const ScanResult& result, const Nodes& nodes) {
+    std::vector<Outcome> all;
+    for (std::size_t node = 0; node < result.points.size() / nodes.starts(); ++node)
+        all.push_back(result.points[nodes.point_of(node, best_start(nodes, node, result.points))].outcome);
+    return all;
+}
+
 void put_boundary(hid_t file, const ScanResult& result) {
     const auto around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
+    const Nodes nodes(result.scan);
     std::vector<std::int64_t> ends;
-    for (const auto& [a, b] : boundary_edges(result.shape(), result.outcomes(), around)) {
-        ends.push_back(static_cast<std::int64_t>(a));
-        ends.push_back(static_cast<std::int64_t>(b));
-    }
+    for (const auto& [a, b] : boundary_edges(nodes.shape(), outcomes_of_nodes(result, nodes), around))
+        for (const std::size_t node : {a, b}) ends.push_back(static_cast<std::int64_t>(nodes.point_of(node, 0)));
     put_dataset(file, "boundary", H5T_NATIVE_INT64, space({ends.size() / 2, 2}), ends.data());
 }
 
@@ -156,7 +166,8 @@ void put_crossings(hid_t file, const ScanResult& result) {
     }
     put_dataset(group, "point", H5T_NATIVE_INT64, space({numbers.size()}), numbers.data());
     put_named(group, "outcome", {outcomes.size()}, outcomes, outcome_names());
-    const Plan plan = plan_of(result);
+    const ScanPlan whole = plan_of(result);
+    const Plan& plan = whole.nodes();
     std::vector<double> ends;
     for (const Edge& edge : boundary_edges(result.shape(), result.outcomes(), result.scan.boundary->around)) {
         Between at = plan.between(edge, 0);
@@ -167,6 +178,53 @@ void put_crossings(hid_t file, const ScanResult& result) {
         }
     }
     put_dataset(file, "crossing", H5T_NATIVE_DOUBLE, space({ends.size() / 2, 2}), ends.data());
+}
+
+// Where energies of two kinds of shapes are equal: between two points (those of the first start), the value of what
+// varies there. `lowest`: no third kind is lower at the ends.
+void put_crossings_of_energy(hid_t file, const ScanResult& result) {
+    const Nodes nodes(result.scan);
+    std::vector<std::int64_t> numbers, ends, axes;
+    std::vector<std::int8_t> kinds, lowest;
+    std::vector<double> values, energies;
+    for (const auto& [number, p] : result.crossings) {
+        const EnergyCrossing c = crossing_of(result.scan, number);
+        numbers.push_back(static_cast<std::int64_t>(number));
+        axes.push_back(static_cast<std::int64_t>(c.axis));
+        bool is_lowest = true;
+        for (const std::size_t node : {c.node, c.node + nodes.stride(c.axis)}) {
+            ends.push_back(static_cast<std::int64_t>(nodes.point_of(node, 0)));
+            const Outcome best = result.points[nodes.point_of(node, best_start(nodes, node, result.points))].outcome;
+            is_lowest = is_lowest && (best == c.kinds[0] || best == c.kinds[1]);
+        }
+        for (const Outcome kind : c.kinds) kinds.push_back(static_cast<std::int8_t>(kind));
+        lowest.push_back(is_lowest);
+        values.push_back(p.value);
+        energies.push_back(p[Measure::energy]);
+    }
+    const auto group = make_group(file, "equal_energies");
+    const std::size_t n = numbers.size();
+    put_dataset(group, "number", H5T_NATIVE_INT64, space({n}), numbers.data());
+    put_dataset(group, "points", H5T_NATIVE_INT64, space({n, 2}), ends.data());
+    put_dataset(group, "axis", H5T_NATIVE_INT64, space({n}), axes.data());
+    put_named(group, "kinds", {n, 2}, kinds, outcome_names());
+    put_dataset(group, "lowest", H5T_NATIVE_INT8, space({n}), lowest.data());
+    put_dataset(group, "value", H5T_NATIVE_DOUBLE, space({n}), values.data());
+    put_dataset(group, "energy", H5T_NATIVE_DOUBLE, space({n}), energies.data());
+}
+
+std::map<std::size_t, PointResult> get_crossings_of_energy(hid_t file) {
+    const auto group = open_group(file, "equal_energies");
+    const auto numbers = get_integers(group, "number");
+    const auto values = get_array(group, "value").data, energies = get_array(group, "energy").data;
+    std::map<std::size_t, PointResult> out;
+    for (std::size_t i = 0; i < std::min({numbers.size(), values.size(), energies.size()}); ++i) {
+        PointResult p = unknown_point(static_cast<std::size_t>(numbers[i]));
+        p.value = values[i], p[Measure::energy] = energies[i];
+        p.outcome = std::isnan(p.value) ? Outcome::failed : Outcome::undecided;
+        out[p.point] = p;
+    }
+    return out;
 }
 
 void put_threshold(hid_t parent, const ThresholdMap& map) {
@@ -209,6 +267,10 @@ std::vector<std::byte> image_of(const Stored& stored) {
     put_points(file, result);
     put_boundary(file, result);
     if (scan.boundary && scan.boundary->refine > 0) put_crossings(file, result);
+    if (const auto starts = start_axis(scan)) {
+        put_attribute(what, "start_axis", static_cast<std::int64_t>(*starts));
+        put_crossings_of_energy(file, result);
+    }
     const auto lines = make_group(file, "thresholds");
     for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
     auto bytes = bytes_of(file);
@@ -289,6 +351,10 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
         points[i].message = messages[i];
     }
     for (std::size_t m = 0; m < n_measures; ++m) {
+        if (!has(group, measure_names[m])) {  // of an earlier version
+            for (PointResult& p : points) p.measures[m] = std::numeric_limits<double>::quiet_NaN();
+            continue;
+        }
         const auto column = get_array(group, measure_names[m]).data;
         if (column.size() != count) throw std::runtime_error("/points does not have the shape of /axes");
         for (std::size_t i = 0; i < count; ++i) points[i].measures[m] = column[i];
@@ -317,6 +383,7 @@ Stored read_file(const fs::path& path) {
     for (const std::string& key : attribute_names(about))
         stored.result.about.emplace_back(key, get_value(open_attribute(about, key), key));
     stored.result.points = get_points(file, stored.result.scan.size());
+    if (has(file, "equal_energies")) stored.result.crossings = get_crossings_of_energy(file);
     if (has(file, "between")) stored.result.between = get_between(file);
     return stored;
 }
@@ -324,8 +391,10 @@ Stored read_file(const fs::path& path) {
 void keep(ScanResult& result, const PointResult& p) {
     if (p.point < result.points.size())
         result.points[p.point] = p;
-    else
+    else if (result.scan.boundary && result.scan.boundary->refine > 0)
         result.between[p.point] = p.outcome;
+    else
+        result.crossings[p.point] = p;
 }
 
 // The file with its journal.
@@ -370,13 +439,16 @@ std::vector<Outcome> ScanResult::outcomes() const {
     return all;
 }
 
-Plan plan_of(const ScanResult& result) {
-    const auto& boundary = result.scan.boundary;
-    Plan plan =
-        boundary ? Plan(result.shape(), boundary->seeds, boundary->around, boundary->refine) : Plan(result.shape());
+ScanPlan plan_of(const ScanResult& result) {
+    ScanPlan plan(result.scan);
     for (const PointResult& p : result.points)
-        if (p.outcome != Outcome::not_run) plan.done(p.point, p.outcome);
-    for (const auto& [number, outcome] : result.between) plan.done(number, outcome);
+        if (p.outcome != Outcome::not_run) plan.done(p);
+    for (const auto& [number, outcome] : result.between) {
+        PointResult p = unknown_point(number);
+        p.outcome = outcome;
+        plan.done(p);
+    }
+    for (const auto& [number, crossing] : result.crossings) plan.done(crossing);
     return plan;
 }
 

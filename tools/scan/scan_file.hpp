@@ -9,8 +9,8 @@
 
 #include "common/result/result.hpp"
 #include "tools/scan/description.hpp"
-#include "tools/scan/plan.hpp"
 #include "tools/scan/point.hpp"
+#include "tools/scan/scan_plan.hpp"
 
 namespace tubule {
 
@@ -19,13 +19,14 @@ struct ScanResult {
     About about;
     std::vector<PointResult> points;         // of the whole grid, in order; Outcome::not_run where nothing is known
     std::map<std::size_t, Outcome> between;  // of points between those of the grid
+    std::map<std::size_t, PointResult> crossings;  // where energies are equal
 
     std::vector<std::size_t> shape() const;
     std::vector<Outcome> outcomes() const;
 };
 
-// Its plan, with all that is known.
-Plan plan_of(const ScanResult& result);
+// Its plan, with all that is known. The result must stay.
+ScanPlan plan_of(const ScanResult& result);
 
 // One writer a file. Throws std::runtime_error naming the file, for I/O errors, for a second writer, and for a file of
 // that name that is no scan.

@@ -8,6 +8,7 @@
 
 #include "common/case/read.hpp"
 #include "common/theory/waves.hpp"
+#include "tools/scan/starts.hpp"
 
 namespace tubule {
 namespace {
@@ -23,19 +24,23 @@ int repeats(const Tube& tube) {
     return waves;
 }
 
+// E = INT k20 (H-H0)^2.
+bool only_k20(const Bending& energy) {
+    bool only = true;
+    for_each_bending_term([&](std::size_t i, const auto& term) {
+        only = only && (std::string_view(term.key) == "k20" ? energy.k[i] > 0 : energy.k[i] == 0);
+    });
+    return only && energy.terms.empty();
+}
+
 // Whether its shapes at rest without energy are the surfaces of constant mean curvature H0, and of which period:
 // E = INT k20 (H-H0)^2 alone.
 std::optional<double> delaunay_period(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const MotionLaw law = motion_law(c.model);
     if (!tube || !law.unconstrained() || !law.without_loads()) return std::nullopt;
-    bool only_k20 = true;
-    for_each_bending_term([&](std::size_t i, const auto& term) {
-        only_k20 = only_k20 && (std::string_view(term.key) == "k20" ? c.energy.k[i] > 0 : c.energy.k[i] == 0);
-    });
-    only_k20 = only_k20 && c.energy.terms.empty();
     const int waves = repeats(*tube);
-    if (!only_k20 || waves == 0) return std::nullopt;
+    if (!only_k20(c.energy) || waves == 0) return std::nullopt;
     return tube->length / waves;
 }
 
@@ -96,6 +101,40 @@ std::optional<double> waves_around(const Case& c) {
     return driven_most(c, m);
 }
 
+// Of a closed cell with given area and volume, of the bending energy k20 alone: radius of the sphere of its area, and
+// its reduced volume.
+struct Vesicle {
+    double radius, reduced_volume;
+};
+std::optional<Vesicle> vesicle(const Case& c) {
+    if (!c.equilibrium || !std::holds_alternative<Sphere>(c.shape) || held_of(c) != Held::area_and_volume)
+        return std::nullopt;
+    const EquilibriumChoices& e = *c.equilibrium;
+    if (!e.area || !(e.volume || e.reduced_volume) || !only_k20(c.energy)) return std::nullopt;
+    const double radius = std::sqrt(*e.area / (4 * std::numbers::pi));
+    return Vesicle{radius, e.volume ? *e.volume / (4 * std::numbers::pi / 3 * std::pow(radius, 3)) : *e.reduced_volume};
+}
+
+// Vesicles end as two spheres that touch in a neck without size, where -H0 is the sum of their mean curvatures,
+// 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): docs/theory.md, section 8. `inside` -1: beside each other.
+std::optional<double> spheres_with_neck(const Case& c, double inside) {
+    const auto v = vesicle(c);
+    if (!v) return std::nullopt;
+    // R1 = R cos a, R2 = R sin a; the reduced volume decreases from 1.
+    const auto volume = [&](double a) { return std::pow(std::cos(a), 3) - inside * std::pow(std::sin(a), 3); };
+    double low = 0, high = std::numbers::pi / 4;
+    if (v->reduced_volume < volume(high)) return std::nullopt;
+    for (int k = 0; k < 60; ++k) (volume((low + high) / 2) > v->reduced_volume ? low : high) = (low + high) / 2;
+    const double neck = (inside / std::sin(low) - 1 / std::cos(low)) / v->radius;  // H0 of it
+    return inside * (c.energy.H0 - neck);
+}
+std::optional<double> two_spheres(const Case& c) {
+    return spheres_with_neck(c, -1);
+}
+std::optional<double> sphere_in_sphere(const Case& c) {
+    return spheres_with_neck(c, 1);
+}
+
 std::vector<std::size_t> some_of(std::size_t size) {
     std::vector<std::size_t> places;
     const std::size_t n = std::min(size, most_nodes);
@@ -111,21 +150,26 @@ const std::vector<Threshold>& thresholds() {
         {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
         {"pearling", "straight tube, m = 0 neutral", waves_around<0>},
         {"buckling", "straight tube, m = 1 neutral", waves_around<1>},
-        {"rings", "straight tube, m = 2 neutral", waves_around<2>}};
+        {"rings", "straight tube, m = 2 neutral", waves_around<2>},
+        {"two_spheres", "two spheres with a neck", two_spheres},
+        {"sphere_in_sphere", "sphere in a sphere", sphere_in_sphere}};
     return all;
 }
 
 std::vector<ThresholdMap> threshold_maps(const Scan& scan) {
-    if (scan.axes.size() != 2 || scan.axes[0].keys.size() != 1 || scan.axes[1].keys.size() != 1) return {};
+    const Nodes nodes(scan);
+    std::vector<Axis> axes;  // that of starts changes no threshold
+    for (std::size_t a = 0; a < scan.axes.size(); ++a)
+        if (!nodes.has_starts() || a != start_axis(scan)) axes.push_back(scan.axes[a]);
+    if (axes.size() != 2 || axes[0].keys.size() != 1 || axes[1].keys.size() != 1) return {};
     std::vector<ThresholdMap> maps;
     for (const Threshold& threshold : thresholds())
-        maps.push_back(
-            {threshold.name, threshold.label, some_of(scan.axes[0].size()), some_of(scan.axes[1].size()), {}});
+        maps.push_back({threshold.name, threshold.label, some_of(axes[0].size()), some_of(axes[1].size()), {}});
     for (const std::size_t i : maps.front().first)
         for (const std::size_t j : maps.front().second) {
             std::optional<Case> c;
             try {
-                c = scan.case_of(i * scan.axes[1].size() + j);
+                c = scan.case_of(nodes.point_of(i * axes[1].size() + j, 0));
             } catch (const CaseError&) {  // no case, no line
             }
             for (std::size_t k = 0; k < maps.size(); ++k)

@@ -1,0 +1,18 @@
+// A scan across the processes of one mpirun.
+#pragma once
+
+#include "tools/scan/dispatcher.hpp"
+#include "tools/scan/ranks.hpp"
+
+namespace tubule {
+
+// Of rank 0: runs the scan on all ranks. How many they are.
+int run_scan(Ranks& ranks, Dispatcher& dispatcher, const Scan& scan);
+// Of the others.
+void serve_scan(Ranks& ranks);
+
+// As it is sent to them.
+Packet to_packet(const Scan& scan);
+Scan scan_from(const Packet& packet);
+
+}  // namespace tubule
