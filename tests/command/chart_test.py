@@ -1,20 +1,23 @@
 #!/usr/bin/python3
 """`tubule chart`: the front, failures, resuming, references, maps, refusals.
 
-chart_test.py TUBULE PLOT: the program, the folder of its scripts.
+chart_test.py TUBULE PLOT [MPIRUN]: the program, the folder of its scripts.
 """
 import csv
 import os
 import resource
 import signal
 import stat
+import subprocess
 import sys
 import textwrap
+import time
 import unittest
 from pathlib import Path
 
-from program import QUICK, SLOW, ProgramTest
+from program import PROGRAM, QUICK, SLOW, ProgramTest
 
+MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 sys.path.insert(0, sys.argv[2])
 import chart  # noqa: E402
 import chart_file  # noqa: E402
@@ -189,6 +192,47 @@ class Surroundings(Charts):
         self.assertEqual(process.returncode, 130, err)
         self.assertIn("tubule chart: interrupted", err)
         self.assertFalse(any(os.path.exists(f"/proc/{run}") for run in runs))
+
+
+@unittest.skipUnless(MPIRUN, "built without MPI")
+class Ranks(Charts):
+    """Across the processes of an mpirun, of which each takes runs that no other one has taken."""
+
+    def command(self, ranks, *arguments):
+        return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "chart", self.case, *arguments]
+
+    def test_the_same_chart_as_of_one_process(self):
+        for vary in (("--vary", "accuracy.energy=1e-2,1e-3,1e-4,1e-7"),
+                     ("--vary", "discretisation.elements=12,20", "--map", "discretisation.time_tolerance=1e-6:1e-2:2")):  # fmt: skip
+            with self.subTest(vary=vary):
+                self.tubule("chart", self.case, *vary, "--quiet", "-o", "one.svg")
+                done = subprocess.run(self.command(3, *vary, "-o", "ranks.svg"), cwd=self.folder, capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(done.stdout.count("ranks.csv"), 1)  # one of them reports
+                for row, other in zip(self.rows("ranks.csv"), self.rows("one.csv"), strict=True):
+                    for name in ("key", "outcome", "stop_time", "elements", "steps", "stated_error", "width"):
+                        self.assertEqual(row[name], other[name], name)
+                self.assertFalse((self.folder / "ranks.ranks").exists())
+
+    def test_killed_in_between_it_goes_on(self):
+        self.write("case.toml", SLOW)
+        command = self.command(3, "--vary", "discretisation.time_tolerance=1e-12,9e-13,8e-13,7e-13,6e-13,5e-13", "-o", "c.svg")
+        with subprocess.Popen(command, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            self.addCleanup(process.kill)
+            tables = lambda: list(self.folder.glob("c.ranks/*/rank_*.csv"))  # noqa: E731
+            while not tables():
+                self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+                time.sleep(0.01)
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            os.kill(int(children[-1]), signal.SIGKILL)
+        self.assertNotEqual(process.returncode, 0)
+        known = {row["key"]: row["cpu_s"] for table in tables() for row in self.rows(table)}
+        self.assertTrue(0 < len(known) < 6, known)
+        done = subprocess.run([*command[:4], "2", *command[5:]], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = {row["key"]: row for row in self.rows("c.csv")}
+        self.assertEqual([row["outcome"] for row in rows.values()], ["finished"] * 6)
+        self.assertEqual({key: rows[key]["cpu_s"] for key in known}, known)  # not run again
 
 
 class Outcomes(Charts):

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from chart_file import BadChart, Reference, Series, assignment, chart_of_case, check, map_option, plain, read_chart, split
 from chart_file import toml_of
+from chart_ranks import ranks_of
 from chart_runs import Program, Runner, Table
 from command_line import say
 
@@ -214,12 +215,15 @@ def work_precision(chart, options, outputs, program, tell):
     if chart.reference.result:
         truth_of(chart, times, [], own, program)  # fails before any run
     table = open_table(chart, options, outputs, times)
+    ranks = join_ranks(options, table)
     if options.draw:
         every = len(jobs)
         jobs = [job for job in jobs if job.key in table.runs]
         tell(f"{len(jobs)} of {every} runs are in {table.path}")
     else:
-        Runner(program, table, jobs, options.jobs, chart.repeats, tell).run(jobs)
+        Runner(program, table, jobs, options.jobs, chart.repeats, tell, ranks).run(jobs)
+    if not draws(ranks):
+        return None
     runs = list({job.key: table.runs[job.key] for job in jobs}.values())
     try:
         truth = truth_of(chart, times, runs, own, program)
@@ -276,6 +280,7 @@ def stability_map(chart, options, outputs, program, tell):
     lines = [Bisection(chart, series, value) for series in chart.series for value in series.vary[chart.against]]
     checked(program, [line.job(i) for line in lines for i in (0, len(line.values) - 1)])
     table = open_table(chart, options, outputs, [])
+    ranks = join_ranks(options, table)
     asked = []
     while going := [(line, job) for line in lines if (job := line.next())]:
         if options.draw:
@@ -283,9 +288,11 @@ def stability_map(chart, options, outputs, program, tell):
             if not going:
                 break
         asked += [job for _, job in going]
-        Runner(program, table, asked, options.jobs, 1, tell).run([job for _, job in going])
+        Runner(program, table, asked, options.jobs, 1, tell, ranks).run([job for _, job in going])
         for line, job in going:
             line.take(table.runs[job.key])
+    if not draws(ranks):
+        return None
     table.write(asked)
     for line in lines:
         low, high = line.limits
@@ -310,6 +317,23 @@ def open_table(chart, options, outputs, times):
         raise BadChart(f"{path}: is no table of a chart ({error}); move it or choose another -o") from error
 
 
+def join_ranks(options, table):
+    """The Ranks of this process, or None. What a killed launch has found is in the table then."""
+    ranks = None if options.draw else ranks_of(os.environ, table.path, table.read)
+    if ranks:
+        if not options.again:
+            table.runs = ranks.found_before() | table.runs
+        options.quiet = options.quiet or ranks.rank > 0
+    return ranks
+
+
+def draws(ranks):
+    """Whether this process draws, now that all runs are known."""
+    if ranks:
+        ranks.leave()
+    return not ranks or ranks.rank == 0
+
+
 def draw_chart(options):
     """The exit status. Raises BadChart."""
 
@@ -321,10 +345,10 @@ def draw_chart(options):
     with tempfile.TemporaryDirectory(prefix="tubule-chart-") as folder:
         program = Program(options.tubule, Path(folder), chart.limit, chart.quantity)
         draw = stability_map if chart.map else work_precision
-        status = draw(chart, options, outputs, program, tell)
+        status = draw(chart, options, outputs, program, tell)  # None: another rank draws
     if status == 0:
         say("\n".join(map(str, [*outputs, outputs[0].with_suffix(".csv")])), sys.stdout)
-    return status
+    return status or 0
 
 
 def main():

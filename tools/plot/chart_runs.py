@@ -191,15 +191,15 @@ class Table:
         self.path, self.quantity, self.times = path, quantity, times
         self.runs, self.names = {}, {}  # by key; names: series and settings of an earlier call
         if not again and path.exists():
-            self.runs = self._read()
+            self.runs = self.read(path)
 
     def _value_columns(self):
         return [f"{self.quantity}@{time:g}" for time in self.times]
 
-    def _read(self):
-        """Runs of an earlier call. Raises ValueError or csv.Error if the file is something else."""
+    def read(self, path):
+        """Runs of an earlier call, or of another rank. Raises ValueError or csv.Error if the file is something else."""
         runs = {}
-        with open(self.path, newline="", encoding="utf-8") as file:
+        with open(path, newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 try:
                     values = {}
@@ -215,10 +215,10 @@ class Table:
                     raise ValueError(error) from error
         return runs
 
-    def write(self, jobs, judged=None):
+    def write(self, jobs, judged=None, path=None):
         """Rows in the order of the jobs; `judged` gives error, front and chosen_for of a key. Runs that no job asks
         for any more are kept at the end."""
-        judged = judged or {}
+        judged, path = judged or {}, path or self.path
         rows, seen = [], set()
         for job in jobs:
             run = self.runs.get(job.key)
@@ -226,13 +226,13 @@ class Table:
                 seen.add(job.key)
                 rows.append(self._row(job.series, " ".join(job.told), run, judged.get(job.key, {})))
         rows += [self._row(*self.names.get(key, ("", "")), run, {}) for key, run in self.runs.items() if key not in seen]
-        aside = self.path.with_name(self.path.name + ".part")
+        aside = path.with_name(path.name + ".part")
         with open(aside, "w", newline="", encoding="utf-8", errors="backslashreplace") as file:
             columns = [*self.COLUMNS, *self._value_columns(), "message", "key"]
             writer = csv.DictWriter(file, columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
-        os.replace(aside, self.path)
+        os.replace(aside, path)
 
     def _row(self, series, settings, run, judged):
         row = {
@@ -258,10 +258,10 @@ class Table:
 
 
 class Runner:
-    """Runs jobs, several at a time, and maintains the table."""
+    """Runs jobs, several at a time, and maintains the table; with `ranks`, those that no other rank has taken."""
 
-    def __init__(self, program, table, jobs, at_once, repeats=1, say=print):
-        self.program, self.table, self.jobs = program, table, jobs
+    def __init__(self, program, table, jobs, at_once, repeats=1, say=print, ranks=None):
+        self.program, self.table, self.jobs, self.ranks = program, table, jobs, ranks
         self.at_once, self.repeats, self.say, self.number = at_once, repeats, say, 0
 
     def run(self, jobs):
@@ -270,21 +270,36 @@ class Runner:
         left = list({job.key: job for job in jobs if job.key not in done}.values())
         if len(jobs) > len(left) and left:
             self.say(f"{len(jobs) - len(left)} runs are in {self.table.path} already")
-        left = [job for job in left for _ in range(self.repeats)]
-        self.total, going = len(left), []
+        self.total, self.ended, going = len(left) * self.repeats, 0, []
+        waiting, left = (left, []) if self.ranks else ([], [job for job in left for _ in range(self.repeats)])
         try:
-            while left or going:
+            while left or going or waiting:
+                if self.ranks:
+                    self.share(waiting, left, going)
                 self.start_some(left, going)
                 time.sleep(0.005)
                 for one in list(going):
                     run = self.program.look(one)
                     if run is not None:
                         going.remove(one)
-                        self.take(one.job, run, self.total - len(left) - len(going))
+                        self.take(one.job, run)
         finally:  # of an interrupt, say: nothing may write into the folder any more
             for one in going:
                 one.process.kill()
                 one.process.wait()
+
+    def share(self, waiting, left, going):
+        """Jobs that others have run are done; of the others, this rank takes as many as it can start."""
+        done = self.table.runs
+        for key, run in self.ranks.found().items():
+            done.setdefault(key, run)
+        waiting[:] = [job for job in waiting if job.key not in done]
+        for job in list(waiting):
+            if len(left) + len(going) >= self.at_once:
+                break
+            if self.ranks.take(job):
+                left += [job] * self.repeats
+                waiting.remove(job)
 
     def start_some(self, left, going):
         while left and len(going) < self.at_once:
@@ -300,12 +315,16 @@ class Runner:
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
             left.pop(0)
 
-    def take(self, job, run, ended):
+    def take(self, job, run):
+        self.ended += 1
         done = self.table.runs
         run.values = {at: run.values[at] for at in self.table.times if at in run.values}
         earlier = done.get(run.key)
         if earlier is None or run.cpu_s < earlier.cpu_s:  # of repeats, the least disturbed
             done[run.key] = run
-        self.table.write(self.jobs)
+        if self.ranks:
+            self.table.write(self.jobs, path=self.ranks.table)
+        if not self.ranks or self.ranks.rank == 0:
+            self.table.write(self.jobs)
         words = run.outcome if run.finished else f"{run.outcome} at t = {run.stop_time:.4g}"
-        self.say(f"[{ended}/{self.total}] {job.series}: {' '.join(job.told)}: {words}, {run.cpu_s:.3g} s")
+        self.say(f"[{self.ended}/{self.total}] {job.series}: {' '.join(job.told)}: {words}, {run.cpu_s:.3g} s")
