@@ -469,6 +469,14 @@ double reference_energy_of(const StationaryProblem& problem, const CurveForms& f
                         std::abs(loads.force) * length);
 }
 
+// Whether the search is to lead from a sphere to a smaller reduced volume: there area and volume have one gradient.
+bool begins_at_sphere(const Constraints& goal, const CurveObservation& start) {
+    constexpr double near = 1e-6;  // of a spline
+    if (!goal.reduced_volume && !(goal.area && goal.volume)) return false;
+    const double wanted = goal.reduced_volume ? *goal.reduced_volume : reduced_volume(*goal.area, *goal.volume);
+    return reduced_volume(start.area, start.volume) > 1 - near && wanted < 1 - near;
+}
+
 // Newton on meshes that follow the shape found on the one before, until their energies agree.
 Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveSpace> space, Eigen::VectorXd u,
                   double gauge, const EquilibriumSettings& settings) {
@@ -485,8 +493,15 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         StationarySystem system(space, problem, gauge);
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
-        if (round == 0) first = last = system.forms().observe(out.x);
+        if (round == 0) first = last = out.observed = system.forms().observe(out.x);
         out.reference_energy = reference_energy_of(problem, system.forms(), out.x);
+        if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first)) {
+            out.estimated_error = 1;
+            return end(
+                Stop::solver_failed,
+                "a sphere leads to no other area and volume, since all directions are alike: start at a spheroid "
+                "or a sphere with waves, or by equilibrium.family");
+        }
         found = settle(system, u, !found, settings, out);
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);

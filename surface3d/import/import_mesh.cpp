@@ -117,8 +117,7 @@ std::vector<int> representatives(const std::vector<Eigen::Vector3d>& points, dou
 
 void merge_vertices(ImportedMesh& out, double weld) {
     TriangleMesh& mesh = out.mesh;
-    const std::vector<int> exact = representatives(mesh.points, 0);
-    const std::vector<int> merged = weld > 0 ? representatives(mesh.points, weld) : exact;
+    const std::vector<int> merged = representatives(mesh.points, weld);
     std::vector<int> number(mesh.points.size());
     std::vector<Eigen::Vector3d> points;
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -134,8 +133,8 @@ void merge_vertices(ImportedMesh& out, double weld) {
     };
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const std::array<int, 3>& old = mesh.triangles[t];
-        // A triangle without area before welding is kept, so that the checks name and reject it.
-        if (collapsed(merged, old) && !collapsed(exact, old)) continue;
+        // Without welding a triangle that has no area is kept, so that the checks name and reject it.
+        if (weld > 0 && collapsed(merged, old)) continue;
         triangles.push_back({number[merged[old[0]]], number[merged[old[1]]], number[merged[old[2]]]});
         places.push_back(out.names.triangle_place[t]);
     }

@@ -20,6 +20,16 @@ PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
 
 
 class Equilibrium(ProgramTest):
+    def test_a_sphere_leads_nowhere_and_a_family_does(self):
+        vesicle = CASE.replace('kind = "capsule"', 'kind = "sphere"').replace("radius = 0.5", "radius = 1.0")
+        lines = [line for line in vesicle.splitlines() if not line.startswith(("length", "[equilibrium]", "modes"))]
+        case = self.write("cell.toml", "\n".join([*lines, "[equilibrium]", "reduced_volume = 0.9"]))
+        out, _ = self.tubule("run", case, status=4)
+        self.assertIn("a sphere leads to no other area and volume", out)
+        self.assertIn("or by equilibrium.family", out)
+        self.assertEqual(about(self.folder / "cell.hdf")["estimated_error"], 1)  # nothing is known
+        self.tubule("run", case, "--set", 'equilibrium.family="prolate"')
+
     def test_one_shape(self):
         case = self.write("cell.toml", CASE)
         out, _ = self.tubule("equilibrium", case)

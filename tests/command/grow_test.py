@@ -138,14 +138,18 @@ class Extended(GrowTest):
         self.assert_as_made_at_once(f"{AMPLITUDE}=0.1:0.12:9", more=slow)
 
     @unittest.skipUnless(MPIRUN, "built without MPI")
-    def test_on_any_number_of_ranks(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
-        for ranks, over in ((3, f"{AMPLITUDE}=0.4"), (2, f"{K42}=1e-5,1e-2")):
-            command = [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "scan", "scan.hdf",
-                       "--extend", f"--over={over}"]  # fmt: skip
+    def test_on_two_axes_on_any_number_of_ranks(self):
+        """More values of one axis and another axis, at once."""
+        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "small.hdf")
+        for ranks in (2, 3, 4):
+            command = [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "scan", "small.hdf",
+                       "--extend", f"--over={AMPLITUDE}=0.4", f"--over={K42}=1e-5,1e-2", "-o", "scan.hdf"]  # fmt: skip
             done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.4,0.5", f"{K42}=1e-5,1e-3,1e-2")
+            self.assertEqual(about(self.result)["workers"], ranks)
+            self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.4,0.5", f"{K42}=1e-5,1e-3,1e-2")
+            self.result.unlink()
+            self.whole.unlink()
 
 
 class Merged(GrowTest):

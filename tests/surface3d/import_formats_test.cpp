@@ -245,6 +245,28 @@ TEST(Stl, Refusals) {
                      {stl_binary(mesh), ": byte 124: a coordinate is not a finite number"}});  // 84 + 12 + 2 * 12 + 4
 }
 
+// A sphere by latitudes, 4 points each, as programs write it: each pole is there four times, in quadrilaterals cut into
+// two triangles. Half of these at the poles have no area.
+TEST(ReadMesh, WeldsPolesThatAreThereSeveralTimes) {
+    std::string text;
+    for (const double z : {-1.0, 0.0, 1.0})
+        for (int j = 0; j < 4; ++j) {
+            const double r = z == 0 ? 1 : 0, x = j % 2 == 0 ? 1 - j : 0, y = j % 2 == 1 ? 2 - j : 0;
+            text += fmt::format("v {} {} {}\n", r * x, r * y, z);
+        }
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 4; ++j) {
+            const int a = 4 * i + j + 1, b = 4 * i + (j + 1) % 4 + 1;
+            text += fmt::format("f {} {} {}\nf {} {} {}\n", a, b, b + 4, a, b + 4, a + 4);
+        }
+    EXPECT_EQ(read("poles.obj", text).mesh.triangles.size(), 16u);  // all are kept, to be refused by name
+    const ImportedMesh welded = read("poles.obj", text, 1e-6);
+    EXPECT_EQ(welded.mesh.triangles.size(), 8u);
+    EXPECT_EQ(welded.mesh.points.size(), 6u);
+    EXPECT_EQ(welded.notes,
+              std::vector<std::string>{"8 triangles collapsed when vertices were welded, and were dropped."});
+}
+
 TEST(ReadMesh, RefusesWhatIsNoMeshFile) {
     const TemporaryDirectory directory;
     const auto message = [&](const std::string& name, double weld = 0) -> std::string {
