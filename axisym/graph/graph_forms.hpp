@@ -13,7 +13,8 @@
 
 namespace tubule::axisym {
 
-// Diagnostics of a state, integrated or extremised over the whole period.
+// Diagnostics of a state, integrated or extremised over the whole period. Many fields: a list of measurements that share no
+// rule.
 struct Observation {
     double energy = 0, free_energy = 0;
     std::vector<double> energy_term;  // of each term, see term_names()

@@ -1,6 +1,5 @@
 #include "surface3d/motion/step_solver.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -12,10 +11,11 @@ namespace {
 // H of a mesh answers to waves of its own size by up to .06, .07, .08 |B| (width of a triangle) more than L_H for k =
 // 2, 3, 4; what little damps would grow in long steps.
 constexpr double curvature_stabilisation = 0.08;
-constexpr double flux_tolerance = 1e-7;    // how well the mesh follows the surface, relative
-constexpr int most_iterations = 20;        // of that, before it is factored
-constexpr int most_multipliers = 4;        // lambda, tension, supply, stretch
-constexpr double least_eigenvalue = 1e-2;  // of a Hessian, of the other one: else rows nearly vanish
+constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
+constexpr int most_iterations = 20;      // of that, before it is factored
+constexpr int most_multipliers = 4;      // lambda, tension, supply, stretch
+// Measured: docs/decisions/energies.md.
+constexpr double least_evenness = 0.02;
 
 }  // namespace
 
@@ -67,20 +67,34 @@ KeptExtent StepSolver::keep_extent(const StageSolution& solved, MotionState& to)
 
 namespace {
 
-// The Hessian of the density in (H, K), or a regular matrix near it where it is singular: an eigenvalue that is small,
-// in units of the curvature, takes a least size.
-Eigen::Matrix2d regular_hessian(const CurvatureJet<double>& f, double H, double K) {
-    const double curvature = std::sqrt(std::max(H * H - 2 * K, 0.0)), unit = curvature > 0 ? curvature : 1;
-    if (f.HK == 0) return Eigen::Vector2d(f.HH != 0 ? f.HH : 1, f.KK != 0 ? f.KK : 1).asDiagonal();
-    Eigen::Matrix2d scaled;
-    scaled << f.HH, f.HK * unit, f.HK * unit, f.KK * unit * unit;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(scaled);
-    Eigen::Vector2d values = solver.eigenvalues();
-    const double least = least_eigenvalue * values.cwiseAbs().maxCoeff();
-    for (double& value : values) value = std::copysign(std::max(std::abs(value), least), value);
-    scaled = solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
-    return (Eigen::Matrix2d() << scaled(0, 0), scaled(0, 1) / unit, scaled(1, 0) / unit, scaled(1, 1) / (unit * unit))
-        .finished();
+// The smaller over the larger eigenvalue of the Hessian of the density in (H, K), in units of the curvature.
+double evenness(const CurvatureJet<double>& f, double H, double K) {
+    const double curvature2 = std::max(H * H - 2 * K, 0.0), a = f.HH, d = f.KK * curvature2,
+                 b2 = f.HK * f.HK * curvature2;
+    const double mean = std::abs(a + d) / 2, root = std::sqrt((a - d) * (a - d) / 4 + b2);
+    return mean + root > 0 ? std::abs(mean - root) / (mean + root) : 0;
+}
+
+// What the evolution of H and K is multiplied by. Where the Hessian is nearly singular somewhere, not that but what is
+// positive in its diagonal, or 1: rows must not vanish.
+std::vector<Eigen::Matrix2d> row_factors(const Bending& bending, const MotionFields& fields) {
+    const Eigen::Index n = fields.H.size();
+    std::vector<CurvatureJet<double>> f(n);
+    bool regular = true;
+    for (Eigen::Index i = 0; i < n; ++i) {
+        f[i] = density(bending, fields.H[i], fields.K[i]);
+        regular = regular && (f[i].HK == 0 || evenness(f[i], fields.H[i], fields.K[i]) > least_evenness);
+    }
+    const auto or_one = [](double second, bool good) { return good ? second : 1; };
+    std::vector<Eigen::Matrix2d> out(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const auto& [value, H, K, HH, HK, KK] = f[i];
+        if (HK != 0 && regular)
+            out[i] << HH, HK, HK, KK;
+        else
+            out[i] << or_one(HH, HK == 0 ? HH != 0 : HH > 0), 0, 0, or_one(KK, HK == 0 ? KK != 0 : KK > 0);
+    }
+    return out;
 }
 
 }  // namespace
@@ -90,11 +104,8 @@ Eigen::Matrix2d regular_hessian(const CurvatureJet<double>& f, double H, double 
 // stabilisation of L_H: theory.md (10.7), (10.8).
 void StepSolver::make_symmetric(const StepBase& base) {
     const int n = surface_.nodes(), H = unknowns_.H, K = unknowns_.K;
-    std::vector<Eigen::Matrix2d> factor(n);
-    for (int i = 0; i < n; ++i) {
-        const double h = base.fields.H[i], k = base.fields.K[i];
-        factor[i] = -regular_hessian(density(surface_.bending(), h, k), h, k) / base.te;
-    }
+    std::vector<Eigen::Matrix2d> factor = row_factors(surface_.bending(), base.fields);
+    for (Eigen::Matrix2d& one : factor) one *= -1 / base.te;
     // Pairs of rows, or the one that there is: their entries in a column.
     const auto scale = [&](int i, double* of_H, double* of_K) {
         const Eigen::Vector2d old(of_H ? *of_H : 0, of_K ? *of_K : 0), out = factor[i] * old;

@@ -27,6 +27,7 @@ inline bool is_before(double t, double other) {
     return t < other * (1 - 1e-12);
 }
 
+// A run on surfaces, from its start to its stop. Many fields: what it is given, what it writes, and where it is.
 class MotionAttempt {
 public:
     // All references must outlive the attempt. `error` tells that of the run; none where it is not to be known.

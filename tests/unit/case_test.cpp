@@ -107,16 +107,16 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"[[shape.mode]]", "[time.mode]",
              "13:7: unknown key time.mode. Allowed here: end, output, stationary, limit"},
         Edit{"title", "tilte", "3:1: unknown key about.tilte; did you mean 'title'? Allowed here: title, source"},
-        Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0"},
-        Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
+        Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0, term"},
+        Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
         Edit{"kind = \"gr", "Re = 1\nkind = \"gr",
              "8:6: model.Re must be absent: only valid with kind = \"stokes\" or \"fluid\""},
         // Reported as misspelt, not as the missing radius:
         Edit{"radius", "  raduis",
              "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
-             "length, mode"},
+             "length, mode, noise"},
         Edit{"kind = \"tube\"", "knd = \"tube\"",
-             "10:1: unknown key shape.knd; did you mean 'kind'? Allowed here: kind, radius, length, mode"},
+             "10:1: unknown key shape.knd; did you mean 'kind'? Allowed here: kind, radius, length, mode, noise"},
         Edit{"n = 1", "l = 1",
              "15:1: unknown key shape.mode.0.l; did you mean 'n'? Allowed here: amplitude, n, m, phase"},
         Edit{"energy = 1e-6", "rmin = 1e-6",
@@ -133,10 +133,12 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
 
 TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
-        "energy, energy_20, energy_40, energy_42, free_energy, work, dissipation, identity_defect, area, volume, volume_drift, "
+        "energy, energy_20, energy_40, energy_42, free_energy, work, dissipation, identity_defect, area, volume, "
+        "volume_drift, "
         "reduced_volume, r_min, "
         "r_max, mode_<n>, kinetic_energy, speed, momentum_x, momentum_y, momentum_z, angular_momentum_x, "
-        "angular_momentum_y, angular_momentum_z, lambda, tension, pressure, force, stretching, correction_energy, integral_H2, integral_K, "
+        "angular_momentum_y, angular_momentum_z, lambda, tension, pressure, force, stretching, correction_energy, "
+        "integral_H2, integral_K, "
         "gauss_bonnet_defect, quality, turn, parameter, special, negative_directions, growth_<m>, "
         "meridian_length, height, r_middle, pole_curvature, distance_to_start, energy_error, elements, tier";
     const std::string at_end = " Allowed here: stop, time, " + series + ", stop_time, at";
@@ -156,7 +158,7 @@ TEST(CaseRefusal, MissingKeys) {
         Edit{"tier = \"axisym\"", "", "1:1: missing key tier: one of \"axisym\", \"surface3d\", \"auto\""},
         Edit{"kind = \"tube\"", "",
              "9:1: missing key shape.kind: one of \"tube\", \"sphere\", \"ellipsoid\", \"torus\", "
-             "\"capsule\", \"dumbbell\", \"file\", \"result\""},
+             "\"capsule\", \"dumbbell\", \"formula\", \"profile\", \"file\", \"result\""},
         Edit{"radius = 1.0", "", "9:1: missing key shape.radius: a number > 0"},
         Edit{"length = 2.0", "", "9:1: missing key shape.length: a number > 0"},
         Edit{"amplitude = 0.3", "", "13:1: missing key shape.mode.0.amplitude: a finite number"},
@@ -277,7 +279,8 @@ TEST(CaseRefusal, OutputTimesOutOfOrder) {
 }
 
 TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
-    const std::string no_energy = "energy needs a modulus other than zero: k20, k40, k42";
+    const std::string no_energy =
+        "energy needs a modulus other than zero: k20, k40, k42, or that of a term [[energy.term]]";
     expect_refused({
         Edit{"k20 = 1.0\nk42 = 0.06", "H0 = 1", "4:1: " + no_energy},
         Edit{"[energy]\nk20 = 1.0\nk42 = 0.06", "", "1:1: " + no_energy},
@@ -442,7 +445,7 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=abc", "energy.k42 must be a finite number, not the string \"abc\""},
         Override{"energy.k42=", "energy.k42 must be a finite number, not the string \"\""},
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
-        Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0"},
+        Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
         Override{"mode.0.n=1",
                  "unknown key mode; did you mean 'model'? Allowed here: tier, about, energy, auto, model, equilibrium, "
                  "velocity, "
@@ -772,14 +775,14 @@ TEST(Tube, RadiusIsDifferentiable) {
 }
 
 TEST(CaseErrors, allAreReportedAtOnce) {
-    EXPECT_EQ(
-        refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
-        "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, H0\n"
-        "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, mode "
-        "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"
-        "--set accuracy.energy=often: accuracy.energy must be a number > 1e-12 and <= 0.1, not the string "
-        "\"often\"\n"
-        "--set time.end=-1: time.end must be a number > 0, not -1");
+    EXPECT_EQ(refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
+              "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, H0, term\n"
+              "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, "
+              "mode, noise "
+              "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"
+              "--set accuracy.energy=often: accuracy.energy must be a number > 1e-12 and <= 0.1, not the string "
+              "\"often\"\n"
+              "--set time.end=-1: time.end must be a number > 0, not -1");
 }
 
 TEST(CaseRanges, OutputTimesEvenlySpaced) {

@@ -113,6 +113,10 @@ public:
         add(key, "list of floats", "");
     }
     void ramp(const std::string& key, const Ramp&) { add(key, "float or table", ""); }
+    void formula(const std::string& key, const std::shared_ptr<const Formula>&, std::span<const std::string_view>,
+                 bool = false) {
+        add(key, "string", "");
+    }
     void absent(const std::string&, const std::string&) {}
     template <class... Kinds>
     void kind(const std::variant<Kinds...>&) {}
@@ -161,7 +165,7 @@ std::vector<Case> kinds_of_cases() {
             c.model.keeps_volume = !is_free;
             c.model.area = !is_free ? AreaRule::fixed : model.inextensible ? AreaRule::reservoir : AreaRule::free;
             c.model.free_period = is_free;
-            c.velocity.rotates = model.inertia;
+            if (model.inertia) c.velocity.initial = InitialVelocity::rotation;
             c.tier = Tier::axisym;
             cases.push_back(c);
             cases.push_back(c);
@@ -198,7 +202,7 @@ std::multimap<std::string, KeyRow> documented_keys() {
         for (std::string cell; std::getline(parts, cell, '|');) cells.push_back(cell);
         if (cells.size() < 6) continue;
         std::smatch match;
-        if (std::regex_search(cells[1], match, std::regex("\\[(.*)\\]"))) table = match[1].str() + ".";
+        if (std::regex_search(cells[1], match, std::regex("\\[+([^\\]]*)\\]"))) table = match[1].str() + ".";
         const std::regex name("`(\\w+)`");
         for (std::sregex_iterator it(cells[1].begin(), cells[1].end(), name), end; it != end; ++it)
             rows.insert({table + (*it)[1].str(), {cells[2], cells[4]}});
