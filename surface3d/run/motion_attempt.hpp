@@ -28,6 +28,7 @@ inline bool is_before(double t, double other) {
 }
 
 // A run on surfaces, from its start to its stop. Many fields: what it is given, what it writes, and where it is.
+// One run with settings as given. Many fields: what it is made of, and where it is.
 class MotionAttempt {
 public:
     // All references must outlive the attempt. `error` tells that of the run; none where it is not to be known.
