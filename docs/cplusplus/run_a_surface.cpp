@@ -51,16 +51,16 @@ tier = "surface3d"
 k20 = 0.5
 [shape]
 kind = "ellipsoid"
-a = 1.0
-b = 0.9
-c = 1.1
+a = 0.8
+b = 1.0
+c = 1.3
 [model]
 kind = "overdamped"
 [accuracy]
 energy = 0.1
 [discretisation]
 elements = 60
-order = 2
+order = 3
 [time]
 end = 0.02
 output = [0.01]

@@ -28,7 +28,7 @@ class Equilibrium(ProgramTest):
         self.assertIn("a sphere leads to no other area and volume", out)
         self.assertIn("or by equilibrium.family", out)
         self.assertEqual(about(self.folder / "cell.hdf")["estimated_error"], 1)  # nothing is known
-        self.tubule("run", case, "--set", 'equilibrium.family="prolate"')
+        self.tubule("run", case, "--set", 'equilibrium.family="prolate"', "--overwrite")
 
     def test_one_shape(self):
         case = self.write("cell.toml", CASE)

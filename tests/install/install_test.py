@@ -44,7 +44,7 @@ class Install(unittest.TestCase):
 
     def test_programs_of_the_docs(self):
         """A spheroid with half axes 1.2 and 0.6, theory.md (7.3); the tube as the command runs it; a surface whose energy
-        falls towards that of a sphere, 8 pi."""
+        falls, but not below that of a sphere, 8 pi (Willmore)."""
         build, source = self.folder / "programs", SOURCES / "docs/cplusplus"
         run(CMAKE, "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", "-DCMAKE_BUILD_TYPE=Debug")
         run(CMAKE, "--build", build)
@@ -74,7 +74,7 @@ class Install(unittest.TestCase):
         text = printed("run_a_surface")
         energies = [float(value) for value in re.findall(r"energy ([\d.]+)", text)]
         self.assertEqual(energies, sorted(energies, reverse=True))
-        self.assertTrue(8 * math.pi < energies[-1] < energies[0] < 8 * math.pi + 0.6, text)
+        self.assertTrue(8 * math.pi < energies[-1] < energies[0] < 9 * math.pi, text)
 
     def test_each_header_compiles_by_itself(self):
         build, source = self.folder / "flags", Path(__file__).parent / "uses_tubule"

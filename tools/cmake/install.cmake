@@ -20,8 +20,10 @@ install(FILES ${PROJECT_BINARY_DIR}/TubuleConfig.cmake ${PROJECT_BINARY_DIR}/Tub
               tools/cmake/dependencies.cmake tools/cmake/FindSuiteSparse.cmake
         DESTINATION ${config_dir})
 
+# Without those that need headers of HDF5 and CHOLMOD, which no other one includes.
 install(DIRECTORY common axisym surface3d DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tubule
-        FILES_MATCHING PATTERN "*.hpp")
+        FILES_MATCHING PATTERN "*.hpp" PATTERN "hdf5_objects.hpp" EXCLUDE PATTERN "vtk_grid.hpp" EXCLUDE
+        PATTERN "sparse_cholmod.hpp" EXCLUDE)
 install(DIRECTORY cases DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule
         FILES_MATCHING PATTERN "*.toml" PATTERN "meshes/*")
 install(PROGRAMS tools/slurm/tubule.sbatch DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule/slurm)
