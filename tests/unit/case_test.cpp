@@ -133,7 +133,8 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
 
 TEST(CaseRefusal, UnknownSeries) {
     const std::string series =
-        "energy, energy_20, energy_40, energy_42, free_energy, work, dissipation, identity_defect, area, volume, "
+        "energy, energy_20, energy_40, energy_42, energy_formula, free_energy, work, dissipation, identity_defect, "
+        "area, volume, "
         "volume_drift, "
         "reduced_volume, r_min, "
         "r_max, mode_<n>, kinetic_energy, speed, momentum_x, momentum_y, momentum_z, angular_momentum_x, "
