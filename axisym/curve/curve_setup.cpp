@@ -20,7 +20,7 @@ namespace {
 // smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
 // The run's own are not smaller than `least_seam`, or rounding there keeps the integrator from starting; its first step
 // smooths the seam over far more than that.
-constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 1e-5;
+constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 3e-4;
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;

@@ -296,7 +296,8 @@ FormulaDomain::FormulaDomain(const Formula& formula) {
     for (std::size_t i = 0; i < formula.steps.size(); ++i) {
         const Step& step = formula.steps[i];
         if (!needs_positive(step.op) && step.op != Op::inverse) continue;
-        Limit limit{.step = &step, .argument = {}};
+        Limit limit;
+        limit.step = &step;
         std::size_t first = i;  // of the operations that make the argument
         for (int open = 1; open > 0; open += values_taken(formula.steps[first].op) - 1) --first;
         limit.argument.steps.assign(formula.steps.begin() + static_cast<std::ptrdiff_t>(first),

@@ -79,7 +79,7 @@ TEST(CurveSpace, refusesWhatMakesNoCurve) {
                       b(Topology::tube, equal_breaks(4), 5, 4, 1);
                   a.prolong(b, Vector::Zero(b.size()));
               }),
-              "curves of different topology, different or free period cannot be prolonged to each other");
+              "curves of different topology or period cannot be prolonged to each other");
 }
 
 TEST(CurveSpace, prolongationIsTheSameCurve) {
