@@ -233,7 +233,7 @@ void measure_by_length(const SmoothProfile& fit, std::vector<double>& s) {
     for (int i = 0; i < n; ++i)  // Simpson
         length[i + 1] = length[i] + (speed(double(i) / n) + 4 * speed((i + 0.5) / n) + speed((i + 1.0) / n)) / (6 * n);
     for (double& at : s) {
-        const int i = std::min(static_cast<int>(at * n), n - 1);
+        const int i = std::clamp(static_cast<int>(at * n), 0, n - 1);
         const double from = double(i) / n, part = at - from;
         at = (length[i] + part / 6 * (speed(from) + 4 * speed(from + part / 2) + speed(at))) / length[n];
     }
@@ -253,7 +253,9 @@ SmoothProfile fit_waves(Kind kind, const std::vector<Point>& points, double leng
             const bool end = i == 0 || i + 1 == n;
             s[i] = nearest(fit, points[i], s[i], end);
             const auto at = point_at(fit, s[i]);
-            fit.distance = std::max(fit.distance, std::hypot(at[0] - points[i].r, at[2] - points[i].z));
+            const double off = std::hypot(at[0] - points[i].r, at[2] - points[i].z);
+            fit.distance = std::isfinite(off) ? std::max(fit.distance, off) : std::numeric_limits<double>::infinity();
+            if (!std::isfinite(off)) return fit;  // numbers so far apart that no waves fit them
         }
         if (round + 1 < rounds) measure_by_length(fit, s);
     }

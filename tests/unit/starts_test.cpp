@@ -134,6 +134,15 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     EXPECT_NE(refusal(".5,0\n.5,.1\n.5,.2\n.5,.3\n.5,.4\n.5,.5\n.5,.6\n.5,.7\n.5,.8\n.5,2\n", within(1e-3, 1))
                   .find("p.csv:10: the profile rises by 2, more than shape.length = 1"),
               std::string::npos);
+    // One point so far away that squares are no numbers: this crashed.
+    for (const double far : {1e97, 1e200}) {
+        const auto path = points(120, [&](double t) {
+            auto point = spheroid(t);
+            if (t > 0.02 && t < 0.03) point[1] *= far;
+            return point;
+        });
+        EXPECT_NE(message_of<ProfileError>([&] { read_profile(path, {}); }).find("smooth curve"), std::string::npos) << far;
+    }
     // A corner is no smooth curve.
     std::string cone;
     for (int i = 0; i <= 10; ++i) cone += fmt::format("{},{}\n", 0.1 * std::min(i, 10 - i), 0.1 * i);
