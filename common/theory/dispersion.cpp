@@ -249,6 +249,8 @@ std::optional<FastestWave> fastest_wave(const UniformTube& tube, const MotionLaw
                 low = a;
         }
         const double q = top == 0 && rate(band.from) >= rate((low + high) / 2) ? band.from : (low + high) / 2;
+        // The search has run into q = 0, where rates have no bound.
+        if (q > 0 && q < 1e-6 * band.to && !(rate(q) < 10 * rate(1e-3 * step))) return std::nullopt;
         if (!best || rate(q) > best->rate) best = {q, rate(q)};
     }
     return best;

@@ -321,6 +321,10 @@ TEST(Thresholds, illPosed) {
     EXPECT_FALSE(stable_tensions(tube_of(0, -0.5, -1.001), 0));
     EXPECT_EQ(growing_bands(tube_of(0, -0.5, -1.001), 0).back().to, std::numeric_limits<double>::infinity());
     EXPECT_FALSE(fastest_wave(tube_of(0, -0.5, -1.001), law_of(ModelKind::gradient_flow), 0));
+    // Buckling in Stokes flow without friction: nothing resists long waves, and rates grow like 1/q^2.
+    UniformTube buckles{bending(1), 1, -6};
+    EXPECT_FALSE(fastest_wave(buckles, law_of(ModelKind::stokes, 1, 0), 1));
+    EXPECT_TRUE(fastest_wave(buckles, law_of(ModelKind::stokes, 1, 1), 1));
     EXPECT_FALSE(ill_posed_around({bending(0.6, 0, -0.0999), 1}));
     EXPECT_TRUE(ill_posed_around({bending(0.6, 0, -0.1001), 1}));
 }

@@ -295,6 +295,9 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
         if (const auto& fastest = report.fastest[m])
             add(out, "  fastest of all with m = {}: q = {:.7g}{}, rate {:.7g}\n", m, fastest->q,
                 fastest->q > 0 ? fmt::format(" (length {:.6g})", 2 * pi / fastest->q) : "", fastest->rate);
+        else if (const auto bands = theory::growing_bands(report.tube, static_cast<int>(m));
+                 !bands.empty() && std::isfinite(bands.back().to))
+            add(out, "  no fastest of all with m = {}: the longer a wave, the faster it grows\n", m);
 }
 
 void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Threshold>& limits, int last) {
