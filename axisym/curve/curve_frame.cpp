@@ -128,8 +128,12 @@ Meridian frame_meridian(const Record& frame) {
 }
 
 SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
+    const std::filesystem::path path = std::filesystem::path(c.path).parent_path() / file.path;
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error))
+        throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
     try {
-        return read_profile(std::filesystem::path(c.path).parent_path() / file.path, file);
+        return read_profile(path, file);
     } catch (const ProfileError& error) {
         throw CaseError(error.what());
     }

@@ -184,8 +184,12 @@ struct Prepare {
         return on(UnitSphere{}, map);
     }
     Prepared operator()(const ProfileFile& file) const {
+        const std::filesystem::path path = beside(c, file.path);
+        std::error_code error;
+        if (!std::filesystem::is_regular_file(path, error))
+            throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
         try {
-            const SmoothProfile profile = read_profile(beside(c, file.path), file);
+            const SmoothProfile profile = read_profile(path, file);
             Prepared out = (*this)(WavedProfile{profile_curve(profile), {}, {}});
             out.notes.push_back(profile.note());
             return out;

@@ -37,6 +37,12 @@ class StartsTest(ProgramTest):
                 for row in (0, -1):
                     self.assertAlmostEqual(found[name][row] / expected[name][row], 1, delta=relative, msg=f"{shape} {name}")
 
+    def test_a_profile_that_is_not_there_is_refused_at_its_key(self):
+        text = 'tier = "axisym"\nenergy = {k20 = 1.0}\ntime = {end = 1e-3}\nshape = {kind = "profile", path = "none.csv"}\n'
+        for tier in ("axisym", "surface3d"):
+            _, said = self.tubule("run", self.write("case.toml", text.replace("axisym", tier)), status=2)
+            self.assertRegex(said, r"case\.toml:4:\d+: shape\.path cannot be used: .*none\.csv: there is no such file")
+
     def test_tubes_equal_the_built_in_one(self):
         z = 2 * np.arange(81) / 80
         self.profile("tube.csv", 1 + 0.2 * np.cos(np.pi * z), z)
