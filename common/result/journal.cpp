@@ -59,6 +59,7 @@ void apply(Entry kind, std::span<const std::byte> bytes, Contents& contents) {
         case Entry::mesh:
             contents.meshes.push_back(get_mesh(payload));
             return;
+        case Entry::point_of_version_0:
         case Entry::point:
             break;  // belongs to a scan
     }

@@ -21,7 +21,8 @@ namespace tubule {
 // The journal may grow by this many bytes beyond the size of the file before it is merged; the tests lower it.
 inline std::size_t journal_slack = std::size_t{4} << 20;
 
-enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh, point /* of a scan */ };
+// The kinds; a new number wherever the layout of the payload changes. Version 0 wrote points of scans as kind 6.
+enum class Entry : std::uint32_t { row = 1, frame, checkpoint, discard, mesh, point_of_version_0, point /* of a scan */ };
 
 std::filesystem::path journal_path(const std::filesystem::path& result);
 

@@ -15,30 +15,11 @@ from matplotlib.image import imread
 
 MPIRUN = sys.argv[2] if len(sys.argv) > 2 else None
 
-from program import PROGRAM, ProgramTest, about
+from program import PROGRAM, UNDULATED_TUBE, ProgramTest, about
 
 AMPLITUDE, K42, RADIUS = "shape.mode.0.amplitude", "energy.k42", "shape.radius"
 
-CASE = """tier = "axisym"
-[energy]
-k20 = 0.2
-H0 = -2.0
-k42 = 1e-3
-[shape]
-kind = "tube"
-radius = 1.0
-length = 2.0
-[[shape.mode]]
-amplitude = 0.3
-n = 1
-[accuracy]
-r_min = 0.05
-[discretisation]
-parametrisation = "graph"
-[time]
-end = 20.0
-stationary = 1e-6
-"""
+CASE = UNDULATED_TUBE.replace("H0 = -2.0\n", "H0 = -2.0\nk42 = 1e-3\n")
 
 
 def contents(result):

@@ -46,6 +46,27 @@ time_tolerance = 1e-12
 time_order = 2
 """
 
+# A tube that pearls, pinches or relaxes, as its amplitude and k42 have it: the case of scans.
+UNDULATED_TUBE = """tier = "axisym"
+[energy]
+k20 = 0.2
+H0 = -2.0
+[shape]
+kind = "tube"
+radius = 1.0
+length = 2.0
+[[shape.mode]]
+amplitude = 0.3
+n = 1
+[accuracy]
+r_min = 0.05
+[discretisation]
+parametrisation = "graph"
+[time]
+end = 20.0
+stationary = 1e-6
+"""
+
 # A tubular cell at rest; to be completed by what is asked of it.
 CAPSULE = """tier = "axisym"
 [energy]

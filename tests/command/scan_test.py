@@ -10,11 +10,13 @@ import os
 import re
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import time
 import tomllib
 import unittest
+import zlib
 from pathlib import Path
 
 import h5py
@@ -23,29 +25,11 @@ import numpy as np
 CASES = Path(sys.argv[2])
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 
-from program import PROGRAM, ProgramTest, about
+from program import PROGRAM, UNDULATED_TUBE, ProgramTest, about
 
 AMPLITUDE, K42 = "shape.mode.0.amplitude", "energy.k42"
 
-CASE = """tier = "axisym"
-[energy]
-k20 = 0.2
-H0 = -2.0
-[shape]
-kind = "tube"
-radius = 1.0
-length = 2.0
-[[shape.mode]]
-amplitude = 0.3
-n = 1
-[accuracy]
-r_min = 0.05
-[discretisation]
-parametrisation = "graph"
-[time]
-end = 20.0
-stationary = 1e-6
-"""
+CASE = UNDULATED_TUBE
 # A map with pinched tubes, unduloids (held open by k42) and straight tubes; 36 points, 0.2 s.
 MAP = ("--over", f"{AMPLITUDE}=0.3:0.5:6", "--over", f"{K42}=1e-5:1e-2:6:log")
 # Points that take 0.1 s each, so that there is time to kill their scan.
@@ -326,6 +310,17 @@ class Refusals(ScanTest):
         self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
 
 
+def as_kind(journal, kind):
+    """All records of a journal (common/result/journal.hpp) as if they were of this kind."""
+    out, seed, at = bytearray(journal[:16]), zlib.crc32(journal[8:16]), 16
+    while at < len(journal):
+        length, sequence = struct.unpack_from("=QQ", journal, at)
+        head, payload = struct.pack("=QQI", length, sequence, kind), journal[at + 24:at + 24 + length]
+        out += head + struct.pack("=I", zlib.crc32(payload, zlib.crc32(head, seed))) + payload
+        at += 24 + length
+    return bytes(out)
+
+
 class Kill(ScanTest):
     def shown(self):
         """Finished points, as `tubule show` has them, the journal included: number to line."""
@@ -380,6 +375,22 @@ class Kill(ScanTest):
         self.assert_kept(known)
         self.assertEqual(about(self.result)["stop"], "finished")
 
+    def test_points_of_an_earlier_version_are_refused(self):
+        """Its records had another layout, and the kind 6: they are not misread as points of today."""
+        self.disturbed(signal.SIGKILL, 2)
+        journal = Path(f"{self.result}.journal")
+        old = as_kind(journal.read_bytes(), 6)
+        journal.write_bytes(old)
+        for command in (("show", self.result), ("scan", "case.toml", *SLOW, "-o", self.result, "--resume")):
+            done = subprocess.run([PROGRAM, *map(str, command)], cwd=self.folder, capture_output=True, text=True)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn("an earlier version", done.stderr)
+            self.assertIn("Delete scan.hdf.journal", done.stderr)
+        self.assertEqual(journal.read_bytes(), old)
+        journal.unlink()
+        self.scan("case.toml", *SLOW, "--resume")
+        self.assertEqual(about(self.result)["stop"], "finished")
+
     def test_a_boundary_goes_on(self):
         """After a kill the scan follows the same boundary as without."""
         fine = ("--over", f"{AMPLITUDE}=0.2:0.5:16", "--over", f"{K42}=1e-5:1e-2:16:log", "--boundary", "outcome")
@@ -399,6 +410,7 @@ class Kill(ScanTest):
 @unittest.skipUnless(MPIRUN, "built without MPI")
 class Ranks(Kill):
     """The same across the processes of an mpirun."""
+    test_points_of_an_earlier_version_are_refused = None  # the same reader
 
     def mpirun(self, ranks):
         # Tests may run as root in a container, with fewer processors than ranks.

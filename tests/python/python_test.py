@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 import unittest
+import warnings
 from pathlib import Path
 
 TUBULE, TOP = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
@@ -132,6 +133,25 @@ class Runs(Folder):
         with self.assertRaisesRegex(tubule.CaseError, "cannot be written|journal"):
             tubule.run(TUBE, output=self.folder / "r.journal")
 
+    def test_results_of_other_cases_are_kept(self):
+        file = self.folder / "out.hdf"
+        tubule.run(TUBE, output=file)
+        before, other = file.read_bytes(), tubule.Case(TUBE, {"energy.k42": 0.2})
+        with self.assertRaisesRegex(tubule.CaseError, "overwrite"):
+            tubule.run(other, output=file)
+        self.assertEqual(file.read_bytes(), before)
+        tubule.run(TUBE, output=file)  # the same case may be run again
+        result = tubule.run(other, output=file, overwrite=True)
+        np.testing.assert_array_equal(tubule.read(file).series["energy"], result.series["energy"])
+
+    def test_what_is_worth_knowing_is_a_warning(self):
+        """k42 < 0: the energy has no lower bound, which does not end the run."""
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            tubule.run(tubule.Case(TUBE, {"energy.k42": -1e-4}))
+        self.assertTrue(any("no lower bound" in str(w.message) for w in seen), seen)
+        self.assertEqual({Path(w.filename).name for w in seen}, {Path(__file__).name})
+
     def test_early_stops_are_no_exceptions(self):
         result = tubule.run(TUBE | {"time": {"end": 0.2, "limit": 1e-9}})
         self.assertEqual(result.stop, "time-limit")
@@ -171,9 +191,13 @@ except KeyboardInterrupt:
     print("interrupted")
 assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 print(tubule.run({TUBE!r}).stop)
+ends = []  # in another thread, too, and many at once: the interrupt is over
+other = threading.Thread(target=lambda: ends.append(tubule.run({TUBE!r}).stop))
+other.start(), other.join()
+print(*ends, *(r.stop for r in tubule.run_many([{TUBE!r}] * 2)))
 """
         done = subprocess.run(["/usr/bin/python3", "-c", script], text=True, capture_output=True, timeout=200)
-        self.assertEqual(done.stdout, "interrupted\nfinished\n", done.stderr)
+        self.assertEqual(done.stdout, "interrupted\nfinished\nfinished finished finished\n", done.stderr)
 
     def test_without_the_lock_of_the_interpreter(self):
         ticks, over = [], threading.Event()

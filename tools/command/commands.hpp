@@ -46,5 +46,7 @@ std::filesystem::path result_path(const RunOptions& options, const Case& c);
 
 // Refuses, before anything is computed, a name that no result can have. Throws CaseError.
 void check_output(const std::filesystem::path& file);
+// And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another case.
+void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite);
 
 }  // namespace tubule

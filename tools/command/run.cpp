@@ -327,6 +327,16 @@ void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& 
                     file.string(), c.path, other));
 }
 
+}  // namespace
+
+void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite) {
+    check_output(file);
+    refuse_to_replace_the_start(c, file);
+    if (!overwrite) refuse_to_replace_another_case(c, file);
+}
+
+namespace {
+
 struct Job {
     Case c;
     std::filesystem::path file;
@@ -353,9 +363,7 @@ Job job_of(const std::string& path, const RunOptions& options) {
     if (is_hdf5(path)) return job_of_result(path, sets, options);
     Case c = read_case(path, sets);
     const auto file = result_path(options, c);
-    check_output(file);
-    refuse_to_replace_the_start(c, file);
-    if (!options.resume && !options.overwrite) refuse_to_replace_another_case(c, file);
+    check_replaced(c, file, options.resume || options.overwrite);
     return {std::move(c), file};
 }
 

@@ -88,26 +88,25 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 
 }  // namespace
 
-MemoryRun run_in_memory(const Case& c, const MemoryRunOptions& options) {
+Result run_in_memory(const Case& c, const MemoryRunOptions& options) {
     PauseWatch watch(c.time.limit, options.interrupted);
     const auto engine = engine_for(c);
-    MemoryRun out;
-    out.result.case_text = {c.text, c.sets};
-    out.result.about = about_start();
-    out.result.series_names = engine->series_names();
-    for (const std::string& name : out.result.series_names) out.result.series[name];
+    Result result;
+    result.case_text = {c.text, c.sets};
+    result.about = about_start();
+    result.series_names = engine->series_names();
+    for (const std::string& name : result.series_names) result.series[name];
     std::optional<ResultWriter> writer;
     if (options.output) {
-        check_output(*options.output);
-        writer = ResultWriter::create(*options.output, out.result.case_text, out.result.about,
-                                      out.result.series_names);
+        check_replaced(c, *options.output, options.overwrite);
+        writer = ResultWriter::create(*options.output, result.case_text, result.about, result.series_names);
     }
-    Memory memory(out.result, options, writer);
-    out.summary = run_to_its_end(c, *engine, out.result, memory);
-    const About end = about_end(c, out.summary, watch.seconds());
-    out.result.about.insert(out.result.about.end(), end.begin(), end.end());
+    Memory memory(result, options, writer);
+    const RunSummary summary = run_to_its_end(c, *engine, result, memory);
+    const About end = about_end(c, summary, watch.seconds());
+    result.about.insert(result.about.end(), end.begin(), end.end());
     if (writer && writer->began()) writer->finish(end);
-    return out;
+    return result;
 }
 
 }  // namespace tubule

@@ -7,6 +7,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <Eigen/Core>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <thread>
@@ -49,16 +50,18 @@ public:
     // Raises KeyboardInterrupt if a signal came.
     void check() {
         if (!interrupted()) return;
-        restore();
+        restore();  // or the next signal would end the process
         PyErr_SetNone(PyExc_KeyboardInterrupt);
         throw py::error_already_set();
     }
 
 private:
     void restore() {
+        catch_interrupts();  // lowers the flag: runs of other threads and later ones ask it, too
         sigaction(SIGINT, &old_interrupt_, nullptr), sigaction(SIGTERM, &old_terminate_, nullptr);
     }
-    struct sigaction old_interrupt_ {}, old_terminate_ {};
+    struct sigaction old_interrupt_ {
+    }, old_terminate_{};
 };
 
 bool is_main_thread() {
@@ -84,8 +87,8 @@ auto without_gil(int threads, const Work& work) {
         try {
             return work();
         } catch (const Paused& pause) {
-            throw std::runtime_error(pause.reason == Stop::interrupted ? "interrupted"
-                                                                       : "time.limit has passed before there was a row");
+            throw std::runtime_error(
+                pause.reason == Stop::interrupted ? "interrupted" : "time.limit has passed before there was a row");
         }
     };
     try {
@@ -142,8 +145,8 @@ py::dict mesh_dictionary(const Results& r, std::size_t number) {
     py::dict out;
     out["order"] = mesh.order, out["nodes"] = mesh.nodes, out["period"] = mesh.period;
     out["cells"] = py::array_t<int>({rows, width}, mesh.cells.data());
-    out["shifts"] = mesh.shifts.empty() ? py::object(py::none())
-                                        : py::object(py::array_t<int>({rows, width}, mesh.shifts.data()));
+    out["shifts"] =
+        mesh.shifts.empty() ? py::object(py::none()) : py::object(py::array_t<int>({rows, width}, mesh.shifts.data()));
     return out;
 }
 
@@ -161,24 +164,31 @@ py::tuple profile(const Results& r, std::size_t number, int points) {
     return py::make_tuple(numpy(radius), numpy(height), tube.length);
 }
 
-Results run(const Case& c, const py::object& progress, const py::object& output, int threads) {
+Results run(const Case& c, const py::object& progress, const py::object& output, bool overwrite, int threads) {
     MemoryRunOptions options;
-    options.interrupted = [] { return interrupted(); };
     std::exception_ptr raised;  // by the caller's own function: it ends the run
+    std::atomic<bool> unwanted = false;
     if (!progress.is_none())
         options.progress = [&](double time, double energy, double step) {
+            if (unwanted) return;
             const py::gil_scoped_acquire gil;
             try {
-                if (!raised) progress(time, energy, step);
+                progress(time, energy, step);
             } catch (...) {
                 raised = std::current_exception();
+                unwanted = true;
             }
         };
-    if (!progress.is_none()) options.interrupted = [&] { return interrupted() || raised; };
+    options.interrupted = [&] { return interrupted() || unwanted; };
+    std::vector<std::string> notes;
+    options.note = [&](const std::string& words) { notes.push_back(words); };
     if (!output.is_none()) options.output = output.cast<std::filesystem::path>();
-    MemoryRun done = without_gil(threads, [&] { return run_in_memory(c, options); });
+    options.overwrite = overwrite;
+    Result done = without_gil(threads, [&] { return run_in_memory(c, options); });
     if (raised) std::rethrow_exception(raised);
-    return {std::make_shared<const Result>(std::move(done.result))};
+    for (const std::string& words : notes)
+        py::module_::import("warnings").attr("warn")(words, py::handle(PyExc_UserWarning), 2);
+    return {std::make_shared<const Result>(std::move(done))};
 }
 
 // ---- closed forms
@@ -276,35 +286,36 @@ void add_results(py::module_& m) {
     py::class_<Results>(m, "Results")
         .def_property_readonly("about", [](const Results& r) { return dictionary(r.result->about); })
         .def_property_readonly("series_names", [](const Results& r) { return r.result->series_names; })
-        .def("series", [](const Results& r, const std::string& name) {
-            const auto found = r.result->series.find(name);
-            if (found == r.result->series.end()) throw py::key_error(name);
-            return numpy(found->second);
-        })
+        .def("series",
+             [](const Results& r, const std::string& name) {
+                 const auto found = r.result->series.find(name);
+                 if (found == r.result->series.end()) throw py::key_error(name);
+                 return numpy(found->second);
+             })
         .def_property_readonly("case_text", [](const Results& r) { return r.result->case_text.text; })
         .def_property_readonly("case_sets", [](const Results& r) { return r.result->case_text.sets; })
         .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
         .def("frame", &frame_dictionary)
         .def("mesh", &mesh_dictionary)
         .def("profile", &profile);
-    m.def("run", &run, py::arg("case"), py::arg("progress"), py::arg("output"), py::arg("threads"));
-    m.def("read_result", [](const std::filesystem::path& file) {
-        return Results{std::make_shared<const Result>(read_result(file))};
-    });
+    m.def("run", &run, py::arg("case"), py::arg("progress"), py::arg("output"), py::arg("overwrite"),
+          py::arg("threads"));
+    m.def("read_result",
+          [](const std::filesystem::path& file) { return Results{std::make_shared<const Result>(read_result(file))}; });
 }
 
 void add_closed_forms(py::module_& m) {
     m.def("density", &density_at);
     m.def("growth_rates", &growth_rates);
-    m.def("profile_curvatures", [](const Numbers& r, const Numbers& r1, const Numbers& r2, const Numbers& z1,
-                                   const Numbers& z2) {
-        const auto part = [&](auto member) {
-            return py::vectorize([member](double a, double b, double c, double d, double e) {
-                return profile_point(a, b, c, d, e).*member;
-            })(r, r1, r2, z1, z2);
-        };
-        return py::make_tuple(part(&ProfilePoint<double>::H), part(&ProfilePoint<double>::K));
-    });
+    m.def("profile_curvatures",
+          [](const Numbers& r, const Numbers& r1, const Numbers& r2, const Numbers& z1, const Numbers& z2) {
+              const auto part = [&](auto member) {
+                  return py::vectorize([member](double a, double b, double c, double d, double e) {
+                      return profile_point(a, b, c, d, e).*member;
+                  })(r, r1, r2, z1, z2);
+              };
+              return py::make_tuple(part(&ProfilePoint<double>::H), part(&ProfilePoint<double>::K));
+          });
     m.def("forecast", [](const Case& c) {
         const Forecast f = without_gil(0, [&] { return forecast(c); });
         py::dict out;
@@ -335,12 +346,12 @@ void add_answers(py::module_& m) {
         options.json = true, options.file = name;
         return without_gil(0, [&] { return stability_answer(options, stability_subject(*r.result, options)); });
     });
-    m.def("compare", [](const Results& a, const Results& b, bool align, bool shapes,
-                        const std::vector<std::string>& frames) {
-        CompareOptions options;
-        options.results = {"a", "b"}, options.frames = frames, options.align = align, options.no_shapes = !shapes;
-        return without_gil(0, [&] { return comparison_json(options, *a.result, *b.result); });
-    });
+    m.def("compare",
+          [](const Results& a, const Results& b, bool align, bool shapes, const std::vector<std::string>& frames) {
+              CompareOptions options;
+              options.results = {"a", "b"}, options.frames = frames, options.align = align, options.no_shapes = !shapes;
+              return without_gil(0, [&] { return comparison_json(options, *a.result, *b.result); });
+          });
     m.def("scan", &scan);
     m.def("build_info", &build_info);
 }

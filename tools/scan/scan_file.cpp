@@ -404,6 +404,11 @@ Stored load(const fs::path& path) {
         Stored stored = read_file(path);
         const auto rest =
             replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
+                if (kind == Entry::point_of_version_0)
+                    throw std::runtime_error(fmt::format(
+                        "the points in its journal were written by an earlier version. Finish the scan "
+                        "with that version, or give up these points: Delete {}, then continue with --resume",
+                        journal_path(path).filename().string()));
                 if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
                 keep(stored.result, from_bytes(payload));
             });

@@ -20,22 +20,25 @@ from .results import Result, read
 Progress = Callable[[float, float, float], None]
 
 
-def run(case, *, output: str | os.PathLike | None = None, progress: Progress | None = None, threads: int = 0) -> Result:
+def run(case, *, output: str | os.PathLike | None = None, overwrite: bool = False,
+        progress: Progress | None = None, threads: int = 0) -> Result:
     """Runs a case of any tier, or finds its equilibria, in this process.
 
     case      a Case, or what Case takes
     output    a result file, written as the run goes on: a kill loses nothing. Without it all stays in memory
+    overwrite replace the result of another case in that file, which is refused otherwise
     progress  called with (time, energy, step) at most ten times a second; what it raises ends the run
     threads   for loops over elements of tier surface3d; 0: one a processor
 
-    A run that cannot go on is no exception: see Result.stop. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad
+    A run that cannot go on is no exception: see Result.stop. What is worth knowing, such as an accuracy that is wider than
+    what the energy can change by, is a warning of Python. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad
     input, RuntimeError where nothing could be computed.
 
     >>> result = run(tube)
     >>> result.stop, len(result.frames)
     ('finished', 4)
     """
-    return Result(_core.run(as_case(case)._core, progress, None if output is None else os.fspath(output), threads))
+    return Result(_core.run(as_case(case)._core, progress, None if output is None else os.fspath(output), overwrite, threads))
 
 
 def run_many(cases: Iterable, *, jobs: int | None = None) -> list[Result]:
