@@ -385,7 +385,7 @@ class Kill(ScanTest):
             done = subprocess.run([PROGRAM, *map(str, command)], cwd=self.folder, capture_output=True, text=True)
             self.assertNotEqual(done.returncode, 0)
             self.assertIn("an earlier version", done.stderr)
-            self.assertIn("Delete scan.hdf.journal", done.stderr)
+            self.assertIn("delete scan.hdf.journal", done.stderr)
         self.assertEqual(journal.read_bytes(), old)
         journal.unlink()
         self.scan("case.toml", *SLOW, "--resume")

@@ -407,7 +407,7 @@ Stored load(const fs::path& path) {
                 if (kind == Entry::point_of_version_0)
                     throw std::runtime_error(fmt::format(
                         "the points in its journal were written by an earlier version. Finish the scan "
-                        "with that version, or give up these points: Delete {}, then continue with --resume",
+                        "with that version, or give up these points: delete {}, then continue with --resume",
                         journal_path(path).filename().string()));
                 if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
                 keep(stored.result, from_bytes(payload));
