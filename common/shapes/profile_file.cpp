@@ -82,7 +82,8 @@ std::vector<Point> read_points(const std::filesystem::path& path) {
         if (row.size() != columns)
             refuse(path, line, fmt::format("has {} values where {} are expected: r, z", row.size(), columns));
         const auto at = number(row[r]), up = number(row[z]);
-        if (!at || !up) refuse(path, line, fmt::format("'{}' is no finite number", row[at ? z : r]));
+        if (const std::string& cell = row[at ? z : r]; !at || !up)
+            refuse(path, line, fmt::format("'{:.40}{}' is not a finite number", cell, cell.size() > 40 ? "..." : ""));
         if (out.size() == most_points) refuse(path, line, fmt::format("more than {} points", most_points));
         out.push_back({*at, *up, line});
     }

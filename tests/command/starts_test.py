@@ -83,8 +83,8 @@ class StartsTest(ProgramTest):
     def test_bad_files_are_refused(self):
         self.write("bad.csv", "r,z\n0,-1\n0.5,oops\n")
         path = self.write("case.toml", case('kind = "profile"\npath = "bad.csv"\n', MOVES.format(1e-4)))
-        self.assertIn("bad.csv:3: 'oops' is no finite number", self.refused("run", path))
-        self.assertIn("bad.csv:3: 'oops' is no finite number", self.refused("check", path))
+        self.assertIn("bad.csv:3: 'oops' is not a finite number", self.refused("run", path))
+        self.assertIn("bad.csv:3: 'oops' is not a finite number", self.refused("check", path))
         path = self.write("case.toml", case('kind = "formula"\nr = "1 + 0.1*cos(phi"\n', MOVES.format(1e-4)))
         self.assertRegex(self.refused("run", path), r"case\.toml:8:17: shape\.r, character 12: this parenthesis is not closed")
         path = self.write("case.toml", case('kind = "formula"\nr = "1 + 0.1*sin(theta)^2*cos(2*phi)"\n', MOVES.format(1e-4)))

@@ -88,7 +88,8 @@ def settled(box, done, sets):
     if sets:
         return
     box.write("again/case.toml", done.out)
-    (box.folder / "again/meshes").symlink_to(CASES / "meshes")
+    for folder in ("meshes", "profiles"):
+        (box.folder / "again" / folder).symlink_to(CASES / folder)
     again = box.run("check", "--quick", "again/case.toml", statuses=(0, 2))
     if again.status != 0 or again.out.split("\n", 1)[1] != done.out.split("\n", 1)[1]:
         raise Finding("no-fixed-point", f"check of what check prints differs:\n{again.err[:500]}")
@@ -110,7 +111,8 @@ def no_number_is_lost(box, result):
 def one(rng, box):
     contents, sets = made(rng)
     case = box.write("case.toml", contents)
-    (box.folder / "meshes").symlink_to(CASES / "meshes")
+    for folder in ("meshes", "profiles"):
+        (box.folder / folder).symlink_to(CASES / folder)
     checked = box.run("check", "--quick", case.name, *sets, statuses=(0, 2))
     if checked.status == 2:
         return refusal(checked, contents)

@@ -28,7 +28,7 @@ from sandbox import Finding, Sandbox
 #     FAST             how many cases belong to the fast tests
 #     one(rng, box)    makes and judges one case, all of it drawn from `rng`, in the Sandbox `box`: a word for the counts,
 #                      such as "refused" or "finished"; raises Finding
-FUZZERS = ("cases", "scenes", "surfaces", "results", "kills", "meshes", "commands", "coverage")
+FUZZERS = ("cases", "scenes", "surfaces", "results", "kills", "meshes", "starts", "commands", "coverage")
 
 
 class Campaign:

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <numbers>
 #include <stdexcept>
 #include <string_view>
 
 #include "common/case/read.hpp"
+#include "common/formula/formula.hpp"
+#include "common/shapes/profile_file.hpp"
 #include "surface3d/import/import_check.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "tests/support/paths.hpp"
@@ -140,6 +144,56 @@ std::vector<std::string> mesh_seeds() {
             '\3' + stl_binary(mesh)};
 }
 
+// ---- profiles and formulas
+
+void profile_text(Input input) {
+    try {
+        const SmoothProfile profile = read_profile(file_of(input, "csv"), {});
+        if (!profile.r.allFinite() || !profile.z.allFinite()) throw std::logic_error("a curve of nan or inf");
+    } catch (const ProfileError&) {
+    }
+}
+
+std::vector<std::string> profile_seeds() {
+    std::string ring, cell;
+    for (int i = 0; i <= 16; ++i) {
+        const double t = std::numbers::pi * i / 8, s = t / 2;
+        ring += fmt::format("{} {}\n", 2 + std::cos(i % 16 * std::numbers::pi / 8), std::sin(t) * (i % 8 != 0));
+        cell += fmt::format("{};{}\n", i % 16 == 0 ? 0 : std::sin(s), -1.5 * std::cos(s));
+    }
+    return {"r, z\n" + cell, "# a ring\n" + ring};
+}
+
+// Jets of a formula agree with it, and what looks for its limits does not end otherwise than by an answer.
+void formula_text(Input input) {
+    constexpr std::string_view names[] = {"H", "K", "H0"};
+    Formula formula;
+    try {
+        formula = parse_formula(text_of(input), names);
+    } catch (const FormulaError& error) {
+        if (error.column < 1 || error.column > input.size() + 1) throw std::logic_error("no such character");
+        return;
+    }
+    FormulaDomain domain(formula);
+    for (const double H : {-1.3, 0.0, 0.7}) {
+        const double at[] = {H, 0.4, -1};
+        domain.look(at, H);
+        const double value = evaluate(formula, at), again = evaluate(formula, at);
+        if (std::isfinite(value) && value != again) throw std::logic_error("two values at one place");
+        using J = Jet<double, 2, 2>;
+        const J jets[] = {J::variable(H, 0), J::variable(0.4, 1), J(-1.0)};
+        if (const double v = evaluate(formula, jets).v;
+            std::isfinite(value) && !(std::abs(v - value) <= 1e-9 * std::abs(value)))
+            throw std::logic_error(fmt::format("{} as a number, {} as a jet", value, v));
+    }
+    if (domain.margin().step != nullptr) words(domain.margin());
+}
+
+std::vector<std::string> formula_seeds() {
+    return {"0.1*log(1 + (H - H0)^2)", "exp(-K)/sqrt(1+H^2)", "-tanh(H)^3 + sinh(pi*K)*cosh(H)",
+            "atan(sin(H)+cos(K))^-2", "H^0.5"};
+}
+
 }  // namespace
 
 const std::vector<Target>& targets() {
@@ -147,6 +201,8 @@ const std::vector<Target>& targets() {
                                          {"override", override_text, override_seeds},
                                          {"scan", scan_text, scan_seeds},
                                          {"mesh", mesh_file, mesh_seeds},
+                                         {"profile", profile_text, profile_seeds},
+                                         {"formula", formula_text, formula_seeds},
                                          {"journal", journal_records, journal_seeds},
                                          {"journal_bytes", journal_bytes, journal_byte_seeds},
                                          {"result", result_parts, result_seeds},

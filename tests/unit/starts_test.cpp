@@ -121,8 +121,8 @@ TEST_F(ProfileFiles, RunEitherWayWithOrWithoutTheLastPoint) {
 
 TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     const std::string half = "0,-1\n.5,-.8\n.8,-.5\n", rest = ".9,.1\n.8,.3\n.7,.6\n.5,.8\n.3,.9\n0,1\n";
-    EXPECT_EQ(refusal(half + "x,0\n" + rest), "p.csv:4: 'x' is no finite number");
-    EXPECT_EQ(refusal(half + "1,nan\n" + rest), "p.csv:4: 'nan' is no finite number");
+    EXPECT_EQ(refusal(half + "x,0\n" + rest), "p.csv:4: 'x' is not a finite number");
+    EXPECT_EQ(refusal(half + "1,nan\n" + rest), "p.csv:4: 'nan' is not a finite number");
     EXPECT_EQ(refusal(half + "1,0,2\n" + rest), "p.csv:4: has 3 values where 2 are expected: r, z");
     EXPECT_EQ(refusal("a,b\n" + half + rest), "p.csv:1: a heading must name the columns r and z");
     EXPECT_EQ(refusal(half), "p.csv:3: 3 points are too few: a profile needs 9");
