@@ -1,5 +1,7 @@
 #include "axisym/graph/graph_run.hpp"
 
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -32,7 +34,10 @@ public:
     bool refine(const tubule::RunSummary& last) override {
         if (!run_->gave_up) return false;
         const double allowed = case_.accuracy.energy * last.reference_energy / stated_over_computed;
-        settings_ = tightened(settings_, run_->latest_error(), allowed, count_++);
+        const double of_space = std::abs(run_->latest_error().spatial);
+        const bool space_is_stuck = of_space > 0.5 * of_space_;
+        settings_ = tightened(settings_, run_->latest_error(), allowed, count_++, space_is_stuck);
+        of_space_ = of_space;
         return true;
     }
 
@@ -50,6 +55,7 @@ private:
     const Record* restart_;  // until the run goes on from it
     GraphSettings settings_;
     int count_ = 1;
+    double of_space_ = std::numeric_limits<double>::infinity();  // error of the attempt before the last
     std::optional<GraphAttempt> run_;  // the last one
 };
 

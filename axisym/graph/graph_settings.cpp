@@ -20,12 +20,14 @@ GraphSettings first_graph_settings(const Case& c) {
 
 // The error was caught when it passed what is allowed, not at its largest: the more often that happened, the bolder the
 // next try.
-GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt) {
+GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt,
+                        bool space_is_stuck) {
     const double boldness = attempt == 1 ? 1 : 0.3;
     const auto shrink = [&](double goal, double part) {
         return std::clamp(boldness * goal * allowed / part, 0.01, 0.6);
     };
-    const double of_time = std::abs(error.total - error.spatial), of_space = std::abs(error.spatial);
+    const double of_space = std::abs(error.spatial),
+                 of_time = std::abs(error.total - error.spatial) + (space_is_stuck ? of_space : 0);
     if (s.free_time && of_time > 0.3 * allowed)
         s.time_tolerance = std::max(s.time_tolerance * shrink(0.35, of_time), 1e-14);
     if (s.free_mesh && of_space > 0.3 * allowed) s.defect *= shrink(0.15, of_space);

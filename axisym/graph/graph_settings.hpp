@@ -18,7 +18,10 @@ struct GraphSettings {
 
 GraphSettings first_graph_settings(const Case& c);
 
-// After attempt number `attempt`, whose error (absolute) was beyond what is allowed.
-GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt);
+// After attempt number `attempt`, whose error (absolute) was beyond what is allowed. `space_is_stuck`: the attempt before
+// had the same error of space. What remains of Newton's iteration counts as such, and only a smaller tolerance of time
+// makes it smaller.
+GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt,
+                        bool space_is_stuck);
 
 }  // namespace tubule::axisym

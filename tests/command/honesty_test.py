@@ -73,6 +73,15 @@ accuracy = {energy = 1e-3}
 time = {end = 0.1}
 """
 
+# A straight tube: its mesh is exact, and what Newton's iteration leaves looks like an error of the mesh.
+STRAIGHT = """tier = "axisym"
+energy = {k20 = 0.2, H0 = -1.0}
+model = {tension = 1.5, pressure = 0.33333}
+shape = {kind = "tube", radius = 1.0, length = 2.0}
+accuracy = {energy = 1e-5}
+time = {end = 5.0}
+"""
+
 # Bending away from H = H0 by a small wave only: a small energy of terms that are large and cancel.
 CANCELLING = """tier = "axisym"
 energy = {k20 = 1.0, H0 = -1.0}
@@ -128,6 +137,25 @@ class Honesty(ProgramTest):
             self.assertEqual(end["stop"], "finished")
             self.assertGreater(end["estimated_error"], 0)
             self.assertLessEqual(end["estimated_error"], asked)
+
+    def test_a_straight_tube_comes_to_rest_as_accurately_as_asked(self):
+        """The radius at rest is that of least F(R), here by bisection of dF/dR, decreasing R first."""
+        end, rows = self.run_case(STRAIGHT)
+        self.assertEqual(end["stop"], "finished")
+
+        def free_energy(R):
+            return 4 * math.pi * R * (0.2 * (1 - 1 / R) ** 2 + 1.5) - 0.33333 * 2 * math.pi * R * R
+
+        def slope(R):
+            return 4 * math.pi * (0.2 * (1 - 1 / R) ** 2 + 1.5) + 4 * math.pi * 0.4 * (1 - 1 / R) / R - 0.33333 * 4 * math.pi * R
+
+        low, high = 0.2, 1.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if slope(middle) < 0 else (low, middle)
+        error = abs(rows["free_energy"][-1] - free_energy(low)) / end["E_ref"]
+        self.assertLessEqual(error, end["estimated_error"])
+        self.assertLessEqual(end["estimated_error"], end["asked_accuracy"])
 
     def test_instabilities_are_followed_as_accurately_as_stated(self):
         for case, at_end in UNSTABLE:
