@@ -157,7 +157,11 @@ int compare(const Case& c, const std::filesystem::path& file) {
 void report(const Case& c, const RunSummary& s, const std::string& file, double seconds) {
     const std::string when = c.moves() ? fmt::format(" at t = {:.6g}", s.stop.time) : "";
     say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
-    if (!s.stop.advice.empty()) say(stdout, "    {}\n", s.stop.advice);
+    const int status = exit_code(s.stop.reason);
+    const std::string about =
+        status == 3 || status == 4 ? fmt::format(" (docs/stopped_runs.md#{})", name(s.stop.reason)) : "";
+    if (!s.stop.advice.empty() || !about.empty())
+        say(stdout, "    {}{}\n", s.stop.advice.empty() ? "what to do" : s.stop.advice, about);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
     if (s.reference_energy > 0 && s.error_is_known())
         say(stdout, "    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
