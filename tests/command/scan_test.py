@@ -55,7 +55,9 @@ class ScanTest(ProgramTest):
         self.result = self.folder / "scan.hdf"
 
     def scan(self, *arguments, status=0):
-        return self.tubule("scan", *arguments, "-o", self.result, status=status)
+        """Anew, or with --resume; whatever scan is there may be replaced."""
+        anew = () if "--resume" in arguments else ("--overwrite",)
+        return self.tubule("scan", *arguments, *anew, "-o", self.result, status=status)
 
     def assert_same_points(self, one, other):
         """Everything except the times that the points took."""
@@ -299,6 +301,16 @@ class Refusals(ScanTest):
         text.write_text("mine")
         self.assertIn("is not a scan", self.scan("case.toml", "--over", f"{K42}=0,0.1", status=2)[1])
         self.assertEqual(text.read_text(), "mine")
+
+    def test_another_scan_is_kept(self):
+        self.scan("case.toml", "--over", f"{K42}=0,0.1")
+        before = self.result.read_bytes()
+        _, err = self.tubule("scan", "case.toml", "--over", f"{K42}=0,0.2", "-o", self.result, status=2)
+        self.assertIn("--overwrite", err)
+        self.assertEqual(self.result.read_bytes(), before)
+        self.tubule("scan", "case.toml", "--over", f"{K42}=0,0.1", "-o", self.result)  # the same may be made again
+        self.scan("case.toml", "--over", f"{K42}=0,0.2")
+        self.assertNotEqual(self.result.read_bytes(), before)
 
     def test_resume_with_another_scan(self):
         self.scan("case.toml", "--over", f"{K42}=0,0.1")

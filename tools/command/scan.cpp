@@ -30,7 +30,7 @@ struct ScanOptions {
     std::string output;
     std::vector<std::string> merge;  // results
     std::optional<int> jobs;
-    bool resume = false, extend = false, quiet = false;
+    bool resume = false, extend = false, overwrite = false, quiet = false;
 };
 
 // That of a case gets another name than its run.
@@ -98,6 +98,7 @@ ScanWriter new_result(const ScanOptions& options) {
     const Scan scan = read_scan(options.choices);
     const auto file = scan_path(options, scan);
     check_output(file);
+    if (!options.resume && !options.overwrite) refuse_to_replace_another_scan(scan, file);
     return open_result(scan, file, options.resume);
 }
 
@@ -184,6 +185,7 @@ void add_scan(CLI::App& app, int& exit_status) {
                       "run each point to time.end even where its outcome is known before");
     command->add_option("-o,--output", o->output, "result file (default: name of the scan, .hdf, in this directory)");
     command->add_flag("--resume", o->resume, "continue a scan that was interrupted or killed");
+    command->add_flag("--overwrite", o->overwrite, "replace the result of another scan");
     command->add_flag("--extend", o->extend,
                       "add the values of --over to the result FILE of a scan; points that are known are not run again");
     command->add_option("--merge", o->merge, "add the points of another scan of the same case to the result FILE")

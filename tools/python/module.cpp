@@ -220,7 +220,7 @@ py::object growth_rates(const Case& c, const Numbers& q, int m, std::optional<do
 // ---- scans
 
 py::dict scan(const Case& c, const std::vector<std::string>& over, const std::optional<std::string>& boundary,
-              const std::filesystem::path& file, std::optional<int> jobs, bool to_the_end) {
+              const std::filesystem::path& file, bool overwrite, std::optional<int> jobs, bool to_the_end) {
     Scan asked;
     asked.path = asked.case_path = c.path, asked.case_text = c.text, asked.sets = c.sets;
     for (const std::string& axis : over) asked.axes.push_back(parse_axis(axis));
@@ -234,6 +234,7 @@ py::dict scan(const Case& c, const std::vector<std::string>& over, const std::op
         }
     }
     check_scan(asked);
+    if (!overwrite) refuse_to_replace_another_scan(asked, file);
     const int threads = jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
     if (threads < 1) throw std::invalid_argument("jobs must be 1 or more");
     const ScanResult done = without_gil(1, [&] {

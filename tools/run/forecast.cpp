@@ -15,8 +15,9 @@
 namespace tubule {
 namespace {
 
-constexpr double pilot_limit = 2;          // seconds
-constexpr double reported_by_coarser = 4;  // cost of the runs of a pair
+constexpr double pilot_limit = 2;           // seconds
+constexpr double reported_by_coarser = 4;   // cost of the runs of a pair
+constexpr double most_extrapolated = 1000;  // a pilot that came to less of the run says nothing about it
 
 double memory_in_use() {
     rusage used{};
@@ -41,6 +42,7 @@ Forecast by_its_beginning(Case c) {
         if (pilot.moved()) out.steps = pilot.steps();
     } else if (pilot.moved()) {
         const double factor = pilot.all_by_done(c.time.end);
+        if (!(factor < most_extrapolated)) return out;
         out.steps = factor * pilot.steps();
         out.seconds = factor * seconds * (pilot.last_run() ? 1 : 1 + reported_by_coarser);
     }
@@ -63,7 +65,8 @@ Forecast forecast(const Case& c) {
 std::string words(const Forecast& f) {
     std::string out = f.resolution.empty() ? "" : f.resolution + "; ";
     if (f.steps) out += fmt::format("about {} steps, ", rounded(*f.steps));
-    out += f.seconds ? (*f.seconds < 1 ? "less than a second" : "about " + duration(*f.seconds)) : "unknown time";
+    out += f.seconds ? (*f.seconds < 1 ? "less than a second" : "about " + duration(*f.seconds))
+                     : "the time cannot be estimated: set time.limit";
     return out + fmt::format(", {} MB", rounded(f.bytes / 1e6));
 }
 

@@ -419,6 +419,8 @@ Stored load(const fs::path& path) {
     }
 }
 
+}  // namespace
+
 bool same_scan(const Scan& a, const Scan& b) {
     const auto same_axis = [](const Axis& x, const Axis& y) { return x.keys == y.keys && x.values == y.values; };
     const auto choice = [](const Scan& s) {
@@ -430,7 +432,18 @@ bool same_scan(const Scan& a, const Scan& b) {
            std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(), same_axis);
 }
 
-}  // namespace
+void refuse_to_replace_another_scan(const Scan& scan, const fs::path& file) {
+    if (!is_scan(file)) return;
+    try {
+        if (same_scan(read_scan_result(file).scan, scan)) return;
+    } catch (const std::runtime_error&) {
+        return;  // damaged: nothing of it can be used as it is
+    }
+    throw CaseError(fmt::format(
+        "{}: holds another scan than that of {}\n--overwrite replaces it, -o FILE keeps both, --extend adds "
+        "values to it",
+        file.string(), scan.path));
+}
 
 std::vector<std::size_t> ScanResult::shape() const {
     std::vector<std::size_t> shape;

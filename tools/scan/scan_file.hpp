@@ -57,6 +57,11 @@ private:
 // Whether the file is an HDF5 file with a scan in it. Never throws.
 bool is_scan(const std::filesystem::path& file);
 
+// Whether they have the same case, overrides, axes and choices, so that one may go on with the points of the other.
+bool same_scan(const Scan& a, const Scan& b);
+// Another scan may be needed: throws CaseError if the file has one that is not the same.
+void refuse_to_replace_another_scan(const Scan& scan, const std::filesystem::path& file);
+
 // Its journal included. Throws std::runtime_error naming the file.
 ScanResult read_scan_result(const std::filesystem::path& file);
 

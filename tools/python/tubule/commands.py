@@ -148,12 +148,13 @@ def _axis(key: str, values) -> str:
 
 
 def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: str | os.PathLike | None = None,
-         jobs: int | None = None, to_the_end: bool = False) -> Scan:
+         overwrite: bool = False, jobs: int | None = None, to_the_end: bool = False) -> Scan:
     """What becomes of a case over a grid of its keys, on all processors: `tubule scan`.
 
     over      by key: a sequence of values, or "low:high:count[:log]"
     boundary  only along the lines between outcomes ("outcome"), or around one of them
     output    a result file, which the program can draw, resume and extend
+    overwrite replace another scan in that file, which is refused otherwise
 
     >>> scan(tube, {"energy.k42": [0, 0.06]})["energy"].shape
     (2,)
@@ -161,7 +162,7 @@ def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: 
     axes = [_axis(key, values) for key, values in over.items()]
     with tempfile.TemporaryDirectory() as folder:
         file = os.fspath(output) if output is not None else str(Path(folder) / "scan.hdf")
-        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, jobs, to_the_end))
+        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, overwrite, jobs, to_the_end))
 
 
 def energy_density(H, K, **moduli):
