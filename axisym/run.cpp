@@ -13,6 +13,7 @@ namespace {
 bool begins_as_graph(const Case& c) {
     const MotionLaw law = motion_law(c.model);
     return std::holds_alternative<Tube>(c.shape) && law.unconstrained() && !law.loads_change() &&
+           !c.energy.H0_varies() &&
            c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "axisym/curve/curve_local.hpp"
 #include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
@@ -14,24 +15,7 @@ namespace {
 namespace stdx = std::experimental;
 constexpr int lanes = ProfileSpace::lanes;
 constexpr int wide = ProfileSpace::max_width;
-
-// A curve at the quadrature points of one group, from the coefficients of one element.
-struct Local {
-    Pack r{0.0}, r1{0.0}, r2{0.0}, z1, z2{0.0};
-    Local(const CurveSpace& space, int e, int g, const double* x) : z1(space.rise(x)) {
-        const auto& b = space.splines().basis(e, g);
-        const double* z = x + space.r().size();
-        for (int a = 0; a < space.splines().width(); ++a) {
-            const double cr = space.r().signs(e)[a] * x[space.r().dofs(e)[a]];
-            const double cz = space.z().signs(e)[a] * z[space.z().dofs(e)[a]];
-            r += cr * load(b.by_point[0][a]);
-            r1 += cr * load(b.by_point[1][a]);
-            r2 += cr * load(b.by_point[2][a]);
-            z1 += cz * load(b.by_point[1][a]);
-            z2 += cz * load(b.by_point[2][a]);
-        }
-    }
-};
+using Local = CurveLocal;
 
 // d log g/ds
 template <class S>
@@ -39,18 +23,36 @@ S stretching(const S& r1, const S& r2, const S& z1, const S& z2) {
     return (r1 * r2 + z1 * z2) * inverse(S(r1 * r1 + z1 * z1));
 }
 
+// H0 at a group of points, where it varies.
+struct PointH0 {
+    Pack value{0.0}, tension{0.0};
+    PointH0(const VaryingH0& H0, int group) {
+        if (H0.empty()) return;
+        value = H0.value[group];
+        if (!H0.tension.empty()) tension = H0.tension[group];
+    }
+};
+
 // The functional per unit of s, with derivatives with respect to (r, r', r'', z', z'').
-template <int Order, Added added = Added::any>
-Jet<Pack, 5, Order> functional_density(const Bending& bending, const Weights& w, const Local& at) {
+template <int Order, Added added = Added::any, bool varies = true>
+Jet<Pack, 5, Order> functional_density(const Bending& bending, const PointH0& H0, const Weights& w, const Local& at) {
     using J = Jet<Pack, 5, Order>;
-    const J r = J::variable(at.r, 0), r1 = J::variable(at.r1, 1), r2 = J::variable(at.r2, 2),
-            z1 = J::variable(at.z1, 3), z2 = J::variable(at.z2, 4);
     J sum;
     if (w.energy != 0 || w.area != 0) {
-        const auto p = profile_point(r, r1, r2, z1, z2);
-        const auto f = density<Pack, added>(bending, p.H.v, p.K.v);
-        sum = p.area * (w.energy * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK) + w.area);
+        const auto p = at.point<Order>();
+        const auto of = [&](const CurvatureJet<Pack>& f) {
+            return w.energy * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+        };
+        if constexpr (varies) {
+            J tension;
+            tension.v = w.energy * H0.tension + w.area;
+            sum = p.area * (of(density_at<Pack, added>(bending, H0.value, p.H.v, p.K.v)) + tension);
+        } else {
+            sum = p.area * (of(density<Pack, added>(bending, p.H.v, p.K.v)) + w.area);
+        }
     }
+    const J r = J::variable(at.r, 0), r1 = J::variable(at.r1, 1), r2 = J::variable(at.r2, 2),
+            z1 = J::variable(at.z1, 3), z2 = J::variable(at.z2, 4);
     if (w.volume != 0) sum += (w.volume * pi) * (r * r * z1);
     if (w.gauge != 0) {
         const J q = stretching(r1, r2, z1, z2);
@@ -59,8 +61,12 @@ Jet<Pack, 5, Order> functional_density(const Bending& bending, const Weights& w,
     return sum;
 }
 
-// Derivatives that r and z enter with: of r the zeroth to second, of z the first and second.
-constexpr int first_derivative[2] = {0, 1}, first_variable[2] = {0, 3};
+// kernel<added, varies>() of this energy.
+template <class Kernel>
+auto by_energy(const Bending& bending, const Kernel& kernel) {
+    if (bending.H0_varies()) return kernel.template operator()<Added::any, true>();
+    return by_added(bending, [&]<Added added>() { return kernel.template operator()<added, false>(); });
+}
 
 }  // namespace
 
@@ -99,8 +105,9 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
 }
 
 template <int P>
-[[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const double* x, double* out) const {
-    const auto kernel = [&]<Added added>() -> bool {
+[[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const VaryingH0& H0, const double* x,
+                                                  double* out) const {
+    const auto kernel = [&]<Added added, bool varies>() -> bool {
         const ProfileSpace& splines = space_.splines();
         Pack smallest{std::numeric_limits<double>::infinity()}, rise{0.0};
         for (int e = 0; e < splines.elements(); ++e) {
@@ -109,7 +116,8 @@ template <int P>
                 const auto& basis = splines.basis(e, g);
                 const Local at(space_, e, g, x);
                 smallest = stdx::min(smallest, at.r);
-                const auto density = functional_density<1, added>(bending_, weights, at);
+                const auto density =
+                    functional_density<1, added, varies>(bending_, {H0, e * splines.groups() + g}, weights, at);
                 const Pack weight = images_ * load(basis.weight);
                 alignas(32) double c[5][lanes];
                 for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
@@ -134,12 +142,13 @@ template <int P>
         if (space_.free_period()) out[space_.shape_size()] += stdx::reduce(rise);
         return stdx::hmin(smallest) > 0;
     };
-    return by_added(bending_, kernel);
+    return by_energy(bending_, kernel);
 }
 
 template <int P>
-[[gnu::flatten]] void CurveForms::hessian_kernel(const Weights& weights, const double* x, double* values) const {
-    const auto kernel = [&]<Added added>() -> void {
+[[gnu::flatten]] void CurveForms::hessian_kernel(const Weights& weights, const VaryingH0& H0, const double* x,
+                                                 double* values) const {
+    const auto kernel = [&]<Added added, bool varies>() -> void {
         constexpr int w = P + 1;
         const ProfileSpace& splines = space_.splines();
         for (int e = 0; e < splines.elements(); ++e) {
@@ -147,7 +156,8 @@ template <int P>
             std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
             for (int g = 0; g < splines.groups(); ++g) {
                 const auto& basis = splines.basis(e, g);
-                const auto density = functional_density<2, added>(bending_, weights, Local(space_, e, g, x));
+                const auto density = functional_density<2, added, varies>(bending_, {H0, e * splines.groups() + g},
+                                                                          weights, Local(space_, e, g, x));
                 const Pack weight = images_ * load(basis.weight);
                 alignas(32) double c[5][5][lanes];
                 for (int i = 0; i < 5; ++i)
@@ -182,18 +192,38 @@ template <int P>
                 }
         }
     };
-    return by_added(bending_, kernel);
+    return by_energy(bending_, kernel);
+}
+
+void CurveForms::fix_H0(const Eigen::VectorXd& x) {
+    fixed_H0_ = tubule::axisym::fix_H0(space_, *bending_.H0_formula, x);
+    fixed_on_ = x;
+}
+
+std::vector<double> CurveForms::H0_at(const Eigen::VectorXd& x, const std::vector<double>& s) const {
+    if (!bending_.H0_varies()) return std::vector<double>(s.size(), bending_.H0);
+    const Eigen::VectorXd& curve = H0_by_area() ? x : fixed_on_;
+    std::vector<double> out = area_below(space_, curve, s);
+    for (std::size_t i = 0; i < s.size(); ++i) {
+        const CurvePoint p = space_.evaluate(curve, s[i]);
+        const double variables[]{out[i], p.r, p.z};
+        out[i] = evaluate(*bending_.H0_formula, variables);
+    }
+    return out;
 }
 
 bool CurveForms::add_gradient(const Weights& weights, const double* x, double* out) const {
-    const bool inside =
-        for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, x, out); });
-    return inside &&
-           (bending_.terms.empty() || std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
+    const bool inside = with_H0(x, [&](const VaryingH0& H0) {
+        return for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, H0, x, out); });
+    });
+    return inside && ((bending_.terms.empty() && !bending_.H0_varies()) ||
+                      std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
 
 void CurveForms::add_hessian(const Weights& weights, const double* x, double* values) const {
-    for_degree(space_.splines().degree(), [&](auto P) { hessian_kernel<P()>(weights, x, values); });
+    with_H0(x, [&](const VaryingH0& H0) {
+        for_degree(space_.splines().degree(), [&](auto P) { hessian_kernel<P()>(weights, H0, x, values); });
+    });
     if (!space_.free_period()) return;
     const int rise = space_.shape_size();
     double* column = values + pattern_.outerIndexPtr()[rise];  // all rows, in order
@@ -210,7 +240,8 @@ void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
-            const auto density = functional_density<2>(bending_, weights, Local(space_, e, g, x));
+            const PointH0 H0(fixed_H0_, e * splines.groups() + g);
+            const auto density = functional_density<2>(bending_, H0, weights, Local(space_, e, g, x));
             const Pack weight = images_ * load(basis.weight);
             const int z1 = first_variable[1];
             add(space_.shape_size(), stdx::reduce(weight * density.dd[packed<5>(z1, z1)]));
@@ -233,11 +264,73 @@ double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& 
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
-            const auto density = functional_density<1>(bending_, weights, at);
+            const PointH0 H0(fixed_H0_, e * splines.groups() + g);
+            const auto density = functional_density<1>(bending_, H0, weights, at);
             sum += load(splines.basis(e, g).weight) *
                    (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
         }
     return images_ * stdx::reduce(sum);
+}
+
+namespace {
+
+// The rows that r and z are tested with.
+template <int Order>
+std::array<Jet<Pack, 5, Order>, 2> sliding_rows(const Bending& bending, const VaryingH0& H0, int group,
+                                                const Local& at) {
+    using J = Jet<Pack, 5, Order>;
+    const auto p = at.point<Order>();
+    const SlopeInH0<Pack> f0 = slope_in_H0(bending, H0.value[group], p.H.v, p.K.v);
+    const J push = chain(p.H, p.K, f0.f, f0.H, f0.K, Pack(0.0), Pack(0.0), Pack(0.0));
+    J slope;
+    slope.v = H0.slope[group];
+    const J common = push * slope * p.area * p.inverse_speed * p.inverse_speed;
+    return {common * J::variable(at.r1, 1), common * J::variable(at.z1, 3)};
+}
+
+}  // namespace
+
+void CurveForms::add_sliding(const double* x, double* out) const {
+    const ProfileSpace& splines = space_.splines();
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Pack weight = images_ * load(basis.weight);
+            const auto rows = sliding_rows<1>(bending_, fixed_H0_, e * splines.groups() + g, Local(space_, e, g, x));
+            for (int field = 0; field < 2; ++field) {
+                const Field& f = field == 0 ? space_.r() : space_.z();
+                double* to = field == 0 ? out : out + space_.r().size();
+                for (int a = 0; a < splines.width(); ++a)
+                    to[f.dofs(e)[a]] +=
+                        f.signs(e)[a] * stdx::reduce(weight * rows[field].v * load(basis.by_point[0][a]));
+            }
+        }
+}
+
+void CurveForms::add_sliding_slopes(const double* x, double* values) const {
+    const ProfileSpace& splines = space_.splines();
+    const int w = splines.width();
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const auto& basis = splines.basis(e, g);
+            const Pack weight = images_ * load(basis.weight);
+            const auto rows = sliding_rows<1>(bending_, fixed_H0_, e * splines.groups() + g, Local(space_, e, g, x));
+            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+            for (int b = 0; b < 2 * w; ++b) {
+                const int by = b / w;
+                const double sign = (by == 0 ? space_.r() : space_.z()).signs(e)[b % w];
+                for (int of = 0; of < 2; ++of) {
+                    Pack slope{0.0};
+                    for (int d = first_derivative[by]; d < 3; ++d)
+                        slope +=
+                            rows[of].d[first_variable[by] + d - first_derivative[by]] * load(basis.by_point[d][b % w]);
+                    const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
+                    for (int a = 0; a < w; ++a)
+                        values[slot[b * 2 * w + of * w + a]] +=
+                            sign * signs[a] * stdx::reduce(weight * slope * load(basis.by_point[0][a]));
+                }
+            }
+        }
 }
 
 Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::VectorXd& x) const {
@@ -249,7 +342,11 @@ Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::Vector
 Eigen::SparseMatrix<double> CurveForms::hessian(const Weights& weights, const Eigen::VectorXd& x) const {
     Eigen::SparseMatrix<double> out = pattern_;
     add_hessian(weights, x.data(), out.valuePtr());
-    return out;
+    if (!H0_by_area() || weights.energy == 0) return out;
+    Eigen::MatrixXd full = weights.energy * H0ByArea(space_, bending_, x.data()).hessian_beyond();
+    for (int j = 0; j < out.cols(); ++j)
+        for (Eigen::SparseMatrix<double>::InnerIterator it(out, j); it; ++it) full(it.row(), j) += it.value();
+    return full.sparseView(1, -1);  // zeros included
 }
 
 double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const {
@@ -304,11 +401,13 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
     const ProfileSpace& splines = space_.splines();
     DensityDomain domain(bending_);
     if (!domain.restricted()) return {};
+    const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            for (int i = 0; i < lanes; ++i) domain.look(p.H[i], p.K[i], splines.basis(e, g).z[i]);
+            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            for (int i = 0; i < lanes; ++i) domain.look(at_H0[i], p.H[i], p.K[i], splines.basis(e, g).z[i]);
         }
     return domain.margin();
 }
@@ -316,6 +415,7 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
 CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
     const ProfileSpace& splines = space_.splines();
     const int n = splines.elements();
+    const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     CurveObservation o;
     Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0};
     std::vector<Pack> terms(count_terms(bending_), Pack(0.0));
@@ -331,8 +431,10 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
             volume += pi * weight * at.r * at.r * at.z1;
             gauge += 0.5 * weight * q * q;
             length += weight * speed;
-            for_each_value(bending_, p.H, p.K, [&](std::size_t i, const Pack& value) { terms[i] += value * dA; });
-            const auto f = density(bending_, p.H, p.K);
+            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            for_each_value_at(bending_, at_H0, p.H, p.K,
+                              [&](std::size_t i, const Pack& value) { terms[i] += value * dA; });
+            const auto f = density_at(bending_, at_H0, p.H, p.K);
             const Pack s = principal_symbol(f, p.kappa_theta);
             const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
             o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
@@ -390,13 +492,15 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
 
 double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
     const ProfileSpace& splines = space_.splines();
+    const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     double magnitude = 0;
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
             const Pack dA = p.area * load(splines.basis(e, g).weight);
-            for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, p.H[i], p.K[i]) * dA[i];
+            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
         }
     return std::max(std::abs(observe(x).energy), images_ * magnitude);
 }

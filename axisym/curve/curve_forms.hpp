@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "axisym/curve/varying_H0.hpp"
 #include "axisym/splines/curve_space.hpp"
 #include "common/energy/bending.hpp"
 
@@ -46,6 +47,11 @@ public:
     const CurveSpace& space() const { return space_; }
     const Bending& bending() const { return bending_; }
     void set_bending(const Bending& bending) { bending_ = bending; }
+    // Where H0 varies it is a function of the area below a point, until this fixes it to the parameters: H0 of s is
+    // then what the formula gives at the point s of the curve x. Throws std::invalid_argument where that is no number.
+    void fix_H0(const Eigen::VectorXd& x);
+    // H0 at the parameters `s`, ascending, of the curve x; or the number.
+    std::vector<double> H0_at(const Eigen::VectorXd& x, const std::vector<double>& s) const;
 
     // Not finite or meaningless unless r > 0 at all quadrature points: see admissible().
     double value(const Weights& weights, const Eigen::VectorXd& x) const;
@@ -54,9 +60,14 @@ public:
     // defined.
     bool add_gradient(const Weights& weights, const double* x, double* out) const;
     Eigen::SparseMatrix<double> hessian(const Weights& weights, const Eigen::VectorXd& x) const;
-    // As above, added to the values of a matrix with pattern().
+    // As above, added to the values of a matrix with pattern(); not where H0 is a function of the area below, where the
+    // matrix is full.
     void add_hessian(const Weights& weights, const double* x, double* values) const;
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    // INT f_H0 dH0/ds (dX.t)/g dS, the power of the force along the curve that a fixed H0 exerts, theory.md (4.15):
+    // added to a gradient it leaves the force along the normal. And its derivatives, which are not symmetric.
+    void add_sliding(const double* x, double* out) const;
+    void add_sliding_slopes(const double* x, double* values) const;
     // The derivative along the displacement z e_z, which stretches a curve along the axis: theory.md (3.19).
     double stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const;
     // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
@@ -72,9 +83,17 @@ public:
 
 private:
     template <int P>
-    bool gradient_kernel(const Weights& weights, const double* x, double* out) const;
+    bool gradient_kernel(const Weights& weights, const VaryingH0& H0, const double* x, double* out) const;
     template <int P>
-    void hessian_kernel(const Weights& weights, const double* x, double* values) const;
+    void hessian_kernel(const Weights& weights, const VaryingH0& H0, const double* x, double* values) const;
+    bool H0_by_area() const { return bending_.H0_varies() && fixed_H0_.empty(); }
+    // use(what H0 is at the points of the curve x, if it varies)
+    template <class Use>
+    auto with_H0(const double* x, const Use& use) const {
+        if (H0_by_area()) return use(H0ByArea(space_, bending_, x).at_points());
+        return use(fixed_H0_);
+    }
+    Pack H0_of(const VaryingH0& H0, int group) const { return H0.empty() ? Pack(bending_.H0) : H0.value[group]; }
     FormulaDomain::Margin domain(const Eigen::VectorXd& x) const;
     template <class Add>
     void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
@@ -82,6 +101,8 @@ private:
 
     const CurveSpace& space_;
     Bending bending_;
+    VaryingH0 fixed_H0_;  // empty before fix_H0()
+    Eigen::VectorXd fixed_on_;
     double images_;
     Eigen::SparseMatrix<double> pattern_;
     std::vector<int> slots_;  // place in pattern_ of the local matrix entries of each element, column by column

@@ -92,8 +92,12 @@ struct MakeMeridian {
 
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy) {
     const CurveSpace& space = motion.space();
-    const std::vector<Sample> samples = sample_profile(
-        space, [&](double s) { return sample(motion, state, s); }, [](Sample& image) { image.u_t = -image.u_t; });
+    std::vector<double> parameters;
+    const auto sample_at = [&](double s) {
+        parameters.push_back(s);
+        return sample(motion, state, s);
+    };
+    const std::vector<Sample> samples = sample_profile(space, sample_at, [](Sample& image) { image.u_t = -image.u_t; });
 
     Record out;
     out.time = time, out.kind = RecordKind::curve;
@@ -106,6 +110,8 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K), add("u_n", &Sample::u_n);
     if (motion.law().inextensible) add("u_t", &Sample::u_t), add("p", &Sample::p);
     if (motion.law().swirls) add("u_theta", &Sample::u_theta);
+    if (motion.forms().bending().H0_varies())  // of a whole cell or period
+        out.arrays.push_back(array("H0", motion.forms().H0_at(state.y.head(space.size()), parameters)));
     restart_fields(RecordWriter(out), state);
     return out;
 }

@@ -20,8 +20,8 @@ struct CurveRestart {
 
 // Numbers energy, length (of a period, or 0), velocities without the part (L_t/L) z e_z of a period L that is free;
 // sampled from pole to pole or over a period, in order along the profile: r, z, H, K, u_n (normal velocity), and of a
-// flow u_t (along the profile, in the order of the points), p (pressure), u_theta (if it swirls); the restart state
-// under names that begin with restart_.
+// flow u_t (along the profile, in the order of the points), p (pressure), u_theta (if it swirls), H0 (if it varies);
+// the restart state under names that begin with restart_.
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy);
 
 // Throws as RecordReader.

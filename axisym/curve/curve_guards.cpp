@@ -41,7 +41,7 @@ std::span<const CurveGuard> curve_guards() {
              return StopReport{Stop::mesh_lost, time,
                                fmt::format("the parametrisation speed varies by a factor {:.3g} along the profile",
                                            s.o.g_max / s.o.g_min),
-                               "set discretisation.parametrisation = \"even\""};
+                               "set discretisation.parametrisation = \"even\", which a number for energy.H0 allows"};
          }}};
     return list;
 }

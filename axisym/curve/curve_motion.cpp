@@ -52,6 +52,12 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     std::array<S, n_rows> out;
     for (S& x : out) x = S(0.0);
     const S z_t = f.z_t - n.stretch * f.v[z0];  // less the motion of the stretching
+    if (!law.inextensible && law.lagrangian) {
+        const S dS = (2 * pi) * (r * (g2 * ig));
+        out[kr] = dS * f.r_t;
+        out[kz] = dS * f.z_t;
+        return out;
+    }
     if (!law.inextensible) {
         const S rate = (2 * pi) * (r * (f.r_t * z_s - z_t * r_s));  // X_t.nu dS/g
         out[kr] = rate * z_s * ig + shift * (2 * pi) * (r * r_s);
@@ -319,6 +325,7 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     };
     add_gradient(force_weights(t, y), law_.inextensible ? F + at_.u_r : F);
     add_gradient(drift_weights(y), F);
+    if (slides()) forms_.add_sliding(y, F);
     const double A = stdx::reduce(area) - area0_, V = stdx::reduce(volume) - volume0_;
     if (at_.area >= 0) F[at_.area] = A;
     if (at_.tension >= 0) F[at_.tension] = A;
@@ -499,6 +506,10 @@ void CurveMotion::add_forms(double t, const double* y, double* values) const {
     };
     add(force_weights(t, y), law_.inextensible ? momentum_slots_ : curve_slots_);
     add(drift_weights(y), curve_slots_);
+    if (!slides()) return;
+    std::fill(entries.begin(), entries.end(), 0.0);
+    forms_.add_sliding_slopes(y, entries.data());
+    for (std::size_t i = 0; i < entries.size(); ++i) values[curve_slots_[i]] += entries[i];
 }
 
 // Contributions of the multipliers of area and volume.

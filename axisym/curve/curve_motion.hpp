@@ -22,7 +22,7 @@ struct CurveLaw : MotionLaw {
     // both are the same condition, and one is enough; where it does not vary at all (a sphere, a straight tube), lambda
     // nu and a constant pressure are the same force, and keeps_volume must be false, since div u = 0 keeps the volume.
     bool holds_area = true, holds_volume = true;
-    bool lagrangian = false;  // the parametrisation is material, X_t = u, instead of even
+    bool lagrangian = false;  // the parametrisation is material, X_t = u, instead of even; u is X_t.nu in gradient flow
     bool swirls = false;      // u has a component around the axis
 };
 
@@ -48,7 +48,8 @@ struct MotionLayout {
 //   (q, div u - supply) = 0,  dV[u] = 0
 // with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
-// dJ[phi] = 0. A pressure that is given stands for -lambda. A free period adds (L_t/L) z e_z to u, and the test
+// dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
+// pressure that is given stands for -lambda. A free period adds (L_t/L) z e_z to u, and the test
 // function z e_z. Many fields: besides the problem, the places of all its terms in the matrix, found once.
 class CurveMotion {
 public:
@@ -62,6 +63,8 @@ public:
     const CurveForms& forms() const { return forms_; }
     const CurveLaw& law() const { return law_; }
     const MotionLayout& layout() const { return at_; }
+    // Before anything else where H0 varies: see CurveForms. The parametrisation must be material.
+    void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
     const Field& pressures() const { return pressure_; }
 
     // F(t, y, rate). False where r <= 0 at a quadrature point: try a smaller step.
@@ -94,6 +97,7 @@ public:
 private:
     struct Local;
     void set_pattern();
+    bool slides() const { return !law_.inextensible && forms_.bending().H0_varies(); }
     Weights force_weights(double t, const double* y) const;
     Weights drift_weights(const double* y) const;
     Eigen::VectorXd stretched(const double* y) const;

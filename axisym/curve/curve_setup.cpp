@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "axisym/curve/curve_frame.hpp"
+#include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 #include "common/run/output_times.hpp"
@@ -75,11 +76,22 @@ std::unique_ptr<CurveSpace> space_of(const Case& c, const Meridian& meridian, co
                                         motion_law(c.model).free_period);
 }
 
+// H0 goes with the points of this start.
+void fix_H0(const Case& c, CurveForms& forms, const Eigen::VectorXd& x) {
+    if (!c.energy.H0_varies()) return;
+    try {
+        forms.fix_H0(x);
+    } catch (const std::invalid_argument& error) {
+        throw complaint(c, "energy.H0", error.what());
+    }
+}
+
 }  // namespace
 
 CurveLaw law_of(const Case& c) {
     CurveLaw law = motion_law(c.model);
-    law.lagrangian = law.inextensible && c.discretisation.parametrisation != Parametrisation::even;
+    law.lagrangian =
+        c.energy.H0_varies() || (law.inextensible && c.discretisation.parametrisation != Parametrisation::even);
     law.swirls = c.velocity.initial == InitialVelocity::rotation;
     return law;
 }
@@ -87,7 +99,7 @@ CurveLaw law_of(const Case& c) {
 Beginning beginning_of(const Case& c) {
     Meridian whole = start_meridian(c);
     std::optional<StartVelocity> velocity = start_velocity(c);
-    if (!velocity && c.discretisation.symmetry &&
+    if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() &&
         (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
@@ -107,8 +119,9 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
     space = space_of(c, start.meridian, first_breaks(arc, settings, c, least_seam));
-    const CurveForms forms(*space, c.energy);
+    CurveForms forms(*space, c.energy);
     const Eigen::VectorXd x = fit(*space, arc);
+    fix_H0(c, forms, x);
     const FormulaDomain::Margin domain = forms.observe(x).domain;
     require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
@@ -123,6 +136,7 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     if (keeps_both && variation <= same_everywhere) law.keeps_volume = false;
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
+    if (c.energy.H0_varies()) motion->fix_H0(x);
 }
 
 FlowSystem CurveSetup::system() const {
@@ -163,7 +177,10 @@ TimeControl CurveSetup::control(double first_step) const {
 CurveObservation observe_start(const CurveSetup& setup) {
     const ArcLength arc(setup.start.meridian);
     const auto space = space_of(setup.c, setup.start.meridian, first_breaks(arc, setup.settings, setup.c, 0));
-    return CurveForms(*space, setup.c.energy).observe(fit(*space, arc));
+    const Eigen::VectorXd x = fit(*space, arc);
+    CurveForms forms(*space, setup.c.energy);
+    fix_H0(setup.c, forms, x);
+    return forms.observe(x);
 }
 
 namespace {

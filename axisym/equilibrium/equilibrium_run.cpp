@@ -92,6 +92,28 @@ Meridian start_of(Family family, double reduced, double area) {
     return scaled(shape, std::sqrt(area / area_and_volume(shape)[0]));
 }
 
+// H0 of the area is a number everywhere, and the same on both sides of a plane of symmetry.
+void check_varying_H0(const Case& c, const Meridian& start) {
+    if (!c.energy.H0_varies()) return;
+    constexpr int points = 256;
+    const auto H0 = [&](double area) {
+        const double variables[]{area, 0, 0};
+        return evaluate(*c.energy.H0_formula, variables);
+    };
+    const bool symmetric = start.topology == Topology::half_tube || start.topology == Topology::half_cell;
+    for (int i = 0; i <= points; ++i) {
+        const double area = static_cast<double>(i) / points, here = H0(area), there = H0(1 - area);
+        if (!std::isfinite(here))
+            throw complaint(c, "energy.H0", fmt::format("is no number where {:.4g} of the area is below", area));
+        if (symmetric && std::abs(here - there) > 1e-6 * (1 + std::abs(here)))
+            throw complaint(
+                c, "energy.H0",
+                fmt::format("must be mirror-symmetric as this shape is, but at {:.4g} and {:.4g} of the area "
+                            "it is {:.6g} and {:.6g}",
+                            area, 1 - area, here, there));
+    }
+}
+
 // What the constraints ask for.
 double wanted_reduced_volume(const Constraints& held) {
     return held.reduced_volume ? *held.reduced_volume : reduced_volume(*held.area, *held.volume);
@@ -106,6 +128,7 @@ Task task_of(const Case& c) {
     } catch (const std::invalid_argument& error) {
         throw CaseError(fmt::format("{}: shape: {}", c.path, error.what()));
     }
+    check_varying_H0(c, task.start);
     const auto [area, volume] = area_and_volume(task.start);
     task.problem.bending = c.energy;
     task.problem.loads = loads_at(motion_law(c.model), 0);
@@ -162,6 +185,21 @@ Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
 
 int elements_of(const Equilibrium& e) {
     return e.space->images() * e.space->splines().elements();
+}
+
+// At the points of a frame, of half a shape with their images.
+std::vector<double> samples_of_H0(const Case& c, const Equilibrium& e) {
+    std::vector<double> s;
+    sample_profile(
+        *e.space,
+        [&](double at) {
+            s.push_back(at);
+            return sample(*e.space, e.x, at);
+        },
+        [](Sample&) {});
+    std::vector<double> out = CurveForms(*e.space, c.energy).H0_at(e.x, s);
+    if (e.space->images() == 2) out.insert(out.end(), out.rbegin() + 1, out.rend());
+    return out;
 }
 
 // What the values of a row come from: a shape.
@@ -275,6 +313,10 @@ private:
             out.arrays.push_back(std::move(a));
         };
         add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K);
+        if (c_.energy.H0_varies()) {
+            std::vector<double> H0 = samples_of_H0(c_, e);
+            out.arrays.push_back({"H0", {H0.size()}, std::move(H0)});
+        }
         for (const ModeRates& mode : modes)
             out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
         return out;

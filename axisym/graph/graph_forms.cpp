@@ -322,7 +322,7 @@ FormulaDomain::Margin Forms::domain(const double* x) const {
             for (const double z : space_.basis(e, g).z) {
                 const auto [r, r1, r2] = space_.evaluate(x, e, z);
                 const auto p = graph_point(r, r1, r2);
-                domain.look(p.H, p.K, z);
+                domain.look(bending_.H0, p.H, p.K, z);
             }
     return domain.margin();
 }

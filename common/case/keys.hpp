@@ -3,6 +3,7 @@
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
 //   ramp       a number, or a table of times and values                    key, target
 //   formula    a text that is a formula                                    key, target, its variables
+//   number_or_formula                                                      key, both targets, its variables
 //   absent     a key that belongs to other cases, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
 //   table, optional_table, tables (a list of tables), entries (tables under open names)    key, target, description
@@ -25,6 +26,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/energy/H0_variables.hpp"
 #include "common/series/catalogue.hpp"
 
 namespace tubule {
@@ -85,13 +87,13 @@ inline std::string repeated_term(const Bending& energy, std::size_t number) {
 }
 
 template <class Keys>
-void keys(Keys& k, Bending& energy) {
+void keys(Keys& k, Bending& energy, Tier tier) {
     std::string moduli;
     for_each_bending_term([&](std::size_t i, const auto& term) {
         k.number(term.key, energy.k[i]);
         moduli += (moduli.empty() ? "" : ", ") + std::string(term.key);
     });
-    k.number("H0", energy.H0);
+    k.number_or_formula("H0", energy.H0, energy.H0_formula, tier == Tier::surface3d ? H0_of_surface : H0_of_profile);
     k.tables("term", energy.terms, [](auto& k, EnergyTerm& term) { keys(k, term); });
     for (std::size_t i = 0; i < energy.terms.size(); ++i) {
         energy.terms[i].entry = i;
@@ -415,10 +417,37 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     });
 }
 
+// Of a spontaneous curvature that varies: what has no law for it. Long: a line for each.
+template <class Keys>
+void check_varying_H0(Keys& k, const Case& c) {
+    if (!c.energy.H0_varies()) return;
+    const std::string number = "must be a number ";
+    k.check("energy.H0", [&]() -> std::string {
+        const MotionLaw law = motion_law(c.model);
+        if (c.tier == Tier::automatic)
+            return number + "in tier \"auto\", whose growth rates are those of a constant H0; try tier = \"axisym\"";
+        if (c.tier == Tier::surface3d) return number + "in tier \"surface3d\"; try tier = \"axisym\"";
+        if (law.free_period) return number + "with model.period = \"free\"; keep the period fixed";
+        if (!c.equilibrium) return {};
+        if (uses(*c.energy.H0_formula, 1) || uses(*c.energy.H0_formula, 2))
+            return "must be a formula of area alone in a case with [equilibrium], where no point has a place at the "
+                   "start";
+        if (c.equilibrium->modes) return number + "with equilibrium.modes; leave the modes out";
+        if (c.equilibrium->branch.parameter == vary_H0) return number + "where the branch varies it";
+        return {};
+    });
+    k.check("discretisation.parametrisation", [&]() -> std::string {
+        const auto chosen = c.discretisation.parametrisation;
+        if (!chosen || *chosen == Parametrisation::material) return {};
+        return "must be \"material\" or absent where energy.H0 varies: it goes with the points of the profile";
+    });
+}
+
 // Conditions across tables.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);
+    check_varying_H0(k, c);
     k.check("velocity.initial", [&] {
         return c.velocity.initial == InitialVelocity::result && !std::holds_alternative<ResultFrame>(c.shape)
                    ? "must not be \"result\": only shape.kind = \"result\" has a velocity"
@@ -466,7 +495,7 @@ void check_together(Keys& k, const Case& c) {
         if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained() || law.loads_change()))
             return "must not be \"graph\": only the gradient flow of a tube with free volume and area, under tension "
                    "and pressure that do not change, is computed as a graph";
-        if (chosen == Parametrisation::material && !law.inextensible)
+        if (chosen == Parametrisation::material && !law.inextensible && !c.energy.H0_varies())
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
     });
@@ -532,7 +561,7 @@ void keys(Keys& k, Case& c) {
         k.text("title", c.title);
         k.text("source", c.source);
     });
-    k.table("energy", [&](auto& k) { keys(k, c.energy); });
+    k.table("energy", [&](auto& k) { keys(k, c.energy, c.tier); });
     if (c.tier != Tier::automatic) k.absent("auto", "must be absent: only valid with tier = \"auto\"");
     if (c.tier == Tier::axisym)
         motion_keys(k, c);

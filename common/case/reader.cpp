@@ -161,12 +161,32 @@ void Reader::formula(const std::string& key, std::shared_ptr<const Formula>& tar
     if (!node) return;
     collect([&] {
         if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
-        try {
-            target = std::make_shared<const Formula>(parse_formula(node->as_string()->get(), variables));
-        } catch (const FormulaError& error) {
-            throw CaseErrors({{where_in(*node, error.column), path_of(key),
-                               fmt::format("{}, character {}: {}", path_of(key), error.column, error.what()), ""}});
-        }
+        target = formula_in(*node, key, variables);
+    });
+}
+
+std::shared_ptr<const Formula> Reader::formula_in(const toml::node& node, const std::string& key,
+                                                  std::span<const std::string_view> variables) const {
+    try {
+        return std::make_shared<const Formula>(parse_formula(node.as_string()->get(), variables));
+    } catch (const FormulaError& error) {
+        throw CaseErrors({{where_in(node, error.column), path_of(key),
+                           fmt::format("{}, character {}: {}", path_of(key), error.column, error.what()), ""}});
+    }
+}
+
+void Reader::number_or_formula(const std::string& key, double& number, std::shared_ptr<const Formula>& formula,
+                               std::span<const std::string_view> variables) {
+    const std::string what = "a number, or a formula of " + fmt::format("{}", fmt::join(variables, ", "));
+    const toml::node* node = find(key, what, false);
+    if (!node) return;
+    collect([&] {
+        if (node->is_number())
+            number = number_in(*node, path_of(key), {});
+        else if (node->is_string())
+            formula = formula_in(*node, key, variables);
+        else
+            refuse_value(where(*node), path_of(key), what, *node);
     });
 }
 

@@ -74,6 +74,10 @@ public:
     void formula(const std::string& key, std::shared_ptr<const Formula>& target,
                  std::span<const std::string_view> variables, bool needed = false);
 
+    // A number, or a formula as text.
+    void number_or_formula(const std::string& key, double& number, std::shared_ptr<const Formula>& formula,
+                           std::span<const std::string_view> variables);
+
     void absent(const std::string& key, const std::string& complaint) {
         if (pass_ == Pass::names)
             names_.push_back(key);
@@ -188,6 +192,8 @@ private:
     void refuse_unknown();
     void refuse(const std::string& key, const std::string& complaint);
 
+    std::shared_ptr<const Formula> formula_in(const toml::node& node, const std::string& key,
+                                              std::span<const std::string_view> variables) const;
     void ramp_in(const toml::table& table, const std::string& key, Ramp& target);
     std::string path_of(const std::string& key) const;
     std::string where(const toml::node& node) const;

@@ -67,6 +67,11 @@ public:
         if (formula) line(key, toml_string(formula->text));
     }
 
+    void number_or_formula(const std::string& key, double number, const std::shared_ptr<const Formula>& formula,
+                           std::span<const std::string_view>) {
+        line(key, formula ? toml_string(formula->text) : toml_number(number));
+    }
+
     void absent(const std::string&, const std::string&) {}
 
     template <class... Kinds>

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -43,9 +44,14 @@ struct CurvatureJet {
     }
     friend CurvatureJet operator+(const CurvatureJet& a, double c) { return {a.f + c, a.H, a.K, a.HH, a.HK, a.KK}; }
     friend CurvatureJet operator-(const CurvatureJet& a, double c) { return {a.f - c, a.H, a.K, a.HH, a.HK, a.KK}; }
+    friend CurvatureJet operator-(const CurvatureJet& a, const T& c)
+        requires(!std::is_same_v<T, double>)
+    {
+        return {a.f - c, a.H, a.K, a.HH, a.HK, a.KK};
+    }
 };
 
-// One term k * value(H, K, H0). `name` gives the series energy_<name>, `key` the case key of its
+// One term k * value(H, K, H0), all of which may be jets. `name` gives the series energy_<name>, `key` the case key of its
 // modulus, `label` the formula in pictures (mathtext). `magnitude` >= |value| never vanishes on a
 // curved membrane where value may; it scales the asked accuracy (E_ref).
 template <class Value, class Magnitude>
@@ -59,13 +65,13 @@ struct BendingTerm {
 
 inline constexpr auto bending_terms =
     std::make_tuple(BendingTerm{"20", "k20", "k_{20}(H-H_0)^2",  //
-                                [](auto H, auto, double H0) { return (H - H0) * (H - H0); },
+                                [](auto H, auto, auto H0) { return (H - H0) * (H - H0); },
                                 [](auto H, auto, double H0) { return H * H + H0 * H0; }},
                     BendingTerm{"40", "k40", "k_{40}(H-H_0)^4",  //
-                                [](auto H, auto, double H0) { return (H - H0) * (H - H0) * ((H - H0) * (H - H0)); },
+                                [](auto H, auto, auto H0) { return (H - H0) * (H - H0) * ((H - H0) * (H - H0)); },
                                 [](auto H, auto, double H0) { return (H - H0) * (H - H0) * ((H - H0) * (H - H0)); }},
                     BendingTerm{"42", "k42", "k_{42}K^2",                    //
-                                [](auto, auto K, double) { return K * K; },  //
+                                [](auto, auto K, auto) { return K * K; },    //
                                 [](auto, auto K, double) { return K * K; }});
 
 inline constexpr std::size_t n_bending_terms = std::tuple_size_v<decltype(bending_terms)>;
@@ -99,11 +105,15 @@ struct EnergyTerm {
 };
 inline constexpr int most_power = 20;
 
-// Moduli of the listed terms in their order, the spontaneous curvature, and what a case adds; dimensionless.
+// Moduli of the listed terms in their order, the spontaneous curvature, and what a case adds; dimensionless. Where H0
+// varies over the membrane, the number is 0 and of no use: what evaluates the density says which H0 a point has.
 struct Bending {
     std::array<double, n_bending_terms> k{};
     double H0 = 0;
     std::vector<EnergyTerm> terms = {};
+    std::shared_ptr<const Formula> H0_formula = {};  // of the place in the start: see H0_variables in common/case
+
+    bool H0_varies() const { return H0_formula != nullptr; }
 };
 
 // The terms together are counted: first those of the list, then those of the case.
@@ -133,19 +143,18 @@ void merge_listed_terms(Bending& bending);
 // Where the formula of a density is defined: see FormulaDomain.
 class DensityDomain {
 public:
-    explicit DensityDomain(const Bending& bending) : H0_(bending.H0) {
+    explicit DensityDomain(const Bending& bending) {
         for (const EnergyTerm& term : bending.terms)
             if (term.formula && term.modulus != 0) domain_.emplace(*term.formula);
     }
     bool restricted() const { return domain_ && domain_->restricted(); }
-    void look(double H, double K, double place) {
-        const double variables[]{H, K, H0_};
+    void look(double H0, double H, double K, double place) {
+        const double variables[]{H, K, H0};
         domain_->look(variables, place);
     }
     FormulaDomain::Margin margin() const { return domain_ ? domain_->margin() : FormulaDomain::Margin(); }
 
 private:
-    double H0_;
     std::optional<FormulaDomain> domain_;
 };
 
@@ -171,8 +180,8 @@ CurvatureJet<T> chain(const CurvatureJet<T>& a, const T& f, const T& f1, const T
 }
 
 // Of a term with modulus 1. T is a number or a pack of them, or what formulas are evaluated on.
-template <class T>
-T value_of(const EnergyTerm& term, const T& H, const T& K, double H0) {
+template <class T, class T0>
+T value_of(const EnergyTerm& term, const T& H, const T& K, const T0& H0) {
     if (!term.formula) return raised(T(H - T(H0)), term.H) * raised(K, term.K);
     const T variables[]{H, K, T(H0)};
     return evaluate(*term.formula, variables);
@@ -191,12 +200,12 @@ inline Added added_to(const Bending& bending) {
     return std::ranges::any_of(bending.terms, has_formula) ? Added::any : Added::powers;
 }
 
-template <class T>
-[[gnu::noinline]] T formula_value(const EnergyTerm& term, const T& H, const T& K, double H0) {
+template <class T, class T0>
+[[gnu::noinline]] T formula_value(const EnergyTerm& term, const T& H, const T& K, const T0& H0) {
     return value_of(term, H, K, H0);
 }
-template <class T>
-[[gnu::noinline]] CurvatureJet<T> formula_density(const EnergyTerm& term, const T& H, const T& K, double H0) {
+template <class T, class T0>
+[[gnu::noinline]] CurvatureJet<T> formula_density(const EnergyTerm& term, const T& H, const T& K, const T0& H0) {
     const CurvatureJet<T> variables[]{{H, T(1.0)}, {K, T(0.0), T(1.0)}, {T(H0)}};
     return term.modulus * evaluate(*term.formula, variables);
 }
@@ -216,33 +225,66 @@ void add_powers(const EnergyTerm& term, const T& x, const T& K, CurvatureJet<T>&
     sum.KK += (term.modulus * b * (b - 1)) * (p * q2);
 }
 
-// The density and its derivatives in H and K, summed over the terms in use.
-template <class T, Added added = Added::any>
-CurvatureJet<T> density(const Bending& bending, const T& H, const T& K) {
+// The density and its derivatives in H and K, summed over the terms in use, at a point with this H0: a number, or as
+// many as H.
+template <class T, Added added = Added::any, class T0>
+CurvatureJet<T> density_at(const Bending& bending, const T0& H0, const T& H, const T& K) {
     CurvatureJet<T> h, k, sum;
     h.f = H, h.H = T(1.0);
     k.f = K, k.K = T(1.0);
     for_each_bending_term([&](std::size_t i, const auto& term) {
-        if (bending.k[i] != 0) sum = sum + bending.k[i] * term.value(h, k, bending.H0);
+        if (bending.k[i] != 0) sum = sum + bending.k[i] * term.value(h, k, H0);
     });
     if constexpr (added == Added::none) return sum;
     for (const EnergyTerm& term : bending.terms) {
         if (term.modulus == 0) continue;
         if constexpr (added == Added::any)
             if (term.formula) {
-                sum = sum + formula_density(term, H, K, bending.H0);
+                sum = sum + formula_density(term, H, K, H0);
                 continue;
             }
-        add_powers(term, T(H - bending.H0), K, sum);
+        add_powers(term, T(H - H0), K, sum);
     }
     return sum;
 }
+// The same where H0 is one number.
+template <class T, Added added = Added::any>
+CurvatureJet<T> density(const Bending& bending, const T& H, const T& K) {
+    return density_at<T, added>(bending, bending.H0, H, K);
+}
+
+// df/dH0 of the density, and its derivatives in H, K and H0: theory.md (2.17).
+template <class T>
+struct SlopeInH0 {
+    T f{}, H{}, K{}, H0{};
+};
+template <class T>
+SlopeInH0<T> slope_in_H0(const Bending& bending, const T& H0, const T& H, const T& K) {
+    // Of the jet's two variables the second is H0, and the first is H, then K.
+    const auto sum = [&](const T& along_H, const T& along_K) {
+        using J = CurvatureJet<T>;
+        const J h{H, along_H}, k{K, along_K}, h0{H0, T(0.0), T(1.0)};
+        J out;
+        for_each_bending_term([&](std::size_t i, const auto& term) {
+            if (bending.k[i] != 0) out = out + bending.k[i] * term.value(h, k, h0);
+        });
+        for (const EnergyTerm& term : bending.terms) {
+            if (term.modulus == 0) continue;
+            const J variables[]{h, k, h0};
+            out = out + term.modulus * (term.formula ? evaluate(*term.formula, variables)
+                                                     : raised(h - h0, term.H) * raised(k, term.K));
+        }
+        return out;
+    };
+    const CurvatureJet<T> by_H = sum(T(1.0), T(0.0)), by_K = sum(T(0.0), T(1.0));
+    return {by_H.K, by_H.HK, by_K.HK, by_H.KK};
+}
 
 // Calls visit(number, modulus times value) for each term in use.
-template <class T, Added added = Added::any, class Visit>
-void for_each_value(const Bending& bending, const T& H, const T& K, Visit&& visit) {
+template <class T, Added added = Added::any, class T0, class Visit>
+void for_each_value_at(const Bending& bending, const T0& H0, const T& H, const T& K, Visit&& visit) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
-        if (bending.k[i] != 0) visit(i, T(bending.k[i] * term.value(H, K, bending.H0)));
+        if (bending.k[i] != 0) visit(i, T(bending.k[i] * term.value(H, K, H0)));
     });
     if constexpr (added == Added::none) return;
     for (std::size_t i = 0; i < bending.terms.size(); ++i) {
@@ -250,21 +292,28 @@ void for_each_value(const Bending& bending, const T& H, const T& K, Visit&& visi
         if (term.modulus == 0) continue;
         T value;
         if (added == Added::any && term.formula)
-            value = formula_value(term, H, K, bending.H0);
+            value = formula_value(term, H, K, H0);
         else
-            value = raised(T(H - bending.H0), term.H) * raised(K, term.K);
+            value = raised(T(H - H0), term.H) * raised(K, term.K);
         visit(n_bending_terms + i, T(term.modulus * value));
     }
 }
+template <class T, Added added = Added::any, class Visit>
+void for_each_value(const Bending& bending, const T& H, const T& K, Visit&& visit) {
+    for_each_value_at<T, added>(bending, bending.H0, H, K, visit);
+}
 
 // SUM |modulus| magnitude, which E_ref is made of.
-inline double magnitude(const Bending& bending, double H, double K) {
+inline double magnitude(const Bending& bending, double H0, double H, double K) {
     double sum = 0;
     for_each_bending_term(
-        [&](std::size_t i, const auto& term) { sum += std::abs(bending.k[i]) * term.magnitude(H, K, bending.H0); });
+        [&](std::size_t i, const auto& term) { sum += std::abs(bending.k[i]) * term.magnitude(H, K, H0); });
     for (const EnergyTerm& term : bending.terms)
-        if (term.modulus != 0) sum += std::abs(term.modulus) * magnitude_of(term, H, K, bending.H0);
+        if (term.modulus != 0) sum += std::abs(term.modulus) * magnitude_of(term, H, K, H0);
     return sum;
+}
+inline double magnitude(const Bending& bending, double H, double K) {
+    return magnitude(bending, bending.H0, H, K);
 }
 
 }  // namespace tubule

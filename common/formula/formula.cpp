@@ -292,6 +292,12 @@ FunctionValues function_values(const Formula::Step& step, double x) {
 }
 
 // The operations before one leave its argument on top of the stack.
+bool uses(const Formula& formula, int variable) {
+    return std::ranges::any_of(formula.steps, [variable](const Formula::Step& step) {
+        return step.op == Op::variable && step.number == variable;
+    });
+}
+
 FormulaDomain::FormulaDomain(const Formula& formula) {
     for (std::size_t i = 0; i < formula.steps.size(); ++i) {
         const Step& step = formula.steps[i];

@@ -59,6 +59,9 @@ struct Formula {
 // cosh tanh atan. Exponents are constants. Throws FormulaError.
 Formula parse_formula(const std::string& text, std::span<const std::string_view> variables);
 
+// Whether it depends on the variable of this number.
+bool uses(const Formula& formula, int variable);
+
 // Which arguments the operations had that are not defined for all.
 class FormulaDomain {
 public:

@@ -195,7 +195,7 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
 
 std::optional<TubeStart> tube_start(const Case& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
-    if (!shape || c.equilibrium) return std::nullopt;
+    if (!shape || c.equilibrium || c.energy.H0_varies()) return std::nullopt;
     TubeStart start{{c.energy, shape->radius, 0}, shape->length, {}};
     std::map<std::pair<int, int>, std::complex<double>> sums;
     for (const TubeMode& mode : shape->modes)

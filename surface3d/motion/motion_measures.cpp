@@ -73,7 +73,7 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
     DensityDomain domain(bending);
     if (!domain.restricted()) return;
-    for (int i = 0; i < mesh.size(); ++i) domain.look(m.fields.H[i], m.fields.K[i], i);
+    for (int i = 0; i < mesh.size(); ++i) domain.look(bending.H0, m.fields.H[i], m.fields.K[i], i);
     m.domain = domain.margin();
     m.least_defined = mesh.nodes[static_cast<std::size_t>(m.domain.place)];
 }

@@ -77,7 +77,7 @@ double reference_energy(const Case& c, const Observables& o, double period) {
 void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K) {
     DensityDomain domain(c.energy);
     if (!domain.restricted()) return;
-    for (int i = 0; i < mesh.size(); ++i) domain.look(H[i], K[i], i);
+    for (int i = 0; i < mesh.size(); ++i) domain.look(c.energy.H0, H[i], K[i], i);
     const FormulaDomain::Margin margin = domain.margin();
     const Eigen::Vector3d& x = mesh.nodes[static_cast<std::size_t>(margin.place)];
     tubule::require_defined(c, margin, fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]));

@@ -125,6 +125,10 @@ public:
                  bool = false) {
         add(key, "string", "");
     }
+    void number_or_formula(const std::string& key, double, const std::shared_ptr<const Formula>&,
+                           std::span<const std::string_view>) {
+        add(key, "float or string", "");
+    }
     void absent(const std::string&, const std::string&) {}
     template <class... Kinds>
     void kind(const std::variant<Kinds...>&) {}

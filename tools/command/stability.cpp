@@ -169,6 +169,8 @@ Record equilibrium_frame(Case c) {
 }
 
 std::string answer_for(const StabilityOptions& options, StabilitySubject subject) {
+    if (subject.c.energy.H0_varies())
+        throw complaint(subject.c, "energy.H0", "must be a number for growth rates; run the case instead");
     if (!options.fit.empty()) return fit_report(options, subject);
     const std::vector<Model> models = models_of(options, subject.c.model);
     std::optional<TubeSubject> tube;
