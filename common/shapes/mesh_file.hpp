@@ -1,6 +1,8 @@
-// Shape "file": a closed triangle mesh from a file, OBJ, OFF, PLY or STL, with a smooth surface fitted through it.
+// Shape "file": a closed triangle mesh from a file, OBJ, OFF, PLY or STL, with a smooth surface fitted through it, or
+// through new triangles that are made of it.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "common/shapes/meridian.hpp"
@@ -9,9 +11,13 @@ namespace tubule {
 
 struct MeshFile {
     static constexpr const char* kind = "file";
-    std::string path;   // relative to the case file
-    double weld = 0;    // vertices nearer than this become one, in the units of the file
-    int smoothing = 0;  // how often vertices are moved to the least-squares surface: for noisy scans
+    std::string path;           // relative to the case file
+    double weld = 0;            // vertices nearer than this become one, in the units of the file
+    int smoothing = 0;          // how often vertices are moved to the least-squares surface: for noisy scans
+    std::optional<int> remesh;  // repair the mesh and give it this many triangles
+    std::optional<double> smoothing_length = {};  // then: waves of this length keep half of their height
+    bool fill_holes = false;
+    std::optional<double> wrap = {};  // put a new surface around all triangles that closes gaps narrower than this
 };
 
 inline Asymmetry asymmetry(const MeshFile&) {
@@ -22,7 +28,21 @@ template <class Keys>
 void keys(Keys& k, MeshFile& file) {
     k.text("path", file.path, k.required);
     k.number("weld", file.weld, {.from = 0});
-    k.integer("smoothing", file.smoothing, {.from = 0, .to = 100});
+    k.integer("remesh", file.remesh, {.from = 100, .to = 20000});
+    if (!file.remesh) {
+        k.integer("smoothing", file.smoothing, {.from = 0, .to = 100});
+        for (const char* key : {"smoothing_length", "fill_holes", "wrap"})
+            k.absent(key, "must be absent: only valid with remesh");
+        return;
+    }
+    k.absent("smoothing",
+             "must be absent: with remesh, smoothing_length is the length over which a surface is smoothed");
+    k.number("smoothing_length", file.smoothing_length, {.above = 0});
+    k.number("wrap", file.wrap, {.above = 0});
+    if (file.wrap)
+        k.absent("fill_holes", "must be absent: wrap closes all holes narrower than its length");
+    else
+        k.flag("fill_holes", file.fill_holes);
 }
 
 }  // namespace tubule

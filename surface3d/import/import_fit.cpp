@@ -199,10 +199,10 @@ double mean_edge(const TriangleMesh& mesh) {
 }
 
 [[noreturn]] void fail(const ImportedMesh& imported, std::size_t triangle, const std::string& message) {
-    throw MeshError(
-        fmt::format("{}: {}: {}; the mesh is too coarse or too rough there for a smooth surface "
-                    "(smoothing may help)",
-                    imported.names.file, triangle_name(imported.names, triangle), message));
+    throw MeshError(fmt::format(
+        "{}: {}: {}; the mesh is too coarse or too rough there for a smooth surface{}", imported.names.file,
+        triangle_name(imported.names, triangle), message,
+        imported.names.triangle_centre.empty() ? ": shape.remesh = NUMBER makes one of so many new triangles" : ""));
 }
 
 // The place of the node at `barycentric` of a flat triangle; NaN when a patch is not met.
@@ -250,26 +250,6 @@ CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, c
     return out;
 }
 
-// The flat triangles between the nodes of the curved ones, k^2 in each, those of a cell together.
-TriangleMesh node_triangles(const CurvedMesh& surface) {
-    const auto indices = lattice(surface.order);
-    const int k = surface.order;
-    std::map<std::array<int, 3>, int> number;
-    for (int a = 0; a < int(indices.size()); ++a) number[indices[a]] = a;
-    TriangleMesh out;
-    out.points = surface.nodes;
-    for (int cell = 0; cell < surface.triangles(); ++cell) {
-        const auto node = [&](int i, int j) { return surface.node(cell, number.at({k - i - j, i, j})); };
-        for (int i = 0; i < k; ++i) {
-            for (int j = 0; i + j < k; ++j) {
-                out.triangles.push_back({node(i, j), node(i + 1, j), node(i, j + 1)});
-                if (i + j < k - 1) out.triangles.push_back({node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
-            }
-        }
-    }
-    return out;
-}
-
 // No part of an element may face away from its flat triangle, and no two may intersect.
 void check_surface(const ImportedMesh& imported, const TriangleMesh& mesh, const CurvedMesh& surface) {
     const TriangleMesh parts = node_triangles(surface);
@@ -310,7 +290,8 @@ TriangleMesh smoothed(const TriangleMesh& original, int times, FitReport& report
     if (times == 0 && report.roughness > 0.01) {
         report.notes.push_back(
             fmt::format("The vertices are {:.2g} of an edge (root mean square) off the smooth surface "
-                        "through their neighbours: the mesh is coarse, or it is noisy and needs smoothing.",
+                        "through their neighbours: the mesh is coarse, or it is noisy; shape.remesh makes a smooth one "
+                        "of new triangles.",
                         report.roughness));
     }
     for (int i = 0; i < times; ++i) {
@@ -335,6 +316,25 @@ void count_reduced(const std::vector<Patch>& patches, int degree, FitReport& rep
 }
 
 }  // namespace
+
+TriangleMesh node_triangles(const CurvedMesh& surface) {
+    const auto indices = lattice(surface.order);
+    const int k = surface.order;
+    std::map<std::array<int, 3>, int> number;
+    for (int a = 0; a < int(indices.size()); ++a) number[indices[a]] = a;
+    TriangleMesh out;
+    out.points = surface.nodes;
+    for (int cell = 0; cell < surface.triangles(); ++cell) {
+        const auto node = [&](int i, int j) { return surface.node(cell, number.at({k - i - j, i, j})); };
+        for (int i = 0; i < k; ++i) {
+            for (int j = 0; i + j < k; ++j) {
+                out.triangles.push_back({node(i, j), node(i + 1, j), node(i, j + 1)});
+                if (i + j < k - 1) out.triangles.push_back({node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
+            }
+        }
+    }
+    return out;
+}
 
 Fit fit_surface(const ImportedMesh& imported, const FitOptions& options) {
     if (options.order < 2 || options.order > 4) {

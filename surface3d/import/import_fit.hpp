@@ -41,4 +41,7 @@ struct Fit {
 // or elements that intersect where their flat triangles do not. std::invalid_argument for a bad order or smoothing.
 Fit fit_surface(const ImportedMesh& imported, const FitOptions& options);
 
+// The flat triangles between the nodes of the curved ones, order^2 in each, those of a cell together.
+TriangleMesh node_triangles(const CurvedMesh& surface);
+
 }  // namespace tubule::surface3d

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <unordered_map>
 
 #include "common/case/input_file.hpp"
@@ -43,7 +44,8 @@ FileMesh read_file(const std::filesystem::path& path) {
 }
 
 // Checks the vertices of each face and triangulates those with more than three.
-void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& out) {
+void add_triangles(const FileMesh& file, const std::string& name, bool drop_degenerate, ImportedMesh& out) {
+    std::size_t dropped = 0;
     const std::int64_t vertices = std::int64_t(file.points.size());
     for (const std::vector<FileCorner>& face : file.faces) {
         if (face.size() > corners_max) {
@@ -52,6 +54,7 @@ void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& 
                                         face.size(), corners_max));
         }
         std::vector<Eigen::Vector3d> corners;
+        bool twice = false;
         for (std::size_t i = 0; i < face.size(); ++i) {
             const auto [vertex, place] = face[i];
             if (vertex < 0 || vertex >= vertices) {
@@ -60,12 +63,18 @@ void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& 
                                             vertex + file.first, file.first, vertices - 1 + file.first));
             }
             for (std::size_t j = 0; j < i; ++j) {
-                if (face[j].vertex == vertex) {
+                if (face[j].vertex != vertex) continue;
+                twice = true;
+                if (!drop_degenerate) {
                     throw MeshError(at(name, place) +
                                     fmt::format("degenerate face: vertex {} occurs twice", vertex + file.first));
                 }
             }
             corners.push_back(file.points[vertex]);
+        }
+        if (twice) {
+            ++dropped;
+            continue;
         }
         auto cut = face.size() == 3 ? std::vector<std::array<int, 3>>{{0, 1, 2}} : cut_polygon(corners);
         if (cut.empty()) {
@@ -77,6 +86,7 @@ void add_triangles(const FileMesh& file, const std::string& name, ImportedMesh& 
             out.names.triangle_place.push_back(face[0].place);
         }
     }
+    if (dropped > 0) out.notes.push_back(fmt::format("{} faces with a vertex twice were dropped.", dropped));
 }
 
 using Cell = std::array<std::int64_t, 3>;
@@ -128,6 +138,7 @@ void merge_vertices(ImportedMesh& out, double weld) {
     }
     std::vector<std::array<int, 3>> triangles;
     std::vector<Place> places;
+    std::vector<std::int64_t> numbers;
     const auto collapsed = [](const std::vector<int>& to, const std::array<int, 3>& t) {
         return to[t[0]] == to[t[1]] || to[t[1]] == to[t[2]] || to[t[2]] == to[t[0]];
     };
@@ -137,6 +148,7 @@ void merge_vertices(ImportedMesh& out, double weld) {
         if (weld > 0 && collapsed(merged, old)) continue;
         triangles.push_back({number[merged[old[0]]], number[merged[old[1]]], number[merged[old[2]]]});
         places.push_back(out.names.triangle_place[t]);
+        numbers.push_back(std::int64_t(t) + out.names.first);
     }
     const std::size_t lost = mesh.triangles.size() - triangles.size();
     if (lost > 0)
@@ -144,12 +156,31 @@ void merge_vertices(ImportedMesh& out, double weld) {
     mesh.points = std::move(points);
     mesh.triangles = std::move(triangles);
     out.names.triangle_place = std::move(places);
+    out.names.triangle_number = std::move(numbers);
+}
+
+void number(std::vector<std::int64_t>& numbers, std::size_t count, std::int64_t first) {
+    if (!numbers.empty()) return;
+    numbers.resize(count);
+    std::iota(numbers.begin(), numbers.end(), first);
 }
 
 }  // namespace
 
+void MeshNames::number_vertices(std::size_t count) {
+    number(vertex_number, count, first);
+}
+void MeshNames::number_triangles(std::size_t count) {
+    number(triangle_number, count, first);
+}
+
 std::string triangle_name(const MeshNames& names, std::size_t triangle) {
-    std::string name = fmt::format("triangle {}", std::int64_t(triangle) + names.first);
+    if (!names.triangle_centre.empty()) {
+        const Eigen::Vector3d& x = names.triangle_centre[triangle];
+        return fmt::format("the new triangle at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]);
+    }
+    std::string name = fmt::format("triangle {}", names.triangle_number.empty() ? std::int64_t(triangle) + names.first
+                                                                                : names.triangle_number[triangle]);
     if (names.triangle_place.empty()) return name;
     const Place& place = names.triangle_place[triangle];
     return name + (place.line ? fmt::format(" (line {})", place.line) : fmt::format(" (byte {})", place.byte));
@@ -162,7 +193,7 @@ std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::s
     return fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", number, x[0], x[1], x[2]);
 }
 
-ImportedMesh read_mesh(const std::filesystem::path& path, double weld) {
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld, bool drop_degenerate) {
     if (!(weld >= 0) || !std::isfinite(weld))
         throw MeshError(fmt::format("{}: weld must be a number >= 0, not {}", path.string(), weld));
     const FileMesh file = read_file(path);
@@ -183,7 +214,7 @@ ImportedMesh read_mesh(const std::filesystem::path& path, double weld) {
     out.names.file = path.string();
     out.names.first = file.first;
     out.mesh.points = file.points;
-    add_triangles(file, path.string(), out);
+    add_triangles(file, path.string(), drop_degenerate, out);
     merge_vertices(out, weld);
     return out;
 }

@@ -28,8 +28,13 @@ struct Place {
 struct MeshNames {
     std::string file = "mesh";
     std::int64_t first = 0;                   // number of the first vertex and triangle
-    std::vector<std::int64_t> vertex_number;  // empty: as in memory
-    std::vector<Place> triangle_place;        // empty: without
+    std::vector<std::int64_t> vertex_number, triangle_number;  // empty: as in memory
+    std::vector<Place> triangle_place;                         // empty: without
+    std::vector<Eigen::Vector3d> triangle_centre;  // of triangles that are not the file's: they are named by these
+
+    // Writes the numbers of this many elements down if they are those in memory.
+    void number_vertices(std::size_t count);
+    void number_triangles(std::size_t count);
 };
 std::string triangle_name(const MeshNames& names, std::size_t triangle);
 std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::size_t vertex);
@@ -42,7 +47,8 @@ struct ImportedMesh {
 
 // The triangles of a file; the extension gives the format (.obj .off .ply .stl, in either case). Polygons become
 // triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and
-// triangles that collapse are dropped, with a note. Throws MeshError; never returns part of a file.
-ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0);
+// triangles that collapse are dropped, with a note. Faces with a vertex twice are errors unless `drop_degenerate`.
+// Throws MeshError; never returns part of a file.
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0, bool drop_degenerate = false);
 
 }  // namespace tubule::surface3d

@@ -15,11 +15,13 @@
 #include "common/shapes/profile_curve.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
+#include "surface3d/import/import_cgal.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
 #include "surface3d/motion/surface_law.hpp"
 #include "surface3d/run/mesh_record.hpp"
+#include "surface3d/run/remeshed_start.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -197,9 +199,25 @@ struct Prepare {
             throw CaseError(error.what());
         }
     }
+    // New triangles of it; of other orders, what interpolates them.
+    Prepared remeshed(const MeshFile& file, const std::string& blame) const {
+        if (!cgal::available())
+            throw complaint(c, "shape.remesh",
+                            "needs a build with CGAL: install libcgal-dev (Debian, Ubuntu) or CGAL 5.5 or newer, then "
+                            "run cmake --preset release && cmake --build --preset release");
+        const RemeshedStart start = usable(blame, [&] {
+            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true), file,
+                                  std::max(element_order(c), 3));
+        });
+        return {[surface = start.surface](int, int order) {
+                    return StartMesh{surface.order == order ? surface : with_order(surface, order), {}, {}};
+                },
+                false, start.notes};
+    }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
         const std::string blame = complaint(c, "shape.path", "cannot be used").what();
+        if (file.remesh) return remeshed(file, blame);
         const auto imported = std::make_shared<ImportedMesh>(usable(blame, [&] {
             ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld);
             close_mesh(mesh);

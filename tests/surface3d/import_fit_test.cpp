@@ -142,7 +142,8 @@ TEST_P(EveryOrder, SmoothingTakesNoiseOut) {
     ASSERT_EQ(report[0].notes.size(), 1u);
     EXPECT_EQ(report[0].notes[0],
               fmt::format("The vertices are {:.2g} of an edge (root mean square) off the smooth surface through their "
-                          "neighbours: the mesh is coarse, or it is noisy and needs smoothing.",
+                          "neighbours: the mesh is coarse, or it is noisy; shape.remesh makes a smooth one of new "
+                          "triangles.",
                           report[0].roughness));
     EXPECT_TRUE(report[1].notes.empty());
     EXPECT_GT(report[1].moved_rms, 0);
@@ -193,7 +194,9 @@ std::string refusal(const TriangleMesh& mesh, int order) {
     return test::message_of<MeshError>([&] { fit_surface(closed(mesh), {.order = order}); });
 }
 
-const std::string advice = "; the mesh is too coarse or too rough there for a smooth surface (smoothing may help)";
+const std::string advice =
+    "; the mesh is too coarse or too rough there for a smooth surface: shape.remesh = NUMBER makes one of so many new "
+    "triangles";
 
 // A disc with a rim of radius of curvature 0.01, far below the mesh width.
 TEST(Fit, RefusesARimThatTheMeshDoesNotResolve) {

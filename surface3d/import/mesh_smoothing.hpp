@@ -1,0 +1,26 @@
+// Smoothing of closed triangle meshes over a stated length, and what it should keep.
+#pragma once
+
+#include "surface3d/mesh/triangle_mesh.hpp"
+
+namespace tubule::surface3d {
+
+// Waves of the wavelength `halved` keep half of their height, those of twice that length 94 percent, of half that
+// length 6 percent: 1/(1 + (halved/w)^4). Spheres and cylinders stay as they are; creases are rounded.
+//
+// It is the normals that are smoothed, not the positions: smoothed positions move everything bent inward, and a tube
+// whose circumference is near the length collapses. The normals n of the vertices become those that minimise
+// INT |n - n0|^2 + (halved/2 pi)^4 |Lap n|^2, at unit length; the points then minimise INT |grad x - P grad x0|^2,
+// where P projects onto the plane that is normal to n (which shortens the edges of rough triangles to those of the
+// smooth surface), and weakly their distance from x0. Throws SolveError where triangles have no area.
+TriangleMesh smoothed(const TriangleMesh& mesh, double halved);
+
+// The points moved along the normals, all equally far, until the mesh bounds this volume.
+TriangleMesh with_volume(const TriangleMesh& mesh, double volume);
+
+double mesh_area(const TriangleMesh& mesh);
+double mesh_volume(const TriangleMesh& mesh);  // of a closed mesh, > 0 if it faces outward
+// The length of the edges of so many equilateral triangles of this area.
+double even_edge(double area, double triangles);
+
+}  // namespace tubule::surface3d

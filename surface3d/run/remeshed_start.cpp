@@ -1,0 +1,265 @@
+#include "surface3d/run/remeshed_start.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "common/solve/pause.hpp"
+#include "surface3d/curvature/curvature.hpp"
+#include "surface3d/import/import_cgal.hpp"
+#include "surface3d/import/import_fit.hpp"
+#include "surface3d/import/import_repair.hpp"
+#include "surface3d/import/mesh_distance.hpp"
+#include "surface3d/import/mesh_smoothing.hpp"
+#include "surface3d/mesh/self_intersection.hpp"
+#include "surface3d/meshing/remesh.hpp"
+#include "surface3d/meshing/remesh_sizes.hpp"
+#include "surface3d/motion/extent.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+using Eigen::Vector3d;
+
+// Measured: docs/decisions/curvature_and_meshes.md.
+constexpr double fine_edges = 3;      // of the mesh that is smoothed, in an edge of the new triangles
+constexpr double first_length = 2.5;  // of smoothing, in these edges
+constexpr double longer = 1.2;
+constexpr int most_lengths = 7;
+constexpr int smoothings = 2;
+// Angles of the surface that an edge may span.
+constexpr double least_angle = 0.4, most_angle = 1.0;
+constexpr double wrap_offset = 0.05;  // of the gaps that are closed
+constexpr double crease = 45;         // degrees between neighbours
+constexpr double flattest = 1e-3;     // of the volume of a ball of the same area
+
+std::string place(const Vector3d& x) {
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
+}
+
+// A closed mesh, the volume that its surface should bound, and what was done to make it.
+struct Body {
+    std::string name;
+    TriangleMesh mesh;
+    double volume = 0;
+    std::vector<std::string> notes;
+};
+
+TriangleMesh filled(const ImportedMesh& file, std::vector<std::string>& notes) {
+    const cgal::FilledHoles filled = cgal::fill_holes(file.mesh);
+    if (filled.left > 0)
+        throw MeshError(fmt::format("{}: {} of {} holes cannot be filled; shape.wrap = LENGTH may help",
+                                    file.names.file, filled.left, filled.left + filled.holes));
+    if (filled.holes > 0)
+        notes.push_back(fmt::format("{} holes were filled; the longest border, at {}, measures {:.3g}.", filled.holes,
+                                    place(filled.at), filled.longest));
+    return filled.mesh;
+}
+
+Body body_of(ImportedMesh& file, const MeshFile& shape) {
+    Body body{file.names.file, {}, 0, {}};
+    if (shape.wrap) {
+        const double offset = wrap_offset * *shape.wrap;
+        ImportedMesh around;
+        around.names.file = file.names.file;
+        around.mesh = cgal::wrap(file.mesh, *shape.wrap / 2, offset);
+        repair_mesh(around, false);
+        body.volume = mesh_volume(around.mesh) - offset * mesh_area(around.mesh);
+        body.mesh = std::move(around.mesh);
+        body.notes = {
+            fmt::format("A surface of {} triangles was wrapped around the {} of the file; gaps narrower than "
+                        "{:g} are closed.",
+                        body.mesh.triangles.size(), file.mesh.triangles.size(), *shape.wrap)};
+    } else {
+        repair_mesh(file, shape.fill_holes);
+        body.notes = file.notes;
+        body.mesh = shape.fill_holes ? filled(file, body.notes) : file.mesh;
+        if (mesh_volume(body.mesh) < 0)
+            for (auto& corner : body.mesh.triangles) std::swap(corner[1], corner[2]);
+        body.volume = mesh_volume(body.mesh);
+    }
+    const double ball = std::pow(mesh_area(body.mesh), 1.5) / (6 * std::sqrt(EIGEN_PI));
+    if (!(body.volume > flattest * ball))
+        throw MeshError(
+            fmt::format("{}: the surface encloses next to nothing: a volume of {:.3g}, where a ball of "
+                        "this area has {:.3g}; is it a sheet?",
+                        body.name, body.volume, ball));
+    return body;
+}
+
+TriangleMesh smooth_mesh(const Body& body, double edge, double length) {
+    // The height that several smoothings leave together is half at this wavelength.
+    const double each = length * std::pow(std::pow(2, 1.0 / smoothings) - 1, 0.25);
+    TriangleMesh mesh = body.mesh;
+    for (int i = 0; i < smoothings; ++i) {
+        check_pause();
+        mesh = smoothed(cgal::isotropic(mesh, edge), each);
+    }
+    return with_volume(mesh, body.volume);
+}
+
+// The curved surface through the vertices of a mesh that is not the file's.
+CurvedMesh curved(const std::string& name, const TriangleMesh& mesh, int order) {
+    ImportedMesh made;
+    made.mesh = mesh, made.names.file = name;
+    for (const auto& [a, b, c] : mesh.triangles)
+        made.names.triangle_centre.push_back((mesh.points[a] + mesh.points[b] + mesh.points[c]) / 3);
+    close_mesh(made);
+    return fit_surface(made, {.order = order}).surface;
+}
+
+// The smallest angle of the surface over an edge for which so many triangles are enough.
+std::optional<double> angle_for(const CurvedMesh& surface, int triangles) {
+    const CurvatureField curvature = PatchRecovery(surface).nodal(surface);
+    const auto enough = [&](double angle) {
+        const MeshSizes sizes = mesh_sizes(surface, curvature.H, curvature.K, {.triangles = triangles, .angle = angle});
+        return !sizes.lost && sizes.triangles < 1.01 * triangles;
+    };
+    if (!enough(most_angle)) return std::nullopt;
+    double low = least_angle, high = most_angle;
+    while (high - low > 0.02) {
+        const double middle = (low + high) / 2;
+        (enough(middle) ? high : low) = middle;
+    }
+    return high;
+}
+
+CurvedMesh with_volume(CurvedMesh mesh, double volume) {
+    const SurfaceSpace space(mesh);
+    std::vector<QuadraturePoint> points;
+    for (const auto& [i, j, l] : lattice(mesh.order)) points.push_back({1.0 * j / mesh.order, 1.0 * l / mesh.order, 0});
+    const Tabulation at_nodes(mesh.order, points);
+    VectorField normal = VectorField::Zero(3, mesh.size());
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a)
+            normal.col(mesh.node(cell, a)) += tangent_point(X, at_nodes, a).normal;
+    }
+    normal.colwise().normalize();
+    for (int step = 0; step < 4; ++step) {
+        const Extent now = extent(space, mesh);
+        for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] += (volume - now.volume) / now.area * normal.col(i);
+    }
+    return mesh;
+}
+
+// A surface of so many triangles, or why there is none.
+std::variant<CurvedMesh, std::string> resolved(const Body& body, const TriangleMesh& smooth, int triangles, int order) {
+    try {
+        const CurvedMesh fine = curved(body.name, smooth, order);
+        const auto angle = angle_for(fine, triangles);
+        if (!angle) return fmt::format("the surface has more detail than {} triangles resolve", triangles);
+        auto made = remesh(fine, Eigen::MatrixXd(0, fine.size()), {.triangles = triangles, .angle = *angle});
+        if (const auto* lost = std::get_if<StopReport>(&made)) return lost->message;
+        CurvedMesh surface = with_volume(std::get<Remeshed>(made).mesh, body.volume);
+        const TriangleMesh parts = node_triangles(surface);
+        if (const auto pair = first_intersection(parts))
+            return fmt::format("parts of the surface intersect at {}",
+                               place(parts.points[parts.triangles[pair->first][0]]));
+        return surface;
+    } catch (const MeshError& error) {
+        return std::string(error.what()).substr(body.name.size() + 2);
+    }
+}
+
+double size_of(const TriangleMesh& mesh) {
+    Eigen::AlignedBox<double, 3> box;
+    for (const Vector3d& x : mesh.points) box.extend(x);
+    return box.diagonal().norm();
+}
+
+// The creased edges of a mesh, as triangles without area.
+TriangleMesh creases_of(const TriangleMesh& mesh, double& sharpest) {
+    std::map<std::pair<int, int>, std::size_t> left;
+    std::vector<Vector3d> normal;
+    TriangleMesh out;
+    out.points = mesh.points;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const auto& c = mesh.triangles[t];
+        const auto& x = mesh.points;
+        normal.push_back((x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]));
+        for (int i = 0; i < 3; ++i) {
+            const auto other = left.find({c[(i + 1) % 3], c[i]});
+            left[{c[i], c[(i + 1) % 3]}] = t;
+            if (other == left.end()) continue;
+            const Vector3d& n = normal[other->second];
+            const double kink = std::atan2(n.cross(normal[t]).norm(), n.dot(normal[t])) * 180 / EIGEN_PI;
+            sharpest = std::max(sharpest, kink);
+            if (kink > crease) out.triangles.push_back({c[i], c[(i + 1) % 3], c[(i + 1) % 3]});
+        }
+    }
+    return out;
+}
+
+struct Farthest {
+    double distance = 0, squares = 0, area = 0;
+    Vector3d at{0, 0, 0};
+    void add(const DistanceSample& sample) {
+        squares += sample.area * sample.distance * sample.distance, area += sample.area;
+        if (sample.distance > distance) distance = sample.distance, at = sample.at;
+    }
+};
+
+// How far the surface is from the file, and how much of that is due to creases.
+std::string distance_note(const TriangleMesh& file, const TriangleMesh& surface, double grain, double length) {
+    const double size = size_of(file);
+    const auto percent = [&](double d) { return fmt::format("{:.2g} percent", 100 * d / size); };
+    Farthest all, smooth;
+    double sharpest = 0;
+    const TriangleMesh creases = creases_of(file, sharpest);
+    const MeshDistance to_crease(creases);
+    for (const DistanceSample& sample : distances(surface, file, grain)) all.add(sample);
+    for (const DistanceSample& sample : distances(file, surface, grain)) {
+        all.add(sample);
+        if (creases.triangles.empty() || to_crease(sample.at) > length / 2) smooth.add(sample);
+    }
+    std::string note =
+        fmt::format("The start is at most {:.3g} from the file, {} of its size {:.4g}, at {}; {} rms.", all.distance,
+                    percent(all.distance), size, place(all.at), percent(std::sqrt(all.squares / all.area)));
+    if (!creases.triangles.empty())
+        note += fmt::format(
+            " The file has {} creases (edges kinked by more than {:g} degrees, up to {:.0f}), which are "
+            "rounded over the length of smoothing; away from them it is at most {}.",
+            creases.triangles.size(), crease, sharpest, percent(smooth.distance));
+    return note;
+}
+
+}  // namespace
+
+RemeshedStart remeshed_start(ImportedMesh file, const MeshFile& shape, int order) {
+    const int triangles = shape.remesh.value();
+    const TriangleMesh given = file.mesh;
+    Body body = body_of(file, shape);
+    std::string why;
+    double length = shape.smoothing_length.value_or(0);
+    for (int i = 0; i < (shape.smoothing_length ? 1 : most_lengths); ++i) {
+        const double edge = even_edge(mesh_area(body.mesh), triangles);
+        if (!shape.smoothing_length) length = first_length * edge * std::pow(longer, i);
+        const TriangleMesh smooth = smooth_mesh(body, edge / fine_edges, length);
+        auto made = resolved(body, smooth, triangles, order);
+        if (const auto* reason = std::get_if<std::string>(&made)) {
+            why = *reason;
+            continue;
+        }
+        RemeshedStart out{std::get<CurvedMesh>(std::move(made)), std::move(body.notes)};
+        const TriangleMesh parts = node_triangles(out.surface);
+        out.notes.push_back(fmt::format(
+            "{} new triangles instead of {}, smoothed over {:.3g}, {:.2g} of their mean edges: waves of this length "
+            "keep half of their height, shorter ones less. The volume is {:.6g} as before.",
+            out.surface.triangles(), given.triangles.size(), length, length / edge, body.volume));
+        out.notes.push_back(distance_note(given, parts, edge / 2, length));
+        return out;
+    }
+    throw MeshError(
+        fmt::format("{}: smoothed over {:.3g}, {}; try shape.remesh = {}{}", body.name, length, why, 2 * triangles,
+                    shape.smoothing_length ? fmt::format(", or shape.smoothing_length = {:.3g}", 2 * length) : ""));
+}
+
+}  // namespace tubule::surface3d
