@@ -24,6 +24,10 @@
 #include "common/shapes/waved_profile.hpp"
 #include "common/solve/stop.hpp"
 
+#if !defined(EIGEN_MAX_ALIGN_BYTES) || EIGEN_MAX_ALIGN_BYTES != 64
+#error Tubule is compiled with EIGEN_MAX_ALIGN_BYTES=64 EIGEN_MAX_STATIC_ALIGN_BYTES=64; its CMake targets say so
+#endif
+
 namespace tubule {
 
 enum class Tier { axisym, surface3d, automatic };

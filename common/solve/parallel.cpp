@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <Eigen/Core>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -114,6 +115,11 @@ void run(Loop& loop, int threads) {
 
 int loop_threads() {
     return omp_get_max_threads();
+}
+
+// Not inline: Eigen's setting is a variable of each library that includes it.
+void multiply_on_one_thread() {
+    Eigen::setNbThreads(1);
 }
 
 }  // namespace tubule

@@ -13,6 +13,9 @@ namespace tubule {
 // number of processors without it, or what omp_set_num_threads() has set for this thread.
 int loop_threads();
 
+// Products of dense matrices stay on their thread from now on: they are small here, and others would only wait.
+void multiply_on_one_thread();
+
 namespace parallel {
 
 // A loop under way: each thread takes the next few numbers until none is left.

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """`tubule chart`: the front, failures, resuming, references, maps, refusals.
 
-chart_test.py TUBULE PLOT [MPIRUN]: the program, the folder of its scripts.
+chart_test.py TUBULE PACKAGE [MPIRUN]: the program, the folder of the Python package.
 """
 import csv
 import os
@@ -19,9 +19,7 @@ from program import PROGRAM, QUICK, SLOW, ProgramTest
 
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 sys.path.insert(0, sys.argv[2])
-import chart  # noqa: E402
-import chart_file  # noqa: E402
-import chart_runs  # noqa: E402
+from drawing import chart, chart_file, chart_runs  # noqa: E402
 
 # Stands for the program: what a run does depends on its elements alone, and costs nothing. E_ref is 2, the energy at the
 # end 1 + 1/elements^2; from 64 elements on it crashes, with 32 it hangs, with 4 it stops early. Every run leaves a line.

@@ -16,7 +16,7 @@ step = 0.06
 ENERGIES = (6.3849499091967346, 3.831523408595685, 1.2568365089070843)
 
 
-PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
+PLOT = Path(__file__).resolve().parents[2] / "tools/python/tubule/drawing"
 
 
 class Equilibrium(ProgramTest):
@@ -79,15 +79,15 @@ class Equilibrium(ProgramTest):
                 sets = ("--set", f"energy.k42={k42}", "--set", f"shape.length={length}")
                 self.tubule("equilibrium", "--quiet", single, *sets, "-o", f"length_{k42:g}_{i:02}.hdf")
         for script, inputs, words in (
-            ("tubular.py", [self.folder], ("l = 4", "distance to the capsule")),
-            ("vesicles.py", [self.folder / "l2.hdf", self.folder / "l3.hdf"], ("reduced volume", "bifurcation")),
+            ("tubular", [self.folder], ("l = 4", "distance to the capsule")),
+            ("vesicles", [self.folder / "l2.hdf", self.folder / "l3.hdf"], ("reduced volume", "bifurcation")),
         ):
             picture = self.folder / f"{script}.svg"
-            done = subprocess.run([PLOT / script, *inputs, "-o", picture], capture_output=True, text=True)
+            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, script, *inputs, "-o", picture], capture_output=True, text=True)
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             for word in words:
                 self.assertIn(word, picture.read_text())
-            done = subprocess.run([PLOT / script, *inputs, "-o", "picture.txt"], capture_output=True, text=True)
+            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, script, *inputs, "-o", "picture.txt"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 2)
 
     def test_refusals(self):

@@ -20,9 +20,10 @@ TUBULE, TOP = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 sys.path.insert(0, sys.argv[3])
 
 import h5py
+import matplotlib
 import numpy as np
 import tubule
-from tubule import cases, commands, results
+from tubule import cases, commands, pictures, results
 
 TUBE = {
     "tier": "axisym",
@@ -348,11 +349,52 @@ def find(tree, key):
     return None
 
 
+class Drawing(Folder):
+    """A picture of a result in memory is that of its file, which is what the program draws."""
+
+    def same(self, case, **options):
+        file = self.folder / "result.hdf"
+        result = tubule.run(case, threads=1)
+        tubule.run(case, threads=1, output=file)
+        result._name = str(file)  # a picture may show it
+        settings = dict(matplotlib.rcParams)
+        tubule.draw(result, self.folder / "memory.svg", **options)
+        tubule.draw(file, self.folder / "file.svg", **options)
+        self.assertEqual(dict(matplotlib.rcParams), settings)
+        words = [f"--{name}={value}" for name, value in options.items()]
+        self.assertEqual(self.program("plot", file, "-o", "program.svg", *words).returncode, 0)
+        memory, read, drawn = ((self.folder / f"{name}.svg").read_text() for name in ("memory", "file", "program"))
+        self.assertEqual(memory, read)
+        self.assertEqual(drawn, read)
+        file.unlink()
+
+    def test_profiles(self):
+        self.same(TUBE)
+
+    def test_surfaces(self):
+        self.same(SURFACE, kind="balance")
+        self.same(SURFACE, kind="cuts")
+
+    def test_scans(self):
+        scan = tubule.scan(TUBE, {"energy.k42": [0, 0.1]}, output=self.folder / "scan.hdf")
+        tubule.draw(scan, self.folder / "scan.svg")
+        self.assertIn("energy", (self.folder / "scan.svg").read_text())
+        with self.assertRaisesRegex(ValueError, "has no file"):
+            tubule.draw(tubule.scan(TUBE, {"energy.k42": [0]}))
+
+    def test_refusals(self):
+        result = tubule.run(TUBE)
+        for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "must be one of"),
+                               ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame")):  # fmt: skip
+            with self.assertRaisesRegex(ValueError, words):
+                tubule.draw(result, **options)
+
+
 class Documentation(unittest.TestCase):
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
     def test_examples_in_the_modules(self):
-        for module in (cases, commands, results):
+        for module in (cases, commands, pictures, results):
             failed, _ = doctest.testmod(module, extraglobs={"tubule": tubule, "tube": tubule.Case(TUBE)}, optionflags=self.flags)
             self.assertEqual(failed, 0)
 

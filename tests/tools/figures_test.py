@@ -16,8 +16,8 @@ from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[2]
 TUBULE = Path(sys.argv[1]).resolve()
-sys.path.insert(0, str(TOP / "tools/plot"))
-import freshness  # noqa: E402
+sys.path.insert(0, str(TOP / "tools/python/tubule"))
+from drawing import freshness  # noqa: E402
 
 
 def figures(top, *arguments):
@@ -54,7 +54,7 @@ class Stale(unittest.TestCase):
         for name, old, new, stale in (
             ("cases/figure_k42_006.toml", b"k42 = 0.06", b"k42 = 0.07", "axisym"),
             ("cases/peanut.toml", b"[time]", b"[time]\nlimit = 5", "flow"),
-            ("tools/plot/energy.py", b"import ", b"import this\nimport ", "axisym"),  # not named by the command itself
+            ("tools/python/tubule/drawing/energy.py", b"import ", b"import this\nimport ", "axisym"),  # not named by the command itself
             ("docs/figure_flow.svg", b"</svg>", b"<g/></svg>", "flow"),
             ("tools/figures", b'"cases/peanut.toml"', b'"cases/figure_k42_0.toml"', "flow"),
         ):
@@ -63,7 +63,7 @@ class Stale(unittest.TestCase):
             self.assertIn("commands" if name == "tools/figures" else name, found[stale])
 
     def test_not_comments_and_layout(self):
-        for name, line in (("tools/plot/style.py", b"\n\n# A remark.\n"), ("cases/figure_k42_006.toml", b"\n# A remark.\n")):
+        for name, line in (("tools/python/tubule/drawing/style.py", b"\n\n# A remark.\n"), ("cases/figure_k42_006.toml", b"\n# A remark.\n")):
             self.assertEqual(self.found_after(name, lambda text: text + line, "axisym"), {}, name)
 
     def test_pictures_that_no_command_makes(self):

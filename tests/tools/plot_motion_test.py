@@ -16,16 +16,10 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 from plot_surface_test import octasphere
-from plot_test import PLOT, InFolder
+from plot_test import PACKAGE, InFolder
 
-import balance  # found by way of plot_test
-import cuts
-import flow
-import raster
-import results
-import style
-import surfaces
-from tubes import Column
+from drawing import balance, cuts, flow, raster, results, style, surfaces  # found by way of plot_test
+from drawing.tubes import Column
 
 TUBULE = None
 OMEGA = np.array([0.0, 0.0, 3.0])
@@ -318,7 +312,7 @@ class Render(InFolder):
     """tools/render without ParaView, and the commands it would pass to it."""
 
     def render(self, *arguments):
-        command = [sys.executable, "-B", PLOT.parent / "render", *arguments]
+        command = [sys.executable, "-B", PACKAGE.parents[1] / "render", *arguments]
         return subprocess.run(command, capture_output=True, text=True, env={"PATH": str(self.folder), **self.more})
 
     def setUp(self):

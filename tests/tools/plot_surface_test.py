@@ -18,7 +18,7 @@ import matplotlib.image
 import numpy as np
 from plot_test import InFolder, write
 
-import raster  # found by way of plot_test
+from drawing import raster  # found by way of plot_test
 
 SURFACE_RESULTS = None
 

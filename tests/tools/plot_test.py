@@ -21,19 +21,11 @@ import h5py
 import numpy as np
 from PIL import Image, ImageSequence
 
-PLOT = Path(__file__).resolve().parents[2] / "tools/plot"
-sys.path[:0] = [str(PLOT), str(Path(__file__).resolve().parents[1] / "support")]
-import colours  # noqa: E402
-import curves  # noqa: E402
-import energy  # noqa: E402
-import labels  # noqa: E402
-import movie  # noqa: E402
-import results  # noqa: E402
+PACKAGE = Path(__file__).resolve().parents[2] / "tools/python/tubule"
+PLOT = PACKAGE / "drawing"
+sys.path[:0] = [str(PACKAGE), str(Path(__file__).resolve().parents[1] / "support")]
 import scripts  # noqa: E402
-import tubes  # noqa: E402
-import validation  # noqa: E402
-import work_precision  # noqa: E402
-import work_precision_fluid  # noqa: E402
+from drawing import colours, curves, energy, labels, movie, results, tubes, validation, work_precision, work_precision_fluid  # noqa: E402
 
 TUBULE = None
 CASE = """tier = "axisym"
@@ -119,7 +111,7 @@ class InFolder(unittest.TestCase):
 
     def plot(self, *arguments, program=None):
         if not program:
-            return scripts.run_script(PLOT / "plot.py", *TERMS, *arguments)
+            return scripts.run_script(PLOT, "plot", *TERMS, *arguments)
         done = subprocess.run([program, "plot", *arguments], capture_output=True, text=True)
         # Files made here by h5py have no checksums, which the program says of each.
         said = [line for line in done.stderr.splitlines(True) if "has no checksums" not in line]
@@ -491,7 +483,7 @@ class Films(InFolder):
 
     def test_interrupted_film_leaves_nothing(self):
         path = write(self.folder / "a.hdf", times=list(np.linspace(0, 1, 200)))
-        command = ["/usr/bin/python3", "-B", PLOT / "plot.py", path, "--movie", self.folder / "a.gif"]
+        command = ["/usr/bin/python3", "-B", PLOT, "plot", path, "--movie", self.folder / "a.gif"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             while process.poll() is None and not process.stderr.readline().startswith("frame"):
                 pass
@@ -588,9 +580,8 @@ class Refusals(InFolder):
     def test_missing_library_names_its_package(self):
         # A module of that name that cannot be imported, found before Debian's.
         (self.folder / "h5py.py").write_text("raise ImportError")
-        path = f"sys.path[:0] = [{str(self.folder)!r}, {str(PLOT)!r}]"
-        script = f"import sys; {path}; sys.argv = ['plot', 'a.hdf']; import plot; sys.exit(plot.main())"
-        done = subprocess.run([sys.executable, "-B", "-c", script], capture_output=True, text=True)
+        path = {"PYTHONPATH": str(self.folder)}
+        done = subprocess.run([sys.executable, "-B", PLOT, "plot", "a.hdf"], env=os.environ | path, capture_output=True, text=True)
         self.assertEqual(done.returncode, 4)
         self.assertIn("has no h5py; install the package python3-h5py", done.stderr)
 
@@ -602,7 +593,7 @@ class Validation(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT / "validation.py", table, "-o", self.folder / "v.svg")
+        return scripts.run_script(PLOT, "validation", table, "-o", self.folder / "v.svg")
 
     def test_figure(self):
         rows = [self.ROW.format(name, h, 1e-3 * h) for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2)]
@@ -641,7 +632,7 @@ class WorkPrecision(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT / "work_precision.py", table, "-o", self.folder / "w.svg")
+        return scripts.run_script(PLOT, "work_precision", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         rows = 'series,energy_asked,error,estimate,cpu_ms\n"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
@@ -680,7 +671,7 @@ class StepCosts(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT / "step_costs.py", table, "-o", self.folder / "s.svg")
+        return scripts.run_script(PLOT, "step_costs", table, "-o", self.folder / "s.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS)
@@ -718,7 +709,7 @@ class WorkPrecisionFluid(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT / "work_precision_fluid.py", table, "-o", self.folder / "w.svg")
+        return scripts.run_script(PLOT, "work_precision_fluid", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))

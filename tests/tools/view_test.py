@@ -19,8 +19,8 @@ import matplotlib.image
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools/plot"))
-import view  # noqa: E402
+sys.path.insert(0, str(ROOT / "tools/python/tubule"))
+from drawing import view  # noqa: E402
 
 TUBULE = sys.argv[1]
 SCREENSHOTS = Path(sys.argv[sys.argv.index("--screenshots") + 1]) if "--screenshots" in sys.argv else None

@@ -12,6 +12,7 @@
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/python.hpp"
 #include "tools/command/text.hpp"
 
@@ -28,7 +29,7 @@ struct ChartOptions {
 };
 
 std::vector<std::string> script_arguments(const ChartOptions& o) {
-    std::vector<std::string> arguments = plot_command("chart", "chart.py");
+    std::vector<std::string> arguments = plot_command("chart", "chart");
     const auto pass = [&](const char* option, const std::string& value) {
         if (!value.empty()) arguments.push_back(fmt::format("--{}={}", option, value));
     };
@@ -69,7 +70,8 @@ int chart(const ChartOptions& options) {
 void add_chart(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("chart", "Run a case with many settings, and draw error against CPU time");
     const auto o = std::make_shared<ChartOptions>();
-    command->add_option("FILE", o->file, "a chart (docs/charts.md), or a case together with --vary")->required();
+    finds_installed_cases(
+        *command->add_option("FILE", o->file, "a chart (docs/charts.md), or a case together with --vary")->required());
     command
         ->add_option("--vary", o->vary,
                      "key=value,value,...: a key with its values. The last --vary makes the points of a line, those "

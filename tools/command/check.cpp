@@ -16,6 +16,7 @@
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
@@ -164,7 +165,7 @@ void add_check(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("check", "Validate cases, print the resolved cases and what they are expected to take");
     const auto options = std::make_shared<CheckOptions>();
-    command->add_option("CASE", options->cases, "case files")->required();
+    finds_installed_cases(*command->add_option("CASE", options->cases, "case files")->required());
     command->add_option("--set", options->sets, "override a key, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
     command->add_flag("--json", options->json, "as JSON, errors included: docs/schemas/check.json");

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/case/case.hpp"
@@ -43,6 +44,9 @@ struct RunOptions {
 };
 int run_cases(const RunOptions& options);
 std::filesystem::path result_path(const RunOptions& options, const Case& c);
+
+// Names and formulas of the terms of the energy, for pictures: all listed ones, and those that a case adds.
+std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bending);
 
 // Refuses, before anything is computed, a name that no result can have. Throws CaseError.
 void check_output(const std::filesystem::path& file);

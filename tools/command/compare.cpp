@@ -341,7 +341,7 @@ int run_compare(const CompareOptions& options) {
     const Text out = options.json ? json_text(c) : options.csv ? csv(c) : words(c);
     print_answer({out.data(), out.size()});
     if (!options.pictures.empty())
-        if (const int status = draw_by_script("compare", "compare.py", options.pictures, to_string(json_text(c))))
+        if (const int status = draw_by_script("compare", "compare", options.pictures, to_string(json_text(c))))
             return status;
     const bool agree = std::all_of(c.checks.begin(), c.checks.end(), [](const Check& check) { return check.holds(); });
     return agree ? 0 : beyond_tolerance;

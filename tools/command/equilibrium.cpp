@@ -11,6 +11,7 @@
 #include "common/result/result.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 
@@ -72,7 +73,7 @@ void add_equilibrium(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("equilibrium", "Find stationary shapes, follow branches of them, print them");
     const auto o = std::make_shared<RunOptions>();
-    command->add_option("CASE", o->cases, "case files with a table [equilibrium]")->required();
+    finds_installed_cases(*command->add_option("CASE", o->cases, "case files with a table [equilibrium]")->required());
     command->add_option("--set", o->sets, "override a key, such as --set equilibrium.modes=5")->allow_extra_args(false);
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
     command->add_flag("--overwrite", o->overwrite, "replace the result of another case");

@@ -1,4 +1,4 @@
-// tubule plot RESULT... : draws results by the Python scripts of tools/plot.
+// tubule plot RESULT... : draws results by the Python scripts of tools/python/tubule/drawing.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -49,20 +49,26 @@ bool is_plane(const std::string& text) {
     return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
-// NAME=LABEL of the terms that the cases of results add. A result that cannot be read is complained of by the script.
-std::vector<std::string> labels_of_added_terms(const std::vector<std::string>& results) {
+// NAME=LABEL of the listed terms, and of those that the cases of results add. A result that cannot be read is complained
+// of by the script.
+std::vector<std::string> labels_of_terms(const std::vector<std::string>& results) {
     std::vector<std::string> out;
+    const auto add = [&](const Bending& energy, std::size_t known) {
+        const auto labels = term_labels(energy);
+        for (std::size_t i = known; i < labels.size(); ++i)
+            out.push_back(fmt::format("{}={}", labels[i].first, labels[i].second));
+    };
+    add(Bending{}, 0);
     for (const std::string& result : results) try {
             const CaseText of = read_case_text(result);
-            for (const EnergyTerm& term : parse_case(of.text, of.sets, result).energy.terms)
-                out.push_back(fmt::format("{}={}", term_name(term), term_label(term)));
+            add(parse_case(of.text, of.sets, result).energy, n_bending_terms);
         } catch (const std::runtime_error&) {
         }
     return out;
 }
 
 std::vector<std::string> script_arguments(const PlotOptions& options) {
-    std::vector<std::string> arguments = plot_command("plot", "plot.py");
+    std::vector<std::string> arguments = plot_command("plot", "plot");
     arguments.push_back("--kind=" + options.kind);
     arguments.push_back("--plane=" + options.plane);
     if (!options.times.empty()) arguments.push_back(fmt::format("--times={}", fmt::join(options.times, ",")));
@@ -81,10 +87,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
         arguments.insert(arguments.end(), {"--movie=" + options.movie, fmt::format("--fps={}", options.fps)});
     if (!options.confirmed.empty()) arguments.push_back("--confirmed=" + options.confirmed);
     for (const std::string& label : options.labels) arguments.push_back("--label=" + label);
-    for_each_bending_term([&](std::size_t, const auto& term) {
-        arguments.push_back(fmt::format("--term={}={}", term.name, term.label));
-    });
-    for (const std::string& label : labels_of_added_terms(options.results)) arguments.push_back("--term=" + label);
+    for (const std::string& label : labels_of_terms(options.results)) arguments.push_back("--term=" + label);
     arguments.push_back("--");
     arguments.insert(arguments.end(), options.results.begin(), options.results.end());
     return arguments;
@@ -154,6 +157,13 @@ void add_movie_options(CLI::App& command, PlotOptions& options) {
 }
 
 }  // namespace
+
+std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bending) {
+    std::vector<std::pair<std::string, std::string>> labels;
+    for_each_bending_term([&](std::size_t, const auto& term) { labels.emplace_back(term.name, term.label); });
+    for (const EnergyTerm& term : bending.terms) labels.emplace_back(term_name(term), term_label(term));
+    return labels;
+}
 
 void add_plot(CLI::App& app, int& exit_status) {
     CLI::App* command =

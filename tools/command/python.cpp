@@ -16,6 +16,7 @@
 
 #include "build_config.hpp"
 #include "common/solve/message.hpp"
+#include "tools/command/installed.hpp"
 
 namespace tubule {
 
@@ -23,14 +24,6 @@ namespace {
 
 constexpr int no_picture = 4;
 constexpr const char* python = "/usr/bin/python3";  // PATH's python3 may lack Debian's modules
-
-// <prefix>/share/tubule/plot of an installed program, else the folder this program was built beside.
-std::filesystem::path script_path(const std::string& script) {
-    std::error_code ignored;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-    const auto installed = program.parent_path().parent_path() / "share/tubule/plot" / script;
-    return std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path(TUBULE_PLOT_DIR) / script;
-}
 
 // Waits for the command, which reads the file from its beginning. Its exit status.
 int wait_for(const std::string& subcommand, std::vector<std::string> command, std::FILE* input) {
@@ -58,11 +51,12 @@ std::vector<std::string> plot_command(const std::string& subcommand, const std::
     if (access(python, X_OK) != 0)
         throw std::runtime_error(fmt::format(
             "tubule {} needs {}; install the packages python3 python3-matplotlib python3-h5py", subcommand, python));
-    const std::string path = script_path(script);
-    if (!std::filesystem::exists(path))
-        throw std::runtime_error(
-            fmt::format("tubule {}: its script {} is missing; install or build tubule again", subcommand, path));
-    return {python, "-B", path};
+    const auto folder = installed(TUBULE_PYTHON_DIR "/tubule/drawing", "tools/python/tubule/drawing");
+    if (!std::filesystem::exists(folder / (script + ".py")))
+        throw std::runtime_error(fmt::format(
+            "tubule {}: its script {}.py is not in {}; install the package python3-tubule, or build tubule again",
+            subcommand, script, folder.string()));
+    return {python, "-B", folder, script};
 }
 
 int draw_by_script(const std::string& subcommand, const std::string& script, const std::vector<std::string>& arguments,

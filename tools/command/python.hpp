@@ -1,4 +1,4 @@
-// The Python scripts of tools/plot, for the subcommands that draw.
+// The Python scripts that draw: tools/python/tubule/drawing.
 #pragma once
 
 #include <string>

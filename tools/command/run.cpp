@@ -27,6 +27,7 @@
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/text.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/engine.hpp"
@@ -409,7 +410,9 @@ int run_cases(const RunOptions& options) {
 void add_run(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("run", "Run cases, each into a result file");
     const auto o = std::make_shared<RunOptions>();
-    command->add_option("CASE", o->cases, "case files; with --resume also results, which know their case")->required();
+    finds_installed_cases(
+        *command->add_option("CASE", o->cases, "case files; with --resume also results, which know their case")
+             ->required());
     command->add_option("--set", o->sets, "override a key, such as --set energy.k42=0.06")->allow_extra_args(false);
     command->add_option("-o,--output", o->output, "result file (default: name of the case, .hdf, in this directory)");
     command->add_flag(

@@ -15,6 +15,7 @@
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/ranked.hpp"
 #include "tools/command/text.hpp"
 #include "tools/scan/dispatcher.hpp"
@@ -165,11 +166,12 @@ void add_scan(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("scan", "Find what becomes of a case over lists, ranges and grids of its keys");
     const auto o = std::make_shared<ScanOptions>();
-    command
-        ->add_option("FILE", o->choices.file,
-                     "a scan file, a case file with --over or --points, or the result of a scan with --resume, "
-                     "--extend or --merge")
-        ->required();
+    finds_installed_cases(
+        *command
+             ->add_option("FILE", o->choices.file,
+                          "a scan file, a case file with --over or --points, or the result of a scan with --resume, "
+                          "--extend or --merge")
+             ->required());
     command
         ->add_option("--over", o->choices.over,
                      "a key and its values: energy.k42=0,0.1,0.2 or lo:hi:n or lo:hi:n:log; several make a grid")

@@ -24,6 +24,7 @@
 #include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
+#include "tools/command/installed.hpp"
 #include "tools/command/python.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
@@ -181,7 +182,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     if (tube) {
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
         if (!options.plot.empty())
-            if (const int status = draw_by_script("stability", "stability.py", {"--output", options.plot},
+            if (const int status = draw_by_script("stability", "stability", {"--output", options.plot},
                                                   tube_curves(options, *tube, models)))
                 throw NoPicture{status};
         return tube_report(options, *tube, models);
@@ -256,7 +257,7 @@ void add_stability(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("stability", "Growth rates of waves: in closed form, of any profile, or fitted");
     const auto o = std::make_shared<StabilityOptions>();
-    command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required();
+    finds_installed_cases(*command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required());
     command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
     std::vector<std::string> names{"all"};

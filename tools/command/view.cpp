@@ -1,4 +1,4 @@
-// tubule view RESULT: writes a page for a browser by the Python script of tools/plot.
+// tubule view RESULT: writes a page for a browser by the Python scripts of tools/python/tubule/drawing.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <stdexcept>
@@ -27,7 +27,7 @@ int view(const ViewOptions& options) {
         return 2;
     }
     try {
-        std::vector<std::string> arguments = plot_command("view", "view.py");
+        std::vector<std::string> arguments = plot_command("view", "view");
         if (!options.output.empty()) arguments.push_back("--output=" + options.output);
         arguments.insert(arguments.end(), {"--", options.result});
         return become("view", arguments);

@@ -1,6 +1,6 @@
 """Differences against triangles: shapes at rest, rates, and the energies of what moves."""
 
-import style  # from tools/plot, on the path since runs.py
+from drawing import style  # on the path since runs.py
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
 
 HEIGHT = 3.6  # inches
@@ -13,6 +13,7 @@ PANELS = (
 
 
 def draw(tables, path):
+    style.apply()
     plt = style.plt
     figure, panels = plt.subplots(1, len(PANELS), figsize=(style.WIDTH, HEIGHT), sharey=True, layout="constrained")
     for axes, (title, part, wanted) in zip(panels, PANELS):

@@ -13,9 +13,9 @@ import numpy as np
 
 import cases
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "plot"))
-from raster import division, lagrange  # noqa: E402
-from results import read_result  # noqa: E402
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python/tubule"))  # last: it has other modules of our names
+from drawing.raster import division, lagrange  # noqa: E402
+from drawing.results import read_result  # noqa: E402
 
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # CPU times are then comparable
 PIECES = 8  # subdivision of a triangle side in the search for extremes

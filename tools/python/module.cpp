@@ -6,7 +6,6 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include <Eigen/Core>
 #include <atomic>
 #include <csignal>
 #include <filesystem>
@@ -17,7 +16,9 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
+#include "common/series/catalogue.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/dispersion.hpp"
@@ -83,7 +84,7 @@ auto without_gil(int threads, const Work& work) {
             int threads;
             ~Reset() { omp_set_num_threads(threads); }
         } reset{before};
-        Eigen::setNbThreads(1);
+        multiply_on_one_thread();
         try {
             return work();
         } catch (const Paused& pause) {
@@ -279,6 +280,12 @@ void add_cases(py::module_& m) {
         .def_readonly("sets", &Case::sets)
         .def_readonly("title", &Case::title)
         .def_property_readonly("toml", &effective_toml)
+        .def_property_readonly("term_labels",
+                               [](const Case& c) {
+                                   py::dict out;
+                                   for (const auto& [name, label] : term_labels(c.energy)) out[py::str(name)] = label;
+                                   return out;
+                               })
         .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
     m.def("parse_case", &parse_case, py::arg("text"), py::arg("sets"), py::arg("path"));
     m.def("read_case", &read_case, py::arg("path"), py::arg("sets"));
@@ -307,6 +314,10 @@ void add_results(py::module_& m) {
 }
 
 void add_closed_forms(py::module_& m) {
+    m.def("series_meaning", [](const std::string& name) {
+        const SeriesEntry* entry = find_series(name);
+        return entry ? meaning_of(*entry, name) : name;
+    });
     m.def("density", &density_at);
     m.def("growth_rates", &growth_rates);
     m.def("profile_curvatures",

@@ -15,8 +15,9 @@ Keys of cases: docs/case_files.md. Series: docs/results.md. All numbers are dime
 from ._core import CaseError, SolveError, build_info as _build_info
 from .cases import Case
 from .commands import Scan, compare, curvatures, energy_density, equilibrium, run, run_many, scan, stability
+from .pictures import draw
 from .results import Frame, Result, read
 
 __version__ = dict(_build_info())["version"]
-__all__ = ["Case", "CaseError", "Frame", "Result", "Scan", "SolveError", "compare", "curvatures", "energy_density",
-           "equilibrium", "read", "run", "run_many", "scan", "stability"]
+__all__ = ["Case", "CaseError", "Frame", "Result", "Scan", "SolveError", "compare", "curvatures", "draw",
+           "energy_density", "equilibrium", "read", "run", "run_many", "scan", "stability"]

@@ -107,9 +107,11 @@ class Scan:
     keys, values   of each axis
     outcome        "uniform-tube", "pinched" ... (docs/scans.md)
     others         measures by name, such as energy, time, energy_error; NaN where a run does not tell
+    file           the result file, or None
     """
 
-    def __init__(self, read: dict):
+    def __init__(self, read: dict, file: str | None = None):
+        self.file = file
         self.keys = [keys[0] if len(keys) == 1 else tuple(keys) for keys, _ in read["axes"]]
         self.values = [np.array([_number(v[0]) if len(v) == 1 else " ".join(v) for v in values]) for _, values in read["axes"]]
         shape = tuple(len(v) for v in self.values)
@@ -162,7 +164,8 @@ def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: 
     axes = [_axis(key, values) for key, values in over.items()]
     with tempfile.TemporaryDirectory() as folder:
         file = os.fspath(output) if output is not None else str(Path(folder) / "scan.hdf")
-        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, overwrite, jobs, to_the_end))
+        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, overwrite, jobs, to_the_end),
+                    None if output is None else file)
 
 
 def energy_density(H, K, **moduli):

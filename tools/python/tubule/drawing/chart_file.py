@@ -1,0 +1,326 @@
+"""The description of a chart, from a chart file (TOML, docs/charts.md) or from options. Standard library only."""
+
+import difflib
+import itertools
+import math
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .chart_runs import Job, value_text
+from .labels import flatten
+
+CHART_KEYS = ("title", "case", "quantity", "times", "limit", "repeats", "set", "reference", "map", "series")
+SERIES_KEYS = ("name", "set", "vary", "study")
+REFERENCE_KEYS = ("result", "set", "values", "E_ref", "known_to", "source")
+MAP_KEYS = ("key", "from", "to", "per_decade", "steps")
+MOST_RUNS = 2000
+LARGEST_FILE = 2**20  # bytes
+
+
+class BadChart(Exception):
+    """One line for the user."""
+
+
+@dataclass
+class Series:
+    """Runs with every combination of values of the keys in `vary`; of several with one name, a line has all runs."""
+
+    name: str
+    sets: dict = field(default_factory=dict)
+    vary: dict = field(default_factory=dict)  # key -> list of values
+
+
+@dataclass
+class Reference:
+    """One of: a result, a run of its own, numbers (with what the errors are relative to, and how well they are known);
+    nothing: the run of the chart with the smallest stated error."""
+
+    result: Path | None = None
+    sets: dict | None = None
+    values: list | None = None
+    scale: float = 0.0
+    known_to: float = 0.0
+    source: str = ""
+
+
+@dataclass
+class Map:
+    """The largest stable value of `key`, by bisection between values on a logarithmic grid."""
+
+    key: str
+    low: float
+    high: float
+    per_decade: int = 6
+    steps: int | None = None  # of each run; else to the end of the case
+
+    @property
+    def values(self):
+        """The values, rounded to three digits."""
+        count = math.ceil(self.per_decade * math.log10(self.high / self.low) - 1e-9) + 1
+        return [float(f"{self.low * 10 ** (i / self.per_decade):.3g}") for i in range(count)]
+
+
+@dataclass
+class Chart:
+    path: Path
+    case: Path
+    title: str = ""
+    quantity: str = "energy"
+    times: list | None = None  # else those of the case
+    limit: float = 600.0
+    repeats: int = 1
+    sets: dict = field(default_factory=dict)
+    series: list = field(default_factory=list)
+    reference: Reference = field(default_factory=Reference)
+    map: Map | None = None
+
+    @property
+    def against(self):
+        """The key on the horizontal axis of a map."""
+        return list(self.series[0].vary)[-1]
+
+    def job(self, series, varied, more=()):
+        """`varied`: (key, value) that tell this run from others of its series."""
+        sets = dict(self.sets)
+        if self.times and not self.map:
+            sets["time.end"] = float(self.times[-1])
+            sets["time.output"] = [float(t) for t in self.times[:-1]]
+        sets |= series.sets
+        sets |= dict(varied)
+        sets |= dict(more)
+        told = tuple(f"{key.rpartition('.')[2]}={value_text(value)}" for key, value in varied)
+        return Job(series.name, self.case, tuple(f"{key}={value_text(value)}" for key, value in sets.items()), told)
+
+    def jobs(self):
+        """Jobs of a chart of error against time; maps choose theirs as they proceed."""
+        return [
+            self.job(series, list(zip(series.vary, values)))
+            for series in self.series
+            for values in itertools.product(*series.vary.values())
+        ]
+
+    def map_job(self, series, varied, value):
+        more = {}
+        if self.map.steps:
+            more = {"time.end": float(f"{self.map.steps * value:.6g}"), "time.output": []}
+        return self.job(series, [*varied, (self.map.key, value)], more.items())
+
+
+# ---- a chart file
+
+
+class Reader:
+    """A table of the file, with its place for messages."""
+
+    def __init__(self, path, table, where, keys):
+        self.path, self.table, self.where = path, table, where
+        if not isinstance(table, dict):
+            raise BadChart(f"{path}: {where}: must be a table")
+        for key in table:
+            if key not in keys:
+                near = difflib.get_close_matches(key, keys, 1)
+                meant = f"; did you mean {near[0]!r}?" if near else ""
+                raise BadChart(f"{path}: {self.name(key)}: unknown key; allowed: {', '.join(keys)}{meant}")
+
+    def name(self, key):
+        return f"{self.where}.{key}" if self.where else key
+
+    def fail(self, key, allowed):
+        raise BadChart(f"{self.path}: {self.name(key)}: must be {allowed}, not {self.table[key]!r}")
+
+    def text(self, key, default=""):
+        if not isinstance(self.table.get(key, default), str):
+            self.fail(key, "text")
+        return self.table.get(key, default)
+
+    def number(self, key, default=None, above=-math.inf, kind=float):
+        value = self.table.get(key, default)
+        if key not in self.table:
+            return value
+        if isinstance(value, bool) or not isinstance(value, (int, kind)) or not above < value < math.inf:
+            self.fail(key, f"{'an integer' if kind is int else 'a number'} above {above:g}")
+        return kind(value)
+
+    def numbers(self, key):
+        values = self.table.get(key)
+        if values is None:
+            return None
+        good = isinstance(values, list) and values and all(type(value) in (int, float) for value in values)
+        if not good:
+            self.fail(key, "a list of numbers")
+        return [float(value) for value in values]
+
+    def sets(self, key):
+        table = self.table.get(key, {})
+        if not isinstance(table, dict):
+            self.fail(key, "a table of case keys, such as { discretisation.order = 3 }")
+        return flatten(table)
+
+    def vary(self, key):
+        lists = self.sets(key)
+        for name, values in lists.items():
+            if not isinstance(values, list) or not values:
+                raise BadChart(f"{self.path}: {self.name(key)}.{name}: must be a list of values, not {values!r}")
+        return lists
+
+
+def toml_of(path):
+    """Raises BadChart."""
+    try:
+        if path.exists() and not path.is_file():
+            raise BadChart(f"{path}: is a directory, a pipe or a device, not a file")
+        if path.exists() and path.stat().st_size > LARGEST_FILE:
+            raise BadChart(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise BadChart(f"{path}: is not TOML: {error}") from error
+
+
+def read_chart(path, study):
+    """The chart of a file, without the series marked as a study unless requested. Raises BadChart."""
+    path = Path(path)
+    root = Reader(path, toml_of(path), "", CHART_KEYS)
+    if "case" not in root.table:
+        raise BadChart(f"{path}: case: is missing: the case file, relative to this file")
+    tables = root.table.get("series", [])
+    if not isinstance(tables, list) or not tables:
+        raise BadChart(f"{path}: needs at least one [[series]]")
+    chart = Chart(path, path.parent / root.text("case"), root.text("title"), root.text("quantity", "energy"))
+    chart.times = root.numbers("times")
+    chart.limit = root.number("limit", chart.limit, above=0)
+    chart.repeats = root.number("repeats", chart.repeats, above=0, kind=int)
+    chart.sets = root.sets("set")
+    chart.series = [one for i, table in enumerate(tables) if (one := read_series(path, table, i, study))]
+    chart.reference = read_reference(path, root.table.get("reference"))
+    if "map" in root.table:
+        chart.map = read_map(path, root.table["map"])
+    return chart
+
+
+def read_series(path, table, index, study):
+    reader = Reader(path, table, f"series.{index}", SERIES_KEYS)
+    if table.get("study") not in (None, True, False):
+        reader.fail("study", "true or false")
+    sets, vary = reader.sets("set"), reader.vary("vary")
+    name = reader.text("name") or words(sets) or "settings of the case"
+    return None if table.get("study") and not study else Series(name, sets, vary)
+
+
+def read_reference(path, table):
+    if table is None:
+        return Reference()
+    reader = Reader(path, table, "reference", REFERENCE_KEYS)
+    given = [key for key in ("result", "set", "values") if key in table]
+    if len(given) != 1:
+        raise BadChart(f"{path}: reference: needs one of result, set, values, not {' and '.join(given) or 'none'}")
+    if "values" in table and "E_ref" not in table:
+        raise BadChart(f"{path}: reference.E_ref: is missing: what the errors are relative to")
+    return Reference(
+        path.parent / reader.text("result") if "result" in table else None,
+        reader.sets("set") if "set" in table else None,
+        reader.numbers("values"),
+        reader.number("E_ref", 0.0, above=0),
+        reader.number("known_to", 0.0, above=0),
+        reader.text("source"),
+    )
+
+
+def read_map(path, table):
+    reader = Reader(path, table, "map", MAP_KEYS)
+    for key in ("key", "from", "to"):
+        if key not in table:
+            raise BadChart(f"{path}: map.{key}: is missing")
+    return Map(
+        reader.text("key"),
+        reader.number("from", above=0),
+        reader.number("to", above=0),
+        reader.number("per_decade", 6, above=0, kind=int),
+        reader.number("steps", None, above=0, kind=int),
+    )
+
+
+# ---- options
+
+
+def split(text):
+    """Splits at commas outside brackets."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts
+
+
+def plain(text):
+    """A TOML value; a bare word is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return text
+
+
+def assignment(text, option):
+    key, equals, value = text.partition("=")
+    if not (key and equals and value):
+        raise BadChart(f"{option} {text}: must be key=value, such as discretisation.order=3")
+    return key, value
+
+
+def words(sets):
+    return ", ".join(f"{key.rpartition('.')[2]} = {value_text(value)}" for key, value in sets.items())
+
+
+def chart_of_case(path, varied, also):
+    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadChart."""
+    keys = {}
+    for text in varied:
+        key, values = assignment(text, "--vary")
+        keys[key] = [plain(value) for value in split(values)]
+        if "" in keys[key]:
+            raise BadChart(f"--vary {text}: a value is empty")
+    *outer, last = keys
+    vary = {last: keys[last]}
+    lines = [dict(zip(outer, values)) for values in itertools.product(*(keys[key] for key in outer))]
+    lines += [{k: plain(v) for k, v in (assignment(one, "--also") for one in split(text))} for text in also]
+    series = [Series(words(sets) or "settings of the case", sets, dict(vary)) for sets in lines]
+    return Chart(Path(path), Path(path), series=series)
+
+
+def map_option(text):
+    key, values = assignment(text, "--map")
+    numbers = [plain(value) for value in values.split(":")]
+    if len(numbers) not in (2, 3) or not all(type(n) in (int, float) and n > 0 for n in numbers):
+        raise BadChart(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
+    return Map(key, float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else 6, 60)
+
+
+def check(chart):
+    """Checks that involve several keys. Raises BadChart."""
+    path = chart.path
+    if not chart.case.is_file():
+        raise BadChart(f"{path}: case: {chart.case}: no such file")
+    if not chart.series:
+        raise BadChart(f"{path}: every series is a study; add --study")
+    times = chart.times
+    if times and (times[0] <= 0 or any(a >= b for a, b in zip(times, times[1:]))):
+        raise BadChart(f"{path}: times: must be growing numbers above 0, not {times}")
+    if chart.reference.values and (not times or len(times) != len(chart.reference.values)):
+        raise BadChart(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
+    if chart.map:
+        if not chart.map.low < chart.map.high:
+            raise BadChart(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
+        for series in chart.series:
+            if len(series.vary) != 1 or list(series.vary) != [chart.against]:
+                raise BadChart(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
+            if not all(type(value) in (int, float) and value > 0 for value in series.vary[chart.against]):
+                raise BadChart(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
+        return
+    count = len(chart.jobs())
+    if count > MOST_RUNS:
+        raise BadChart(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")

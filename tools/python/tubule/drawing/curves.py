@@ -1,0 +1,137 @@
+"""Panel of profiles that are not graphs r(z), or that flow: sections through the axis, coloured by the normal velocity, with
+arrows for the velocity along the profile. Shapes at rest that have no velocity are coloured by H and K."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.path import Path
+
+from .colours import draw_bar
+from .flow import LONGEST_ARROW, ROUNDING, SHORTEST_ARROW, STILL, SYMBOLS, VELOCITY, arrow_style, draw_arrow_key
+from .labels import power, symbol
+from .tubes import ProfilePanel, caption
+
+BAND, OUTLINE = 2.8, 3.8  # points: the coloured line, and its outline
+POINTS_PER_INCH, MIN_POINTS = 150, 200  # along a profile
+ARROW_SPACING, ARROW_DISTANCE = 0.19, 0.075  # inches along a profile, and outside of it
+
+
+class Section:
+    """One profile in inches, evenly spaced points: x from the axis, y along it, unit normal, arc length."""
+
+    def __init__(self, frame, scale):
+        r, z = scale * frame.r, scale * (frame.z - (frame.z.min() + frame.z.max()) / 2)
+        self.along = np.concatenate([[0], np.cumsum(np.hypot(np.diff(r), np.diff(z)))])
+        self.length = self.along[-1]
+        self.places = np.linspace(0, self.length, max(MIN_POINTS, int(POINTS_PER_INCH * self.length)))
+        self.x, self.y = self.at(r), self.at(z)
+        # The inside is to the left of the profile, outward is to the right.
+        step = np.gradient(self.x), np.gradient(self.y)
+        size = np.hypot(*step) + 1e-300
+        self.normal = step[1] / size, -step[0] / size
+
+    def at(self, values):
+        return np.interp(self.places, self.along, values)
+
+    def beside(self, places, distance):
+        """Points displaced outward by a distance."""
+        x, y = self.x + distance * self.normal[0], self.y + distance * self.normal[1]
+        return np.interp(places, self.places, x), np.interp(places, self.places, y)
+
+
+def arrows(section, u_t, largest):
+    """Positions along the profile from tail to head of each visible arrow; one of the `largest` speed is the longest."""
+    count = max(3, round(section.length / ARROW_SPACING))
+    middles = (np.arange(count) + 0.5) * section.length / count
+    lengths = LONGEST_ARROW * np.interp(middles, section.places, u_t) / largest
+    seen = np.abs(lengths) >= SHORTEST_ARROW
+    return [
+        np.clip(np.linspace(middle - length / 2, middle + length / 2, 9), 0, section.length)
+        for middle, length in zip(middles[seen], lengths[seen])
+    ]
+
+
+class CurvePanel(ProfilePanel):
+    MARGIN = 0.14
+    COLUMN_GAP = 0.1
+    MAX_LENGTH = 3.2
+    by_run = False  # velocities relative to the largest ones of their run, else of each shape
+
+    def scale_by_run(self):
+        self.by_run = True
+
+    def _scale(self, name, frame, row):
+        frames = self.results[row].frames if self.by_run else [frame]
+        return max(other.largest(name) for other in frames)
+
+    def _choose_colours(self):
+        self.velocity = any(frame.u_n is not None for frame in self.frames)
+        if not self.velocity:
+            super()._choose_colours()
+
+    def _fastest(self, row):
+        """The largest speed over all frames of a run."""
+        return max((frame.speed for frame in self.results[row].frames), default=0.0)
+
+    def _still(self, frame, row):
+        return frame.speed <= max(STILL * self._fastest(row), ROUNDING * np.hypot(frame.length, frame.r.max()))
+
+    def _words(self, column, row):
+        frame, result = column.cells[row], self.results[row]
+        words = [caption(column, row, result.is_equilibrium)]
+        if frame and frame.parameter is not None:
+            key = result.case.get("equilibrium", {}).get("branch", {}).get("vary", "parameter")
+            name = symbol(key.split(".")[-1]).replace("_", " ")
+            words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {power(frame.parameter, 4)}")
+        if frame and frame.u_n is not None:
+            names = [] if self._still(frame, row) else ["u_n", "u_t"]
+            names = [name for name in (*names, "u_theta") if getattr(frame, name) is not None]
+            words += [f"|{SYMBOLS[name]}| \u2264 {power(frame.largest(name), 2)}" for name in names] or ["at rest"]
+        return "\n".join(word for word in words if word)
+
+    def _draw_profile(self, axes, frame, x, y):
+        section = Section(frame, self.scale)
+        row = next(i for i in range(len(self.results)) if any(column.cells[i] is frame for column in self.columns))
+        still = self._still(frame, row)
+        closing = np.concatenate([section.x, -section.x[::-1]]), np.concatenate([section.y, section.y[::-1]])
+        axes.fill(x + closing[0], y + closing[1], color="0.95", linewidth=0, zorder=0)
+        for side in (-1, 1):
+            points = np.column_stack([x + side * section.x, y + section.y])
+            axes.plot(*points.T, color="0.1", linewidth=OUTLINE, solid_capstyle="butt", zorder=3)
+            colour = self._colour(section, frame, side, 0 if still else self._scale("u_n", frame, row))
+            pieces = np.stack([points[:-2], points[1:-1], points[2:]], axis=1)  # overlapping: no gaps between
+            axes.add_collection(
+                LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
+            )
+            if frame.u_t is None or still:
+                continue
+            for places in arrows(section, section.at(frame.u_t), self._scale("u_t", frame, row)):
+                way_x, way_y = section.beside(places, ARROW_DISTANCE)
+                way = Path(np.column_stack([x + side * way_x, y + way_y]))
+                axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(places[-1] - places[0]))))
+        self._draw_axis(axes, frame, x, y)
+
+    def _colour(self, section, frame, side, largest):
+        if not self.velocity:
+            colours, values = (self.H, frame.H) if side < 0 else (self.K, frame.K)
+            return colours.rgb(section.at(values))
+        if frame.u_n is None:
+            return np.full((section.x.size, 3), 0.7)
+        relative = section.at(frame.u_n) / largest if largest else np.zeros(section.x.size)
+        return plt.get_cmap(VELOCITY)(0.5 + relative / 2)[:, :3]
+
+    def draw_colour_bars(self, figure, bottom):
+        if not self.velocity:
+            super().draw_colour_bars(figure, bottom)
+            return
+        flows = any(frame.u_t is not None for frame in self.frames)
+        what = "run" if self.by_run else "shape"
+        left, width = (0.06, 0.42) if flows else (0.29, 0.42)
+        draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
+                 f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {what}, > 0: outward")  # fmt: skip
+        if flows:
+            words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the {what}"
+            draw_arrow_key(figure, left + width + 0.05, bottom, words)

@@ -1,0 +1,219 @@
+"""Panel (b): bending energy over time, in total and by term, with the times of the profiles marked. Where the membrane
+has inertia, its kinetic energy is a band on top. Stationary shapes have an index instead of a time."""
+
+import numpy as np
+from matplotlib.colors import to_rgba
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from .labels import formula, number
+from .style import DASHES, MARKERS, WIDTH, line_colours, time_name, time_text
+
+STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
+HEIGHT = 2.15  # inches of the axes
+KINETIC, BAND_ALPHA = "kinetic E\u2096, up to E + E\u2096", 0.25
+VISIBLE = 2e-3  # part of the total below which a term would coincide with the zero line
+LEAST_CHANGE = 0.05  # of the height of the panel: terms are left out rather than that the total shows less of it
+SETTLED = 0.3  # the initial phase ends when this part of the change is left
+
+
+def monotone_cubic(x, y, points):
+    """Fritsch-Carlson interpolation: smooth between large steps, without overshoot. x strictly increasing."""
+    if x.size < 2:
+        return np.full(points.shape, y[0])
+    step, rise = np.diff(x), np.diff(y)
+    secant = rise / step
+    slope = np.empty_like(y)
+    slope[0] = _end_slope(step, secant)
+    slope[-1] = _end_slope(step[::-1], secant[::-1])
+    w1, w2 = 2 * step[1:] + step[:-1], step[1:] + 2 * step[:-1]
+    same_sign = secant[1:] * secant[:-1] > 0
+    safe = np.where(same_sign, secant[1:], 1), np.where(same_sign, secant[:-1], 1)
+    slope[1:-1] = np.where(same_sign, (w1 + w2) / (w1 / safe[1] + w2 / safe[0]), 0)
+    i = np.clip(np.searchsorted(x, points, side="right") - 1, 0, x.size - 2)
+    t = (points - x[i]) / step[i]
+    return (
+        y[i]
+        + rise[i] * t * t * (3 - 2 * t)
+        + step[i] * t * (1 - t) * (slope[i] * (1 - t) - slope[i + 1] * t)
+    )
+
+
+def _end_slope(step, secant):
+    """Slope of the parabola through the first three points, limited to prevent overshoot."""
+    if step.size < 2:
+        return secant[0]
+    slope = ((2 * step[0] + step[1]) * secant[0] - step[0] * secant[1]) / (step[0] + step[1])
+    return np.clip(slope, *sorted((0.0, 3 * secant[0])))
+
+
+def settling_time(result):
+    """Time after which at most SETTLED of the energy's change is left; infinite if it is constant."""
+    time, energy = result.series["time"], result.series["energy"]
+    if result.has_inertia:
+        energy = energy + result.series["kinetic_energy"]  # bending energy oscillates
+    left = np.abs(energy - energy[-1])
+    if left.max() <= 1e-9 * np.abs(energy).max():
+        return np.inf
+    late = np.flatnonzero(left > SETTLED * left.max())
+    return time[min(late[-1] + 1, time.size - 1)] if late.size else time[0]
+
+
+def visible_terms(results, known):
+    """Terms to draw: above VISIBLE of the total in some result."""
+    names = list(dict.fromkeys(name for result in results for name in result.terms(known)))
+    return [name for name in names if any(_matters(result, name) for result in results)]
+
+
+def _matters(result, name):
+    values = result.series.get(f"energy_{name}", np.zeros(1))
+    return np.abs(values).max() > VISIBLE * np.abs(result.series["energy"]).max()
+
+
+def _lines_of(words):
+    """The text in one line if it is short."""
+    line = ", ".join(words)
+    return line if len(line) <= 32 else ",\n".join(words)
+
+
+def relative_ticks(axis, name):
+    """On an axis with small changes of a large number, ticks are relative to that number; returns the label of the axis,
+    which says so. (Matplotlib would write the number above the axis, where the times are.)"""
+    low, high = sorted(axis.get_view_interval())
+    if high - low > 1e-3 * max(abs(low), abs(high)):
+        return name
+    exponent = int(np.floor(np.log10(high - low)))
+    base = np.floor(low / 10 ** (exponent + 1)) * 10 ** (exponent + 1)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: number((value - base) / 10**exponent)))
+    return f"({name} \u2212 {base:.{max(0, -exponent - 1)}f}) / " + formula(f"10^{{{exponent}}}")
+
+
+class EnergyPanel:
+    """Lines of `results` (all with an energy series); one label per result; `times` marked on them."""
+
+    def __init__(self, results, labels, times, term_labels):
+        self.results, self.times, self.term_labels = results, times, term_labels
+        lone = len(results) == 1
+        self.numbered = all(result.is_equilibrium for result in results)
+        self.kinetic = any(result.has_inertia for result in results)
+        self.labels = ["bending E" if self.kinetic else "total"] if lone else [_lines_of(label) for label in labels]
+        self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
+        self.settled = max(map(settling_time, results))
+        self.colours = line_colours(len(results))
+        self.terms = [] if self._terms_hide_change() else visible_terms(results, term_labels)
+        self.height = HEIGHT + 0.62
+
+    def _terms_hide_change(self):
+        """Whether an axis with all terms would show the total as a straight line."""
+        rows = [result.series for result in self.results]
+        every = [values for row in rows for name, values in row.items() if name.startswith("energy_") and name != "energy_error"]
+        if not every:
+            return False
+        change = max(float(np.ptp(row["energy"])) for row in rows)
+        span = max(row["energy"].max() for row in rows) - min(float(values.min()) for values in every)
+        return change < LEAST_CHANGE * span
+
+    def draw(self, figure, bottom):
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
+        width, height = figure.get_size_inches()
+        y, tall = (bottom + 0.38) / height, HEIGHT / height
+        handles = self._legend_entries()
+        longest = max(len(line) for handle in handles for line in handle.get_label().split("\n"))
+        legend_width = 0.5 + 0.06 * longest
+        left, right = 0.6, width - legend_width - 0.1
+        initial = min((t for t in self.times if t >= self.settled), default=self.settled) * 1.03
+        early = initial < 0.3 * self.end
+        decades = self.settled < 0.01 * self.end
+        if early and not decades:
+            gap = 0.3
+            first = (right - left - gap) / 2
+            zoom = figure.add_axes([left / width, y, first / width, tall])
+            whole = figure.add_axes([(left + first + gap) / width, y, first / width, tall], sharey=zoom)
+            whole.tick_params(labelleft=False)
+            self._lines(zoom, 0, initial, False)
+            self._lines(whole, 0, self.end, False)
+            axes = [zoom, whole]
+            zoom.set_xlabel("time t (initial phase)", labelpad=2)
+            whole.set_xlabel("time t (whole run)", labelpad=2)
+        else:
+            axes = [figure.add_axes([left / width, y, (right - left) / width, tall])]
+            start = self._first_time() if decades else 0.0
+            self._lines(axes[0], start, self.end, decades)
+            axes[0].set_xlabel("number of the shape" if self.numbered else "time t", labelpad=2)
+        axes[0].set_ylabel(relative_ticks(axes[0].yaxis, "energy" if self.kinetic else "bending energy E"), labelpad=3)
+        axes[-1].legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0, labelspacing=0.45
+        )
+
+    def _first_time(self):
+        steps = [result.series["time"][1] for result in self.results if result.series["time"].size > 1]
+        positive = [time for time in self.times if time > 0] + steps
+        return max(min(positive) / 3, 1e-6 * self.end)
+
+    def _term_names(self):
+        return {name: formula(self.term_labels.get(name, f"E_{{{name}}}")) for name in self.terms}
+
+    def _lines(self, axes, start, end, log):
+        if log:
+            axes.set_xscale("log")
+        axes.set_xlim(start, end if log else end + 0.02 * (end - start))
+        if not log:
+            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+        for row, (result, colour) in enumerate(zip(self.results, self.colours)):
+            time = result.series["time"]
+            grid = (np.geomspace if log else np.linspace)(start, end, 500)
+            grid = np.union1d(grid[(grid >= time[0]) & (grid <= time[-1])], time[(time >= start) & (time <= end)])
+            several = sum(_matters(result, name) for name in self.terms) > 1
+            for name, dashes in zip(self.terms, DASHES * len(self.terms)):
+                if several and _matters(result, name):
+                    values = monotone_cubic(time, result.series[f"energy_{name}"], grid)
+                    axes.plot(grid, values, color=colour, linestyle=dashes, linewidth=0.8)
+            bending = monotone_cubic(time, result.series["energy"], grid)
+            axes.plot(grid, bending, color=colour, zorder=3)
+            if result.has_inertia:
+                total = bending + np.maximum(monotone_cubic(time, result.series["kinetic_energy"], grid), 0)
+                axes.fill_between(grid, bending, total, color=colour, linewidth=0, alpha=BAND_ALPHA, zorder=1)
+                axes.plot(grid, total, color=colour, linewidth=0.6, zorder=2)
+            marks = np.array([t for t in self.times if time[0] <= t <= time[-1] * (1 + 1e-9) and start <= t <= end])
+            values = monotone_cubic(time, result.series["energy"], np.minimum(marks, time[-1]))
+            marker = MARKERS[row % len(MARKERS)]
+            axes.plot(marks, values, marker, color=colour, mec="white", mew=0.4, clip_on=False, zorder=4)
+            if result.stopped_early and start <= time[-1] <= end:
+                axes.plot(time[-1], result.series["energy"][-1], clip_on=False, zorder=5, **STOP_MARK)
+        self._mark_times(axes, start, end)
+
+    def _mark_times(self, axes, start, end):
+        """t0, t1, ... above the axes; of overlapping labels only the first is kept."""
+        inches = axes.get_position().width * WIDTH
+        before = -1.0
+        for index, time in enumerate(self.times):
+            if not start <= time <= end:
+                continue
+            axes.axvline(time, color="0.75", linewidth=0.5, zorder=0)
+            place = axes.transLimits.transform(axes.transScale.transform((time, 1)))[0] * inches
+            if place - before > 0.095 and not self.numbered:
+                axes.annotate(time_name(index), (time, 1), (0, 2), xycoords=("data", "axes fraction"),
+                              textcoords="offset points", ha="center", va="bottom", fontsize=7)
+                before = place
+
+    def _legend_entries(self):
+        handles = []
+        for row, (result, label, colour) in enumerate(zip(self.results, self.labels, self.colours)):
+            marker = MARKERS[row % len(MARKERS)]
+            handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
+            if result.stopped_early:
+                time = time_text(result.about.get("stop_time", result.end_time))
+                text = result.stopped_early if self.numbered else f"{result.stopped_early} at t = {time}"
+                handles.append(Line2D([], [], label=text, **STOP_MARK))
+        lone = len(self.results) == 1
+        shade = self.colours[0] if lone else "0.3"
+        if self.kinetic:
+            handles.append(Patch(facecolor=to_rgba(shade, BAND_ALPHA), edgecolor=shade, linewidth=0.6, label=KINETIC))
+        if len(self.terms) > 1:
+            if not lone:
+                handles.append(Line2D([], [], color=shade, label="bending E" if self.kinetic else "total"))
+            for dashes, (name, text) in zip(DASHES * len(self.terms), self._term_names().items()):
+                handles.append(Line2D([], [], color=shade, linewidth=0.9, linestyle=dashes, label=text))
+        return handles

@@ -1,0 +1,220 @@
+"""A film of one result: the shape at its frames, and the energy beside it. Camera, size and colour scale stay the same."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from . import flow, raster
+from .colours import Colours, colour_scale, curvature_colours, draw_bar
+from .command_line import Unavailable, say
+from .labels import power, symbol
+from .results import BadInput
+from .style import draw_scale_bar, line_colours, time_text
+from .surfaces import node_areas
+from .tubes import ring_areas
+
+SIZE, DPI = (8.0, 4.5), 100  # inches; pixels per inch: 800 x 450, even as codecs want them
+BOX = 0.35, 0.75, 4.1, 3.45  # of the shape: left, bottom, width, height in inches
+AROUND, ALONG = 72, 240  # pieces of a profile that is turned around the axis
+FORMATS = (".mp4", ".gif")
+SAY_EVERY = 5.0  # seconds between lines about the progress, off a terminal
+
+
+@dataclass
+class Picture:
+    """What is drawn of a frame: triangles as results.Surface has them, and one number for each node."""
+
+    order: int
+    closed: bool
+    points: np.ndarray
+    normal: np.ndarray
+    values: np.ndarray
+
+
+def revolved(frame, values):
+    """The surface of revolution of a profile, as flat triangles with the normals of the profile."""
+    step = np.hypot(np.diff(frame.r), np.diff(frame.z))
+    along = np.concatenate([[0], np.cumsum(step)])
+    places = np.linspace(0, along[-1], ALONG + 1)
+    r, z, v = (np.interp(places, along, array) for array in (frame.r, frame.z, values))
+    way = np.column_stack([np.gradient(z), -np.gradient(r)])  # outward is to the right of the profile
+    way /= np.linalg.norm(way, axis=1, keepdims=True) + 1e-300
+    angle = np.linspace(0, 2 * np.pi, AROUND + 1)
+    cos, sin = np.cos(angle), np.sin(angle)
+
+    def grid(radial, axial):
+        return np.stack([np.outer(radial, cos), np.outer(radial, sin), np.outer(axial, np.ones_like(angle))], axis=-1)
+
+    def triangles(nodes):
+        a, b, c, d = nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1]
+        pieces = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
+        return pieces.reshape(-1, 3, *nodes.shape[2:])
+
+    poles = max(frame.r[0], frame.r[-1]) < 1e-6 * frame.r.max()
+    ring = np.hypot(frame.r[0] - frame.r[-1], frame.z[0] - frame.z[-1]) < 1e-6 * frame.r.max()  # a torus
+    values_there = np.broadcast_to(v[:, None], (v.size, angle.size))
+    return triangles(grid(r, z)), triangles(grid(*way.T)), triangles(values_there), poles or ring
+
+
+def picture(frame, name):
+    values = getattr(frame, name)
+    if hasattr(frame, "order"):
+        return Picture(frame.order, frame.closed, frame.points, frame.normal, values)
+    points, normal, values, closed = revolved(frame, values)
+    return Picture(1, closed, points, normal, values)
+
+
+def extent(frame, view):
+    """Corners of what the frame covers in the picture."""
+    if hasattr(frame, "order"):
+        return view.extent(frame.points.reshape(-1, 3))
+    return view.extent(revolved(frame, frame.H)[0].reshape(-1, 3))
+
+
+def colours_of(result, frames, name):
+    """One scale for all frames."""
+    if any(getattr(frame, name, None) is None for frame in frames):
+        raise BadInput(f"--colour: not all frames have {name}")
+    areas = [(node_areas if hasattr(frame, "order") else ring_areas)(frame).ravel() for frame in frames]
+    if name in "HK":
+        colours = curvature_colours([result], frames, areas)["HK".index(name)]
+        colours.label = colours.label.format("")
+        return colours
+    values = [getattr(frame, name).ravel() for frame in frames]
+    if name == "u_n":
+        largest = max(float(np.abs(v).max()) for v in values) or 1.0
+        label = f"normal velocity {flow.SYMBOLS['u_n']}, > 0: outward"
+        return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
+    mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
+    return Colours("PRGn", *colour_scale(values, areas, mean), f"pressure p, white: its mean {power(mean, 3)}")
+
+
+class Stage:
+    """The page on which one frame after the other is drawn."""
+
+    def __init__(self, result, frames, name, title):
+        self.result, self.frames, self.quantity = result, frames, name
+        self.colours = colours_of(result, frames, name)
+        self.view = raster.View()
+        ends = [extent(frame, self.view) for frame in frames]
+        self.low, self.high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
+        self.scale = min(np.array(BOX[2:]) / (self.high - self.low))  # inches per unit of length
+        self.figure = Figure(figsize=SIZE)
+        self.figure.text(0.5, 0.985, title, ha="center", va="top", fontsize=10)
+        self._draw_shape_axes()
+        self._draw_energy()
+
+    def _draw_shape_axes(self):
+        mappable = ScalarMappable(self.colours.norm, self.colours.map)
+        draw_bar(self.figure, 0.1, 0.06, 0.44, mappable, self.colours.label, self.colours.extend)
+        axes = self.figure.add_axes([0, 0, 1, 1])
+        axes.set(xlim=(0, SIZE[0]), ylim=(0, SIZE[1]))
+        axes.axis("off")
+        centre = np.array(BOX[:2]) + np.array(BOX[2:]) / 2
+        size = self.scale * (self.high - self.low)
+        left, bottom = np.round((centre - size / 2) * DPI) / DPI
+        self.pixels = np.ceil(size * DPI).astype(int)  # width, height
+        extent = left, left + self.pixels[0] / DPI, bottom, bottom + self.pixels[1] / DPI
+        self.image = axes.imshow(np.zeros((2, 2, 4), np.uint8), extent=extent, interpolation="none", aspect="auto")
+        axes.set(xlim=(0, SIZE[0]), ylim=(0, SIZE[1]))  # imshow changes them
+        draw_scale_bar(axes, BOX[0] + BOX[2] + 0.05, BOX[1], (self.high - self.low)[1] / 3, self.scale)
+        self.words = axes.text(BOX[0], SIZE[1] - 0.45, "", va="top", fontsize=9)
+
+    def _x(self, frame):
+        """What the energy is drawn against: time, or the parameter of a branch."""
+        return frame.time if getattr(frame, "parameter", None) is None else frame.parameter
+
+    def _draw_energy(self):
+        parameter = getattr(self.frames[0], "parameter", None) is not None
+        series = self.result.series
+        self.dot, key = None, "parameter" if parameter and "parameter" in series else "time"
+        self.name = str(self.result.case.get("equilibrium", {}).get("branch", {}).get("vary", "")).split(".")[-1]
+        if "energy" not in series or len(series["energy"]) < 2:
+            return
+        axes = self.figure.add_axes([0.66, 0.17, 0.31, 0.68])
+        axes.plot(series[key], series["energy"], color=line_colours(1)[0])
+        axes.set(xlabel=symbol(self.name).replace("_", " ") if parameter else "time t", ylabel="energy E")
+        (self.dot,) = axes.plot([], [], "o", color="C3", markersize=6)
+        self.energy = np.asarray(series[key]), np.asarray(series["energy"])
+
+    def draw(self, index):
+        frame = self.frames[index]
+        shape = picture(frame, self.quantity)
+        width, height = self.pixels
+        per_unit = self.scale * DPI * raster.OVERSAMPLING
+        samples = raster.sample(
+            shape.points, shape.normal, shape.values[..., None], shape.order, shape.closed, self.view,
+            (self.low[0], self.high[1]), per_unit, width * raster.OVERSAMPLING, height * raster.OVERSAMPLING,
+        )  # fmt: skip
+        there = np.isfinite(samples.depth)
+        self.image.set_data(raster.shaded(samples, self.colours.rgb(samples.values[there, 0])))
+        parameter = getattr(frame, "parameter", None)
+        name = "t" if parameter is None else symbol(self.name).replace("_", " ")
+        self.words.set_text(f"{name} = {time_text(self._x(frame))}")
+        if self.dot:
+            x, energy = self.energy
+            nearest = int(np.argmin(np.abs(x - self._x(frame))))
+            self.dot.set_data([x[nearest]], [energy[nearest]])
+
+
+class Progress:
+    """On a terminal a line that changes, elsewhere a line now and then."""
+
+    def __init__(self, count):
+        self.count, self.last, self.live = count, time.monotonic(), sys.stderr.isatty()
+
+    def __call__(self, done):
+        if self.live:
+            end = "\n" if done == self.count else ""
+            print(f"\rframe {done} of {self.count}", end=end, file=sys.stderr, flush=True)
+        elif time.monotonic() - self.last > SAY_EVERY:
+            say(f"frame {done} of {self.count}")
+            self.last = time.monotonic()
+
+
+def writer_for(path, fps):
+    ending = os.path.splitext(path)[1].lower()
+    if ending not in FORMATS:
+        raise BadInput(f"{path}: a film is written as one of {', '.join(FORMATS)}")
+    if not os.path.isdir(os.path.dirname(path) or "."):
+        raise BadInput(f"{path}: the folder {os.path.dirname(path)} does not exist")
+    if ending == ".gif":
+        return PillowWriter(fps=fps)
+    if not shutil.which("ffmpeg"):
+        raise Unavailable(f"{path}: needs ffmpeg; install the package ffmpeg, or write a .gif")
+    return FFMpegWriter(fps=fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
+
+
+def draw(result, frames, path, name, title, fps):
+    """Writes the film of these frames of a result, coloured by a quantity; a file of that name is replaced at the end."""
+    writer = writer_for(path, fps)
+    if len(frames) < 2:
+        raise BadInput(f"{result.path}: has {len(frames)} frames; a film needs two or more (time.output in the case)")
+    stage, progress = Stage(result, frames, name, title), Progress(len(frames))
+    base, ending = os.path.splitext(path)
+    part = f"{base}.part{ending}"
+    try:
+        with writer.saving(stage.figure, part, DPI):
+            for index in range(len(frames)):
+                stage.draw(index)
+                writer.grab_frame()
+                progress(index + 1)
+        os.replace(part, path)
+    except subprocess.CalledProcessError as error:
+        if isinstance(error.__context__, KeyboardInterrupt):  # Ctrl-C reaches ffmpeg, too
+            raise error.__context__
+        raise Unavailable(f"{path}: ffmpeg failed: {(error.stderr or error.output or '').strip()[-200:]}") from error
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error}") from error
+    finally:
+        if os.path.exists(part):
+            os.remove(part)

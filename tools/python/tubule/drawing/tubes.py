@@ -1,0 +1,216 @@
+"""Panel (a): one row of profiles per result, one column per time. Tubes r(z): left halves coloured by H, right by K."""
+
+from dataclasses import dataclass
+from operator import attrgetter
+
+import numpy as np
+from matplotlib.collections import QuadMesh
+
+from .colours import curvature_colours, draw_bars
+from .labels import number, wrapped
+from .results import BadInput
+from .style import WIDTH, draw_scale_bar, time_text, time_title
+
+MAX_COLUMNS = 6
+MAX_HEIGHT = 5.6  # inches of all rows together
+MAX_TUBE_WIDTH = 1.5  # inches
+ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.24, 16
+SCALE_BAR = 0.3  # inches right of the last column
+STRIPS = 40  # across half a tube
+MIN_POINTS, POINTS_PER_INCH = 300, 150  # along a tube
+
+
+@dataclass
+class Column:
+    time: float | None  # None: the last state of runs that ended before the first common time or after the last
+    cells: list  # a Frame or None for each result
+    stops: list  # why the run ended with this frame, or None
+
+
+def same_time(a, b, span):
+    return abs(a - b) <= 1e-6 * abs(b) + 1e-12 * span
+
+
+def choose_columns(results, times=None, frames_of=attrgetter("frames")):
+    """Columns of frames at the wanted times, else at up to six of the available times, evenly spaced by index.
+
+    Times that all results have go before others. Of several results, the last frame of one that did not get
+    to its end is no common time: it stands, with the reason, in the first later column.
+    """
+    span = max(result.end_time for result in results)
+    lone = len(results) == 1
+
+    def is_stop(result, frame):
+        return result.stopped_early is not None and frame.time >= result.last_shape_time
+
+    def has(result, time):
+        """The frame at that time, or None because the run had stopped."""
+        ended = result.stopped_early is not None and result.end_time < time
+        return ended or any(same_time(frame.time, time, span) for frame in frames_of(result))
+
+    candidates = []
+    for time in sorted(f.time for r in results for f in frames_of(r) if lone or not is_stop(r, f)):
+        if not candidates or not same_time(time, candidates[-1], span):
+            candidates.append(time)
+    shared = [time for time in candidates if all(has(result, time) for result in results)]
+    if len(shared) > 2:
+        candidates = shared
+    if times:
+        available = sorted({f.time for r in results for f in frames_of(r)})
+        for time in times:
+            if not any(same_time(time, other, span) for other in available):
+                known = ", ".join(time_text(t) for t in available[:12]) + (", ..." if len(available) > 12 else "")
+                raise BadInput(f"--times: no result has a frame at t = {number(time)}; there are frames at {known}")
+        candidates = sorted(set(times))
+    elif len(candidates) > MAX_COLUMNS:
+        picks = np.linspace(0, len(candidates) - 1, MAX_COLUMNS).round().astype(int)
+        candidates = [candidates[i] for i in picks]
+
+    columns = [Column(time, [None] * len(results), [None] * len(results)) for time in candidates]
+    last = Column(None, [None] * len(results), [None] * len(results))
+    for row, result in enumerate(results):
+        for frame in frames_of(result):
+            column = next((c for c in columns if same_time(frame.time, c.time, span)), None)
+            if column is None and is_stop(result, frame) and not times:
+                column = next((c for c in columns if c.time > frame.time), last)
+            if column:
+                column.cells[row] = frame
+                column.stops[row] = result.stopped_early if is_stop(result, frame) else None
+    return columns + ([last] if any(last.cells) else [])
+
+
+def caption(column, row, numbered=False):
+    """Why the run of a row ended with the frame in this column, and when unless the column's header says it, or
+    frames have numbers in place of times."""
+    stop, frame = column.stops[row], column.cells[row]
+    if not stop:
+        return ""
+    shown = column.time is not None and same_time(frame.time, column.time, frame.time)
+    return stop if shown or numbered else f"{stop}\nt = {time_text(frame.time)}"
+
+
+def ring_areas(frame):
+    """Area of each value of a profile, up to a common factor."""
+    return np.abs(frame.r) * np.hypot(np.gradient(frame.r), np.gradient(frame.z)) + 1e-300
+
+
+class ProfilePanel:
+    """Sizes everything in inches first, so that the figure can be made to fit; then draws. How one profile is drawn
+    and coloured, and what is written below it, is defined by derived classes."""
+
+    MARGIN = 0.0  # inches of margin around a profile
+    COLUMN_GAP = 0.14
+    MAX_LENGTH = MAX_HEIGHT  # inches of the longest profile
+
+    def __init__(self, results, labels, columns):
+        self.results, self.columns = results, columns
+        lone = len(results) == 1  # its label is the title of the picture
+        self.labels = [""] if lone else [wrapped(label, LABEL_WIDTH) for label in labels]
+        frames = [frame for column in columns for frame in column.cells if frame]
+        self.frames = frames
+        lines = [line for label in self.labels for line in label.split("\n")]
+        self.left = 0.2 + 0.062 * max(map(len, lines))
+
+        widths = [2 * max(frame.r.max() for frame in column.cells if frame) for column in columns]
+        cells_of_rows = zip(*(column.cells for column in columns))
+        self.lengths = lengths = [max((f.length for f in cells if f), default=0.0) for cells in cells_of_rows]
+        self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
+        captions = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
+        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - (self.COLUMN_GAP + 2 * self.MARGIN) * len(columns)
+        room_y = MAX_HEIGHT - sum(captions) - (ROW_GAP + 2 * self.MARGIN) * len(results)
+        self.scale = min(
+            room_x / sum(widths),
+            room_y / sum(lengths),
+            MAX_TUBE_WIDTH / max(widths),
+            self.MAX_LENGTH / max(lengths),
+        )
+
+        # A label or a column header needs room even where the tube is small.
+        cell_widths = [max(self.scale * width, 0.62) for width in widths]
+        squeeze = room_x / max(room_x, sum(cell_widths))
+        gap = self.COLUMN_GAP + 2 * self.MARGIN
+        pitch = [squeeze * width + gap for width in cell_widths]
+        slack = (room_x + gap * len(columns) - sum(pitch)) / len(columns)
+        slack = min(slack, 0.5)
+        self.centres = self.left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
+        label_heights = [0.14 * (label.count("\n") + 1) for label in self.labels]
+        tube_heights = [max(self.scale * length + 2 * self.MARGIN, label) for length, label in zip(lengths, label_heights)]
+        self.height = HEADER + sum(tube_heights) + sum(captions) + ROW_GAP * len(results)
+        tops = self.height - HEADER - np.cumsum([0, *(t + c + ROW_GAP for t, c in zip(tube_heights, captions))][:-1])
+        self.middles = [top - tall / 2 for top, tall in zip(tops, tube_heights)]
+        if lone:
+            occupied = self.centres[0] - self.scale * widths[0] / 2, self.centres[-1] + self.scale * widths[-1] / 2
+            self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
+        else:  # in the middle of what is right of the labels
+            self.centres += (room_x + gap * len(columns) - sum(pitch) - slack * len(columns)) / 2
+        self.right = self.centres[-1] + self.scale * widths[-1] / 2 + self.MARGIN
+        self._choose_colours()
+
+    def _choose_colours(self):
+        self.H, self.K = curvature_colours(self.results, self.frames, [ring_areas(frame) for frame in self.frames])
+
+    def _words(self, column, row):
+        """Below the profile of that row and column."""
+        return caption(column, row)
+
+    def draw(self, figure, bottom):
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
+        width, height = figure.get_size_inches()
+        axes = figure.add_axes([0, bottom / height, 1, self.height / height])
+        axes.set(xlim=(0, width), ylim=(0, self.height))
+        axes.axis("off")
+        for index, (column, x) in enumerate(zip(self.columns, self.centres)):
+            axes.text(x, self.height - 0.06, self._title(index, column), ha="center", va="top")
+            captions = [row[index] for row in self.captions]
+            for frame, caption, y, length in zip(column.cells, captions, self.middles, self.lengths):
+                if frame:
+                    self._draw_profile(axes, frame, x, y)
+                if caption:
+                    below = y - self.scale * length / 2 - self.MARGIN - 0.07
+                    axes.text(x, below, caption, ha="center", va="top", fontsize=6.5, linespacing=1.1)
+        for label, y in zip(self.labels, self.middles):
+            axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
+        longest = max(frame.length for frame in self.frames)
+        draw_scale_bar(axes, self.right + 0.14, self.middles[-1] - self.scale * longest / 2, longest / 2, self.scale)
+
+    def _title(self, index, column):
+        if column.time is not None and all(result.is_equilibrium for result in self.results):
+            return f"shape {number(column.time)}" if len(self.columns) > 1 else ""
+        return time_title(index, column.time)
+
+    def _draw_axis(self, axes, frame, x, y):
+        reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
+        axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
+
+    def draw_colour_bars(self, figure, bottom):
+        """Two colour bars in the 0.5 inches above `bottom`."""
+        draw_bars(figure, bottom, self.H, self.K, " (left halves)", " (right halves)")
+
+
+class TubePanel(ProfilePanel):
+    """Of tubes r(z), as shaded bodies."""
+
+    def _draw_profile(self, axes, frame, x, y):
+        points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))
+        place = np.linspace(0, frame.z.size - 1, points)  # as dense as the samples of the frame
+
+        def sampled(values):
+            return np.interp(place, np.arange(frame.z.size), values)
+
+        r = self.scale * sampled(frame.r)
+        z = self.scale * sampled(frame.z - (frame.z.min() + frame.z.max()) / 2) + y
+        # Strips of equal angle around the axis; the light comes from the viewer, from slightly above.
+        s = np.sin(np.linspace(0, np.pi / 2, STRIPS + 1))
+        middle = (s[1:] + s[:-1]) / 2
+        slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened, because necks would become black
+        lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
+        shade = (0.85 + 0.15 * np.clip(lit, 0, 1))[..., None]
+        for side, values, colours in ((-1, frame.H, self.H), (1, frame.K, self.K)):
+            values = sampled(values)
+            rgb = colours.rgb((values[1:] + values[:-1]) / 2)[:, None] * shade
+            corners = np.stack([x + side * r[:, None] * s, np.broadcast_to(z[:, None], (z.size, s.size))], axis=-1)
+            mesh = QuadMesh(corners, antialiased=False, rasterized=True, linewidth=0, zorder=1)
+            mesh.set_facecolor(rgb.reshape(-1, 3))
+            axes.add_collection(mesh, autolim=False)
+            axes.plot(x + side * r, z, color="0.1", linewidth=0.7, solid_capstyle="butt", zorder=3)
+        self._draw_axis(axes, frame, x, y)
