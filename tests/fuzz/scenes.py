@@ -137,12 +137,13 @@ def scene(draw, ensembles=0.5):
 class Run:
     """A case run to its end: how it ended, what it states, and its free energies by time."""
 
-    def __init__(self, box, case, *sets, limit=LIMIT):
+    def __init__(self, box, case, *sets, limit=LIMIT, command="run", quantity="free_energy"):
         box.write("case.toml", toml.dump(case))
         result = box.folder / "case.hdf"
         result.unlink(missing_ok=True)
         used = processor_seconds()
-        words = box.run("run", "case.toml", "--quiet", "--overwrite", *(f"--set={x}" for x in (f"time.limit={limit}", *sets)), limit=20 * limit)
+        bounds = (f"time.limit={limit}",) if "time" in case else ()
+        words = box.run(command, "case.toml", "--quiet", "--overwrite", *(f"--set={x}" for x in (*bounds, *sets)), limit=20 * limit)
         self.seconds = processor_seconds() - used
         self.warned, self.stop, self.stated, self.energy = bool(words.err.strip()), "no result", math.inf, {}
         if not result.exists():
@@ -151,7 +152,7 @@ class Run:
             about, series = file["about"].attrs, file["series"]
             self.stop, self.scale, self.stated = about.get("stop", "none"), float(about["E_ref"]), float(about["estimated_error"])
             self.warned = bool(about["warnings"])
-            self.energy = dict(zip(series["time"][:], series["free_energy"][:]))
+            self.energy = dict(zip(series["time"][:], series[quantity][:]))
 
     @property
     def finished(self):
