@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 #include <vector>
@@ -16,7 +15,7 @@ namespace tubule::surface3d {
 
 namespace {
 
-constexpr double speck = 0.01;  // of the area
+constexpr double speck = 0.01;  // of the area of the largest piece
 constexpr const char* wrapping = "shape.wrap = LENGTH puts one surface around everything, closing gaps of that length";
 
 [[noreturn]] void fail(const ImportedMesh& in, const std::string& message) {
@@ -155,19 +154,19 @@ std::vector<std::string> drop_specks(ImportedMesh& in, const std::vector<int>& p
         if (piece[t] >= int(area.size())) area.push_back(0), name.push_back(triangle(in, t));
         area[piece[t]] += (x[b] - x[a]).cross(x[c] - x[a]).norm() / 2;
     }
-    const double total = std::accumulate(area.begin(), area.end(), 0.0);
+    const double largest = *std::ranges::max_element(area);
     std::size_t specks = 0;
     std::vector<std::string> stay;
     for (std::size_t i = 0; i < area.size(); ++i) {
-        if (area[i] < speck * total)
+        if (area[i] < speck * largest)
             ++specks;
         else
             stay.push_back(name[i]);
     }
-    const std::size_t dropped = drop_triangles(in, [&](std::size_t t) { return area[piece[t]] >= speck * total; });
+    const std::size_t dropped = drop_triangles(in, [&](std::size_t t) { return area[piece[t]] >= speck * largest; });
     if (specks > 0)
         in.notes.push_back(
-            fmt::format("{} pieces of less than 1 percent of the area, {} triangles in all, were "
+            fmt::format("{} pieces of less than 1 percent of the area of the largest, {} triangles in all, were "
                         "dropped.",
                         specks, dropped));
     return stay;

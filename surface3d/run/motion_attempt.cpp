@@ -307,7 +307,7 @@ void MotionAttempt::advance_to(double time) {
 // Whether the surface and its energy can be believed.
 std::optional<StopReport> MotionAttempt::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
-    if (auto bad = find_bad_shape(now_, case_.accuracy.r_min, t)) return bad;
+    if (auto bad = find_bad_shape(now_, least_neck(case_, memory_.scale.area), t)) return bad;
     if (traits().controls_mesh)
         if (auto drift = find_drift(volume_drift(), asked, t)) return drift;
     return std::nullopt;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/geometry/profile_point.hpp"
 #include "common/run/energy_checks.hpp"
 #include "surface3d/run/guards.hpp"
 
@@ -27,6 +28,11 @@ std::string where(const Eigen::Vector3d& x) {
 
 StopReport undefined_energy(const MotionMeasures& m, double time) {
     return tubule::undefined_energy(m.domain, time, where(m.least_defined));
+}
+
+double least_neck(const Case& c, double area) {
+    const bool by_size = std::holds_alternative<MeshFile>(c.shape) && !c.places.contains("accuracy.r_min");
+    return c.accuracy.r_min * (by_size ? std::sqrt(area / (4 * pi)) : 1);
 }
 
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {

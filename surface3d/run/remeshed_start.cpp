@@ -13,15 +13,19 @@
 
 #include "common/solve/pause.hpp"
 #include "surface3d/curvature/curvature.hpp"
+#include "surface3d/fem/projection.hpp"
 #include "surface3d/import/import_cgal.hpp"
 #include "surface3d/import/import_fit.hpp"
 #include "surface3d/import/import_repair.hpp"
 #include "surface3d/import/mesh_distance.hpp"
 #include "surface3d/import/mesh_smoothing.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/meshing/remesh_sizes.hpp"
 #include "surface3d/motion/extent.hpp"
+#include "surface3d/motion/motion_fields.hpp"
+#include "surface3d/run/guards.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -36,6 +40,7 @@ constexpr int most_lengths = 7;
 constexpr int smoothings = 2;
 // Angles of the surface that an edge may span.
 constexpr double least_angle = 0.4, most_angle = 1.0;
+constexpr double sharpest_start = 1;  // radians from node to node
 constexpr double wrap_offset = 0.05;  // of the gaps that are closed
 constexpr double crease = 45;         // degrees between neighbours
 constexpr double flattest = 1e-3;     // of the volume of a ball of the same area
@@ -105,6 +110,33 @@ TriangleMesh smooth_mesh(const Body& body, double edge, double length) {
     return with_volume(mesh, body.volume);
 }
 
+// Whether a way of at most so many neighbours leads from one triangle to the other.
+bool are_near(const TriangleMesh& mesh, std::size_t from, std::size_t to, int neighbours) {
+    std::vector<std::vector<std::size_t>> at(mesh.points.size());
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+        for (const int v : mesh.triangles[t]) at[v].push_back(t);
+    std::vector<bool> seen(mesh.triangles.size());
+    std::vector<std::size_t> ring{from};
+    seen[from] = true;
+    for (int i = 0; i < neighbours && !seen[to]; ++i)
+        for (const std::size_t t : std::exchange(ring, {}))
+            for (const int v : mesh.triangles[t])
+                for (const std::size_t s : at[v])
+                    if (!seen[s]) seen[s] = true, ring.push_back(s);
+    return seen[to];
+}
+
+// Triangles that noise has folded are near each other, and more smoothing parts them. Others belong to parts of the
+// surface that cross, which it would move far.
+void check_crossing(const Body& body, const TriangleMesh& smooth, double length, int neighbours) {
+    const auto pair = first_intersection(smooth);
+    if (!pair || are_near(smooth, pair->first, pair->second, neighbours)) return;
+    throw MeshError(
+        fmt::format("{}: smoothed over {:.3g}, parts of the surface that are far from each other along it "
+                    "intersect at {}; move them apart in the file, or shape.wrap = LENGTH joins them",
+                    body.name, length, place(smooth.points[smooth.triangles[pair->first][0]])));
+}
+
 // The curved surface through the vertices of a mesh that is not the file's.
 CurvedMesh curved(const std::string& name, const TriangleMesh& mesh, int order) {
     ImportedMesh made;
@@ -150,20 +182,35 @@ CurvedMesh with_volume(CurvedMesh mesh, double volume) {
     return mesh;
 }
 
+// Why a run that begins with this surface would stop at once, with half of what it allows.
+std::optional<std::string> why_unusable(const CurvedMesh& surface) {
+    const SurfaceSpace space(surface);
+    const MotionFields fields = motion_fields(space, surface, Projection(space, surface));
+    const Observables o = observe(space, surface, {fields.normal, {}, fields.H, fields.K}, Bending{});
+    if (const auto bad = find_impossible_curvature(o, surface, 0.005)) return bad->message;
+    const MeshTurn turn = mesh_turn(surface, mesh_quality(surface), fields.H, fields.K);
+    if (turn.angle > sharpest_start)
+        return fmt::format("the normal turns by {:.2g} radians from node to node at {}", turn.angle, place(turn.where));
+    const TriangleMesh parts = node_triangles(surface);
+    if (const auto pair = first_intersection(parts))
+        return fmt::format("parts of the surface intersect at {}",
+                           place(parts.points[parts.triangles[pair->first][0]]));
+    return std::nullopt;
+}
+
 // A surface of so many triangles, or why there is none.
-std::variant<CurvedMesh, std::string> resolved(const Body& body, const TriangleMesh& smooth, int triangles, int order) {
+std::variant<RemeshedStart, std::string> resolved(const Body& body, const TriangleMesh& smooth, int triangles,
+                                                  int order) {
     try {
-        const CurvedMesh fine = curved(body.name, smooth, order);
+        // Elements of order 2 are those of order 3 without their highest degree: the surface is known better.
+        const CurvedMesh fine = curved(body.name, smooth, std::max(order, 3));
         const auto angle = angle_for(fine, triangles);
         if (!angle) return fmt::format("the surface has more detail than {} triangles resolve", triangles);
         auto made = remesh(fine, Eigen::MatrixXd(0, fine.size()), {.triangles = triangles, .angle = *angle});
         if (const auto* lost = std::get_if<StopReport>(&made)) return lost->message;
-        CurvedMesh surface = with_volume(std::get<Remeshed>(made).mesh, body.volume);
-        const TriangleMesh parts = node_triangles(surface);
-        if (const auto pair = first_intersection(parts))
-            return fmt::format("parts of the surface intersect at {}",
-                               place(parts.points[parts.triangles[pair->first][0]]));
-        return surface;
+        RemeshedStart out{with_volume(std::get<Remeshed>(made).mesh, body.volume), body.volume, body.notes};
+        if (const auto why = why_unusable(out.of_order(order))) return *why;
+        return out;
     } catch (const MeshError& error) {
         return std::string(error.what()).substr(body.name.size() + 2);
     }
@@ -233,22 +280,27 @@ std::string distance_note(const TriangleMesh& file, const TriangleMesh& surface,
 
 }  // namespace
 
+CurvedMesh RemeshedStart::of_order(int order) const {
+    return order == surface.order ? surface : with_volume(with_order(surface, order), volume);
+}
+
 RemeshedStart remeshed_start(ImportedMesh file, const MeshFile& shape, int order) {
     const int triangles = shape.remesh.value();
     const TriangleMesh given = file.mesh;
-    Body body = body_of(file, shape);
+    const Body body = body_of(file, shape);
     std::string why;
     double length = shape.smoothing_length.value_or(0);
     for (int i = 0; i < (shape.smoothing_length ? 1 : most_lengths); ++i) {
         const double edge = even_edge(mesh_area(body.mesh), triangles);
         if (!shape.smoothing_length) length = first_length * edge * std::pow(longer, i);
         const TriangleMesh smooth = smooth_mesh(body, edge / fine_edges, length);
+        if (i == 0) check_crossing(body, smooth, length, int(std::ceil(2 * length * fine_edges / edge)));
         auto made = resolved(body, smooth, triangles, order);
         if (const auto* reason = std::get_if<std::string>(&made)) {
             why = *reason;
             continue;
         }
-        RemeshedStart out{std::get<CurvedMesh>(std::move(made)), std::move(body.notes)};
+        RemeshedStart out = std::get<RemeshedStart>(std::move(made));
         const TriangleMesh parts = node_triangles(out.surface);
         out.notes.push_back(fmt::format(
             "{} new triangles instead of {}, smoothed over {:.3g}, {:.2g} of their mean edges: waves of this length "

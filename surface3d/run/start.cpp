@@ -206,13 +206,9 @@ struct Prepare {
                             "needs a build with CGAL: install libcgal-dev (Debian, Ubuntu) or CGAL 5.5 or newer, then "
                             "run cmake --preset release && cmake --build --preset release");
         const RemeshedStart start = usable(blame, [&] {
-            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true), file,
-                                  std::max(element_order(c), 3));
+            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true), file, element_order(c));
         });
-        return {[surface = start.surface](int, int order) {
-                    return StartMesh{surface.order == order ? surface : with_order(surface, order), {}, {}};
-                },
-                false, start.notes};
+        return {[start](int, int order) { return StartMesh{start.of_order(order), {}, {}}; }, false, start.notes};
     }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();

@@ -70,7 +70,8 @@ TEST(RepairMesh, TurnsTrianglesThatFaceTheWrongWay) {
 TEST(RepairMesh, DropsSpecksButNoSecondSurface) {
     const ImportedMesh out = repaired(both(ball, moved(geodesic_sphere(1), {3, 0, 0}, 0.05)));
     EXPECT_EQ(out.mesh.triangles, ball.triangles);
-    EXPECT_EQ(out.notes, Notes{"1 pieces of less than 1 percent of the area, 20 triangles in all, were dropped."});
+    EXPECT_EQ(out.notes,
+              Notes{"1 pieces of less than 1 percent of the area of the largest, 20 triangles in all, were dropped."});
     EXPECT_EQ(refusal(both(ball, moved(ball, {3, 0, 0}))),
               "mesh: the mesh consists of 2 separate surfaces: triangle 180 is not connected to triangle 0; a case has "
               "one membrane: keep one of them in the file");
