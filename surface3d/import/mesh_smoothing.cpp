@@ -63,12 +63,30 @@ Columns vertex_normals(const TriangleMesh& mesh) {
     return n;
 }
 
-Columns smooth_normals(const TriangleMesh& mesh, const Laplacian& of, double lambda) {
+// The fields that minimise INT |f - f0|^2 + lambda^4 |Lap f|^2.
+Columns filtered(const Laplacian& of, double halved, const Columns& fields) {
+    const double lambda = halved / (2 * std::numbers::pi);
     const Sparse half = of.area.cwiseSqrt().cwiseInverse().asDiagonal() * of.stiffness;
     SparseCholesky solver;
     solver.factor(with_diagonal(std::pow(lambda, 4) * Sparse(half.transpose() * half), of.area));
-    return solver.solve(Columns(of.area.asDiagonal() * vertex_normals(mesh)));
+    return solver.solve(Columns(of.area.asDiagonal() * fields));
 }
+
+// About the middle: a small body far away keeps its digits.
+struct Centred {
+    Columns x;
+    Eigen::RowVector3d middle;
+
+    explicit Centred(const TriangleMesh& mesh) : x(mesh.points.size(), 3) {
+        for (Eigen::Index i = 0; i < x.rows(); ++i) x.row(i) = mesh.points[i];
+        middle = x.colwise().mean();
+        x.rowwise() -= middle;
+    }
+    TriangleMesh moved(TriangleMesh mesh, const Columns& to) const {
+        for (Eigen::Index i = 0; i < to.rows(); ++i) mesh.points[i] = to.row(i) + middle;
+        return mesh;
+    }
+};
 
 // The divergence of the gradients of the points, projected.
 Columns projected_edges(const TriangleMesh& mesh, const Columns& normal) {
@@ -89,20 +107,18 @@ Columns projected_edges(const TriangleMesh& mesh, const Columns& normal) {
 
 TriangleMesh smoothed(const TriangleMesh& mesh, double halved) {
     const Laplacian of = laplacian(mesh);
-    const Columns normal = smooth_normals(mesh, of, halved / (2 * std::numbers::pi));
-    Columns x(normal.rows(), 3);
-    for (Eigen::Index i = 0; i < x.rows(); ++i) x.row(i) = mesh.points[i];
-    // About the middle: a small body far away keeps its digits.
-    const Eigen::RowVector3d middle = x.colwise().mean();
-    x.rowwise() -= middle;
+    const Centred points(mesh);
     // Where waves of the length are concerned this holds the points by less than 3 percent, farther ones fast.
     const Eigen::VectorXd hold = of.area / (halved * halved);
     SparseCholesky solver;
     solver.factor(with_diagonal(of.stiffness, hold));
-    x = solver.solve(Columns(projected_edges(mesh, normal) + hold.asDiagonal() * x));
-    TriangleMesh out = mesh;
-    for (Eigen::Index i = 0; i < x.rows(); ++i) out.points[i] = x.row(i) + middle;
-    return out;
+    const Columns normal = filtered(of, halved, vertex_normals(mesh));
+    return points.moved(mesh, solver.solve(Columns(projected_edges(mesh, normal) + hold.asDiagonal() * points.x)));
+}
+
+TriangleMesh unfolded(const TriangleMesh& mesh, double halved) {
+    const Centred points(mesh);
+    return points.moved(mesh, filtered(laplacian(mesh), halved, points.x));
 }
 
 TriangleMesh with_volume(const TriangleMesh& mesh, double volume) {

@@ -15,6 +15,10 @@ namespace tubule::surface3d {
 // smooth surface), and weakly their distance from x0. Throws SolveError where triangles have no area.
 TriangleMesh smoothed(const TriangleMesh& mesh, double halved);
 
+// The same filter applied to the points: it parts triangles that noise has folded, whose normals say nothing, but makes
+// thin parts thinner, so it is for lengths far below what should stay.
+TriangleMesh unfolded(const TriangleMesh& mesh, double halved);
+
 // The points moved along the normals, all equally far, until the mesh bounds this volume.
 TriangleMesh with_volume(const TriangleMesh& mesh, double volume);
 

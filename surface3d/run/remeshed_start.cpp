@@ -43,6 +43,8 @@ constexpr double least_angle = 0.4, most_angle = 1.0;
 constexpr double sharpest_start = 1;  // radians from node to node
 constexpr double wrap_offset = 0.05;  // of the gaps that are closed
 constexpr double crease = 45;         // degrees between neighbours
+constexpr double folded = 120;        // degrees, too
+constexpr double unfolding = 0.33;    // of the length
 constexpr double flattest = 1e-3;     // of the volume of a ball of the same area
 
 std::string place(const Vector3d& x) {
@@ -99,13 +101,44 @@ Body body_of(ImportedMesh& file, const MeshFile& shape) {
     return body;
 }
 
+// The creased edges of a mesh, as triangles without area.
+TriangleMesh creases_of(const TriangleMesh& mesh, double& sharpest) {
+    std::map<std::pair<int, int>, std::size_t> left;
+    std::vector<Vector3d> normal;
+    TriangleMesh out;
+    out.points = mesh.points;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const auto& c = mesh.triangles[t];
+        const auto& x = mesh.points;
+        normal.push_back((x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]));
+        for (int i = 0; i < 3; ++i) {
+            const auto other = left.find({c[(i + 1) % 3], c[i]});
+            left[{c[i], c[(i + 1) % 3]}] = t;
+            if (other == left.end()) continue;
+            const Vector3d& n = normal[other->second];
+            const double kink = std::atan2(n.cross(normal[t]).norm(), n.dot(normal[t])) * 180 / EIGEN_PI;
+            sharpest = std::max(sharpest, kink);
+            if (kink > crease) out.triangles.push_back({c[i], c[(i + 1) % 3], c[(i + 1) % 3]});
+        }
+    }
+    return out;
+}
+
+// Whether neighbours face away from each other.
+bool is_folded(const TriangleMesh& mesh) {
+    double sharpest = 0;
+    creases_of(mesh, sharpest);
+    return sharpest > folded;
+}
+
 TriangleMesh smooth_mesh(const Body& body, double edge, double length) {
     // The height that several smoothings leave together is half at this wavelength.
     const double each = length * std::pow(std::pow(2, 1.0 / smoothings) - 1, 0.25);
-    TriangleMesh mesh = body.mesh;
+    TriangleMesh mesh = cgal::isotropic(body.mesh, edge);
+    if (is_folded(mesh)) mesh = cgal::isotropic(unfolded(mesh, unfolding * length), edge);
     for (int i = 0; i < smoothings; ++i) {
         check_pause();
-        mesh = smoothed(cgal::isotropic(mesh, edge), each);
+        mesh = smoothed(i > 0 ? cgal::isotropic(mesh, edge) : mesh, each);
     }
     return with_volume(mesh, body.volume);
 }
@@ -220,29 +253,6 @@ double size_of(const TriangleMesh& mesh) {
     Eigen::AlignedBox<double, 3> box;
     for (const Vector3d& x : mesh.points) box.extend(x);
     return box.diagonal().norm();
-}
-
-// The creased edges of a mesh, as triangles without area.
-TriangleMesh creases_of(const TriangleMesh& mesh, double& sharpest) {
-    std::map<std::pair<int, int>, std::size_t> left;
-    std::vector<Vector3d> normal;
-    TriangleMesh out;
-    out.points = mesh.points;
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const auto& c = mesh.triangles[t];
-        const auto& x = mesh.points;
-        normal.push_back((x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]));
-        for (int i = 0; i < 3; ++i) {
-            const auto other = left.find({c[(i + 1) % 3], c[i]});
-            left[{c[i], c[(i + 1) % 3]}] = t;
-            if (other == left.end()) continue;
-            const Vector3d& n = normal[other->second];
-            const double kink = std::atan2(n.cross(normal[t]).norm(), n.dot(normal[t])) * 180 / EIGEN_PI;
-            sharpest = std::max(sharpest, kink);
-            if (kink > crease) out.triangles.push_back({c[i], c[(i + 1) % 3], c[(i + 1) % 3]});
-        }
-    }
-    return out;
 }
 
 struct Farthest {

@@ -86,11 +86,14 @@ def volume(points, triangles):
 
 
 class MeshesTest(ProgramTest):
+    said_at_first = None
+
     def setUp(self):
         super().setUp()
         self.off("sound.off", *sphere(12))
-        path = self.write("sound.toml", CASE.format("sound.off", "remesh = 200"))
-        _, said = self.attempt("check", "--quick", path)
+        path = self.write("sound.toml", CASE.format("sound.off", "remesh = 100"))
+        MeshesTest.said_at_first = MeshesTest.said_at_first or self.attempt("check", "--quick", path)[1]
+        said = MeshesTest.said_at_first
         if "needs a build with CGAL" in said:
             self.assertRegex(said, r"sound\.toml:7:\d+: shape\.remesh needs a build with CGAL: install libcgal-dev")
             self.skipTest("this build has no CGAL")
@@ -137,7 +140,7 @@ class MeshesTest(ProgramTest):
 
     def test_decimated_scan_relaxes(self):
         points, triangles = sphere(60)
-        wavy = 1 + 0.15 * np.sin(3 * points[:, 0] + 1) * np.sin(4 * points[:, 1]) * np.cos(2 * points[:, 2])
+        wavy = 1 + 0.3 * np.sin(3 * points[:, 0] + 1) * np.sin(4 * points[:, 1]) * np.cos(2 * points[:, 2])
         points = points * (wavy + np.random.default_rng(2).normal(0, 0.003, len(points)))[:, None]
         decimation = vtkQuadricDecimation()
         decimation.SetInputData(poly_data(points, triangles))
@@ -179,9 +182,9 @@ class MeshesTest(ProgramTest):
 
     def test_wrong_keys_are_refused(self):
         for keys, said in (
-            ("remesh = 50", r"7:10: shape\.remesh must be from 100 to 20000, not 50"),
+            ("remesh = 50", r"7:10: shape\.remesh must be an integer >= 100 and <= 20000, not 50"),
             ("remesh = 300\nsmoothing = 2", r"8:13: shape\.smoothing must be absent: with remesh, smoothing_length"),
-            ("remesh = 300\nsmoothing_length = 0.0", r"8:20: shape\.smoothing_length must be > 0"),
+            ("remesh = 300\nsmoothing_length = 0.0", r"8:20: shape\.smoothing_length must be a number > 0, not 0\.0"),
             ("smoothing_length = 0.1", r"7:20: shape\.smoothing_length must be absent: only valid with remesh"),
             ("remesh = 300\nwrap = 0.1\nfill_holes = true", r"9:14: shape\.fill_holes must be absent: wrap closes all"),
         ):

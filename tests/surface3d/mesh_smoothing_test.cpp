@@ -83,6 +83,22 @@ TEST(MeshSmoothing, NoiseGoes) {
     EXPECT_LT(rms(smoothed(mesh, 12 * edge)), rms(mesh) / 5);
 }
 
+// Every tenth vertex thrown across its neighbours: triangles face inward, and no longer do.
+TEST(MeshSmoothing, FoldsArePulledOut) {
+    TriangleMesh mesh = geodesic_sphere(12);
+    const double edge = even_edge(mesh_area(mesh), double(mesh.triangles.size()));
+    for (std::size_t i = 0; i < mesh.points.size(); i += 10)
+        mesh.points[i] += 1.5 * edge * mesh.points[i].cross(Vector3d(1, 2, 3)).normalized();
+    const auto inward = [](const TriangleMesh& m) {
+        return std::ranges::count_if(m.triangles, [&](const auto& t) {
+            const Vector3d &a = m.points[t[0]], &b = m.points[t[1]], &c = m.points[t[2]];
+            return (b - a).cross(c - a).dot(a) <= 0;
+        });
+    };
+    EXPECT_GT(inward(mesh), 100);
+    EXPECT_EQ(inward(unfolded(mesh, 8 * edge)), 0);
+}
+
 TEST(MeshSmoothing, TheVolumeComesOut) {
     const TriangleMesh mesh = irregular({.axes = {1, 0.8, 0.6}}, 8);
     for (const double factor : {0.9, 1.0, 1.1}) {

@@ -151,9 +151,11 @@ TEST_F(NewTriangles, FromACoarseIrregularMesh) {
     const TriangleMesh mesh = noisy(irregular(bumpy, 7), 0.05);
     for (const int order : {2, 4}) {
         const RemeshedStart start = start_of(mesh, {.path = "", .remesh = 500}, order);
-        EXPECT_EQ(start.surface.order, order);
-        EXPECT_NEAR(start.surface.triangles(), 500, 25);
-        EXPECT_LT(distance_from(start.surface, bumpy), 0.06);
+        const CurvedMesh surface = start.of_order(order);
+        EXPECT_EQ(surface.order, order);
+        EXPECT_NEAR(surface.triangles(), 500, 25);
+        EXPECT_NEAR(volume_of(surface) / mesh_volume(mesh), 1, 1e-9);
+        EXPECT_LT(distance_from(surface, bumpy), 0.06);
     }
 }
 
