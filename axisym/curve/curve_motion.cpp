@@ -43,7 +43,7 @@ struct PointFields {
     S r_t, z_t, ur_t, uz_t, w_t;
 };
 
-// The law per unit of s, except the energy, the gauge and the volume.
+// The law per unit of s, except the energy, the gauge and the volume. Long: a line for each term.
 template <class S>
 std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, const PointNumbers& n) {
     const double drift = n.drift, shift = n.shift;

@@ -426,7 +426,8 @@ void check_varying_H0(Keys& k, const Case& c) {
         const MotionLaw law = motion_law(c.model);
         if (c.tier == Tier::automatic)
             return number + "in tier \"auto\", whose growth rates are those of a constant H0; try tier = \"axisym\"";
-        if (c.tier == Tier::surface3d) return number + "in tier \"surface3d\"; try tier = \"axisym\"";
+        if (c.tier == Tier::surface3d && !c.moves())
+            return number + "without a table [time]: give the surface a motion";
         if (law.free_period) return number + "with model.period = \"free\"; keep the period fixed";
         if (!c.equilibrium) return {};
         if (uses(*c.energy.H0_formula, 1) || uses(*c.energy.H0_formula, 2))
@@ -436,6 +437,11 @@ void check_varying_H0(Keys& k, const Case& c) {
         if (c.equilibrium->branch.parameter == vary_H0) return number + "where the branch varies it";
         return {};
     });
+    for (const auto& [key, given] : {std::pair{"discretisation.relaxation", c.surface.relaxation.has_value()},
+                                     {"discretisation.follow_curvature", c.surface.follow_curvature}})
+        k.check(key, [&, given = given] {
+            return given ? "must be absent where energy.H0 varies: the nodes go with the membrane" : "";
+        });
     k.check("discretisation.parametrisation", [&]() -> std::string {
         const auto chosen = c.discretisation.parametrisation;
         if (!chosen || *chosen == Parametrisation::material) return {};
@@ -482,6 +488,9 @@ void check_together(Keys& k, const Case& c) {
                                    law.reservoir     ? "area = \"reservoir\""
                                    : law.free_period ? "period = \"free\""
                                                      : "pressure");
+            if (c.energy.H0_varies())
+                return fmt::format("must not be \"{}\" where energy.H0 varies: it has no force along the surface",
+                                   scheme.name);
             if (const auto key = term_beyond_paper(c.energy); !key.empty())
                 return fmt::format("must not be \"{}\" with {}: it has k20, k40 and k42 only", scheme.name, key);
             return {};

@@ -8,7 +8,7 @@
 namespace tubule::surface3d {
 
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
-                    const Bending& bending) {
+                    const Bending& bending, const Eigen::VectorXd& H0) {
     // Summed up cell by cell, so that the answer does not depend on the number of threads.
     const int terms = static_cast<int>(count_terms(bending));
     Eigen::MatrixXd of_cell(terms + 5, space.cells());
@@ -16,15 +16,18 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
         const auto H = space.gather(curvature.H, cell), K = space.gather(curvature.K, cell);
+        Eigen::VectorXd nodal_H0;
+        if (H0.size() > 0) nodal_H0 = space.gather(H0, cell);
         auto sum = of_cell.col(cell);
         sum.setZero();
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
             const double dS = table.weight[q] * p.area, h = H.dot(table.value.col(q)), k = K.dot(table.value.col(q));
-            for_each_value(bending, h, k, [&](std::size_t i, double value) { sum[i] += dS * value; });
+            const double h0 = H0.size() > 0 ? nodal_H0.dot(table.value.col(q)) : bending.H0;
+            for_each_value_at(bending, h0, h, k, [&](std::size_t i, double value) { sum[i] += dS * value; });
             // The flux of (x, y, 0)/2, which also holds for a period of a tube.
             const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
-            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude(bending, h, k));
+            sum.template tail<5>() += dS * Eigen::Matrix<double, 5, 1>(1, flux, h * h, k, magnitude(bending, h0, h, k));
         }
     });
     const Eigen::VectorXd total = of_cell.rowwise().sum();

@@ -16,9 +16,9 @@ struct Observables {
     double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this
 };
 
-// The energy is INT f(H, K) dS with the recovered fields H, K.
+// The energy is INT f(H, K) dS with the recovered fields H, K; `H0` at the nodes, where it varies.
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
-                    const Bending& bending);
+                    const Bending& bending, const Eigen::VectorXd& H0 = {});
 
 // Vertices - edges + triangles: 2 for a sphere, 0 for a torus or a periodic tube.
 int euler_characteristic(const CurvedMesh& mesh);

@@ -13,7 +13,7 @@ MotionFields motion_fields(const SurfaceSpace& space, const CurvedMesh& mesh, co
         out.topRows<3>().noalias() += (dS * p.normal) * table.value.col(q).transpose();
         out.bottomRows<3>() -= dS * gradients(p, table, q);
     }));
-    MotionFields fields{both.topRows<3>().colwise().normalized(), {}, {}};
+    MotionFields fields{both.topRows<3>().colwise().normalized(), {}, {}, {}};
     fields.H = both.bottomRows<3>().cwiseProduct(fields.normal).colwise().sum().transpose();
     using Row = Eigen::Matrix<double, 1, Eigen::Dynamic>;
     const Row K = project(load<1>(space, mesh, [&](int cell, const CellColumns<3>& X, int q, CellColumns<1>& out) {

@@ -85,6 +85,8 @@ private:
         Eigen::Matrix<double, 2, 3> B;  // e^T B
         Eigen::Matrix2d S;              // HP - B
         CurvatureJet<double> f;
+        Eigen::Vector2d bend,
+            push;  // what the slope of H0 adds to grad f_H + S grad f_K, and the force along the surface
     };
 
     void size(CellWork& work) const;
@@ -94,6 +96,7 @@ private:
     void add_advection(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
+    void add_varying_H0(const std::vector<Point>& at, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_stretch(const std::vector<Point>& at, CellWork& work) const;
@@ -144,7 +147,11 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     at.trace = B.trace();
     at.B2 = B.squaredNorm();
     at.S = at.trace * Eigen::Matrix2d::Identity() - at.B * at.e;
-    at.f = density(bending_, at.H, at.K);
+    const PointH0 H0(bending_, gather_H0(space_, base_.fields.H0, cell), gradient, phi, at.H, at.K);
+    at.f = density_at(bending_, H0.value, at.H, at.K);
+    const Eigen::Vector2d slope = at.e.transpose() * H0.slope;
+    at.bend = H0.f0.H * slope + H0.f0.K * (at.S * slope);
+    at.push = H0.f0.f * slope;
     return at;
 }
 
@@ -254,6 +261,27 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
     }
     if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
     if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
+}
+
+// What a varying H0 adds, known on X*: -(f_HH0 grad H0 + (HP-B) f_KH0 grad H0, G(v)) - (f_H0 grad H0, v), and where
+// nothing flows (f_H0 grad H0, grad q)/friction, as u has f_H0 grad H0/friction along the surface: theory.md (10.20).
+void Assembler::add_varying_H0(const std::vector<Point>& at, CellWork& work) const {
+    if (base_.fields.H0.size() == 0) return;
+    const CellTables& t = work.t;
+    Eigen::VectorXd force = Eigen::VectorXd::Zero(nv_);
+    for (int q = 0; q < table_.points(); ++q) {
+        const Point& s = at[q];
+        force += s.dS * (t.normal_grad.middleRows<2>(2 * q).transpose() * s.bend);
+        if (law_.flows) {
+            const Eigen::Vector3d push = s.dS * (s.e * s.push);
+            for (int d = 0; d < 3; ++d) force.segment(d * n_, n_) += push[d] * t.phi.row(q).transpose();
+        } else if (p_ >= 0) {
+            work.rhs.segment(p_, t.psi.cols()) -=
+                (s.dS / law_.friction) * (t.psi_grad.middleRows<2>(2 * q).transpose() * s.push);
+        }
+    }
+    work.rhs.head(nv_) += force;
+    work.force.head(nv_) += force;
 }
 
 // -(p, div_P v) and -(div_P u, q); where nothing flows u = (u.nu) nu - grad p/friction.
@@ -375,6 +403,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
     add_advection(at, cell, work);
     add_momentum(at, cell, work);
     add_bending(at, cell, work);
+    add_varying_H0(at, work);
     add_pressure(at, work);
     add_curvature_evolution(at, cell, work);
     add_stretch(at, work);

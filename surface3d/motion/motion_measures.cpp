@@ -13,13 +13,24 @@ namespace {
 constexpr int n_sums = 16;
 using Sums = Eigen::Matrix<double, n_sums, 1>;
 
-// Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p|^2, p.
+Eigen::Vector3d push(const MovingSurface& surface, const MotionFields& fields, const CellColumns<3>& gradient, int cell,
+                     int q) {
+    const SurfaceSpace& space = surface.space();
+    const auto phi = space.tabulation().value.col(q);
+    return PointH0(surface.bending(), gather_H0(space, fields.H0, cell), gradient, phi,
+                   space.gather(fields.H, cell).dot(phi), space.gather(fields.K, cell).dot(phi))
+        .push();
+}
+
+// Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p - f_H0
+// grad H0|^2, p.
 Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
-               const VectorField& rate) {
+               const VectorField& rate, const MotionMeasures& m) {
     const SurfaceSpace& space = surface.space();
     const Tabulation& table = space.tabulation();
     Eigen::Matrix<double, n_sums, Eigen::Dynamic> of_cell(n_sums, space.cells());
     const bool presses = s.p.size() > 0, slips = presses && !surface.law().flows;
+    const bool pushed = slips && m.fields.H0.size() > 0;
     const Eigen::VectorXd pressure = presses ? surface.pressure_at_nodes(s) : Eigen::VectorXd::Zero(mesh.size());
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell), U = space.gather(u, cell), A = space.gather(rate, cell);
@@ -31,11 +42,14 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
             const Eigen::Vector3d v = U * table.value.col(q), a = A * table.value.col(q);
             const Eigen::Matrix3d P = Eigen::Matrix3d::Identity() - p.normal * p.normal.transpose();
             const Eigen::Vector3d along = P.col(2);
+            Eigen::Vector3d slip = Eigen::Vector3d::Zero();
+            if (slips) slip = grad * nodal_p;
+            if (pushed) slip -= push(surface, m.fields, grad, cell, q);
             const Eigen::Matrix3d G = P * (U * grad.transpose()) + s.stretch * along * along.transpose(),
                                   sigma = (G + G.transpose()) / 2;
             Sums here;
             here << v.squaredNorm(), 2 * sigma.squaredNorm(), G.squaredNorm(), G.trace() * G.trace(), a.squaredNorm(),
-                v, p.x.cross(v), p.x, slips ? (grad * nodal_p).squaredNorm() : 0, nodal_p.dot(table.value.col(q));
+                v, p.x.cross(v), p.x, slip.squaredNorm(), nodal_p.dot(table.value.col(q));
             sum += table.weight[q] * p.area * here;
         }
         of_cell.col(cell) = sum;
@@ -62,7 +76,7 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
     m.symbol = std::numeric_limits<double>::infinity();
     for (int i = 0; i < mesh.size(); ++i) {
         const double H = m.fields.H[i], K = m.fields.K[i], half = std::sqrt(std::max(H * H / 4 - K, 0.0));
-        const CurvatureJet<double> f = density(bending, H, K);
+        const CurvatureJet<double> f = density_at(bending, m.fields.H0_at(bending, i), H, K);
         const auto at = [&](double x) { return f.HH + 2 * f.HK * x + f.KK * x * x; };
         double least = std::min(at(H / 2 - half), at(H / 2 + half));
         if (f.KK > 0) least = std::min(least, at(std::clamp(-f.HK / f.KK, H / 2 - half, H / 2 + half)));
@@ -73,7 +87,7 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
     DensityDomain domain(bending);
     if (!domain.restricted()) return;
-    for (int i = 0; i < mesh.size(); ++i) domain.look(bending.H0, m.fields.H[i], m.fields.K[i], i);
+    for (int i = 0; i < mesh.size(); ++i) domain.look(m.fields.H0_at(bending, i), m.fields.H[i], m.fields.K[i], i);
     m.domain = domain.margin();
     m.least_defined = mesh.nodes[static_cast<std::size_t>(m.domain.place)];
 }
@@ -106,13 +120,13 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     const CurvedMesh mesh = surface.mesh(s);
     MotionMeasures m;
     m.fields = surface.fields(mesh);
-    m.bending = observe(space, mesh, {m.fields.normal, {}, m.fields.H, m.fields.K}, bending);
+    m.bending = observe(space, mesh, {m.fields.normal, {}, m.fields.H, m.fields.K}, bending, m.fields.H0);
     m.velocity = surface.velocity(s, m.fields);
     VectorField rate = VectorField::Zero(3, mesh.size());
     if (law.inertia != 0 && before)
         for (int d = 0; d < 3; ++d)
             rate.row(d) = (s.u - before->u).segment(d * mesh.size(), mesh.size()).transpose() / s.step;
-    const Sums sum = integrals(surface, s, mesh, m.velocity, rate);
+    const Sums sum = integrals(surface, s, mesh, m.velocity, rate, m);
     m.kinetic = law.inertia * sum[0] / 2;
     m.dissipation = law.viscosity * sum[1] + law.friction * sum[0];
     if (!law.flows) {  // without an error of the projection of -grad p

@@ -50,7 +50,7 @@ MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u,
     keep_momenta(momenta, 0, s);
     const CurvedMesh now = mesh(s);
     const MotionFields f = fields(now);
-    s.w = mesh_velocity(now, f, flux(s.u, now, f), control_.relaxation);
+    s.w = node_velocity(s, now, f, flux(s.u, now, f), control_.relaxation);
     return s;
 }
 
@@ -65,7 +65,14 @@ MotionFields MovingSurface::fields(const CurvedMesh& mesh) {
         projection_->update(space_, mesh);
     else
         projection_.emplace(space_, mesh);
-    return motion_fields(space_, mesh, *projection_);
+    MotionFields out = motion_fields(space_, mesh, *projection_);
+    out.H0 = H0_;
+    return out;
+}
+
+VectorField MovingSurface::node_velocity(const MotionState& state, const CurvedMesh& mesh, const MotionFields& fields,
+                                         const Eigen::VectorXd& flux, double relaxation) {
+    return H0_.size() > 0 ? velocity(state, fields) : mesh_velocity(mesh, fields, flux, relaxation);
 }
 
 VectorField MovingSurface::mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields,
@@ -106,7 +113,12 @@ VectorField MovingSurface::velocity(const MotionState& state, const MotionFields
     return out - (*projection_)(
                      load<3>(space_, mesh(state), [&](int cell, const CellColumns<3>& X, int q, CellColumns<3>& sum) {
                          const SurfacePoint<double> p = tangent_point(X, table, q);
-                         const Eigen::Vector3d slope = gradients(p, table, q) * space_.gather(state.p, cell);
+                         const CellColumns<3> gradient = gradients(p, table, q);
+                         const auto phi = table.value.col(q);
+                         const PointH0 H0(bending_, gather_H0(space_, fields.H0, cell), gradient, phi,
+                                          space_.gather(fields.H, cell).dot(phi),
+                                          space_.gather(fields.K, cell).dot(phi));
+                         const Eigen::Vector3d slope = gradient * space_.gather(state.p, cell) - H0.push();
                          sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
                      }));
 }

@@ -52,6 +52,9 @@ public:
     const MotionControl& control() const { return control_; }
     const Projection& projection() const { return *projection_; }  // of the mesh of the last fields()
     int nodes() const { return space_.size(); }
+    // A spontaneous curvature that varies, at the nodes, before anything else. From then on nodes are material.
+    void carry_H0(const Eigen::VectorXd& H0) { H0_ = H0; }
+    const Eigen::VectorXd& H0() const { return H0_; }
     LinearWork& linear_work() { return linear_work_; }
 
     const CurvedMesh& mesh() const { return mesh_; }
@@ -63,6 +66,9 @@ public:
     // The velocity of the nodes for the normal velocity of the surface given by `flux`; `fields` are the last ones.
     VectorField mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields, const Eigen::VectorXd& flux,
                               double relaxation);
+    // Of nodes that are material, or as above.
+    VectorField node_velocity(const MotionState& state, const CurvedMesh& mesh, const MotionFields& fields,
+                              const Eigen::VectorXd& flux, double relaxation);
     // At the nodes of the mesh: velocities of the surface, pressures.
     VectorField velocity(const MotionState& state, const MotionFields& fields) const;
     Eigen::VectorXd pressure_at_nodes(const MotionState& state) const;
@@ -109,6 +115,7 @@ private:
     Bending bending_;
     MotionControl control_;
     MeshMotion mesh_motion_;
+    Eigen::VectorXd H0_;  // empty where it is a number
     bool holds_rigid_motions_ = false;
     LinearWork linear_work_;
     std::optional<Projection> projection_;

@@ -44,7 +44,9 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
     out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
     const Eigen::VectorXd x = solve(base, stage.time, rate, out);
     out.u = x.head(stage.u.size());
-    out.w = surface_.mesh_velocity(at, base.fields, mesh_flux(base, out.u), stage.relaxation);
+    MotionState moving;
+    moving.X = stage.X, moving.u = out.u, moving.p = out.p, moving.period = stage.period;
+    out.w = surface_.node_velocity(moving, at, base.fields, mesh_flux(base, out.u), stage.relaxation);
     out.X = stage.Xbar + stage.te * (out.w + stretched(stage.X, out.stretch));
     out.period = stage.period_bar + stage.te * out.stretch * stage.period;
     out.fields = std::move(base.fields);
@@ -82,7 +84,7 @@ std::vector<Eigen::Matrix2d> row_factors(const Bending& bending, const MotionFie
     std::vector<CurvatureJet<double>> f(n);
     bool regular = true;
     for (Eigen::Index i = 0; i < n; ++i) {
-        f[i] = density(bending, fields.H[i], fields.K[i]);
+        f[i] = density_at(bending, fields.H0_at(bending, i), fields.H[i], fields.K[i]);
         regular = regular && (f[i].HK == 0 || evenness(f[i], fields.H[i], fields.K[i]) > least_evenness);
     }
     const auto or_one = [](double second, bool good) { return good ? second : 1; };

@@ -60,6 +60,7 @@ void MotionAttempt::use_mesh(const CurvedMesh& mesh) {
                                 .most_drift = std::max(most_drift / 2 * case_.accuracy.energy, one_condition),
                                 .smoothing = case_.surface.smoothing};
     scheme_ = make_scheme(time_scheme(case_), mesh, motion_law(case_.model), case_.energy, control);
+    surface().carry_H0(memory_.H0);
     summary.elements = mesh.triangles();
 }
 
@@ -228,17 +229,24 @@ bool MotionAttempt::wants_new_mesh() const {
 void MotionAttempt::make_new_mesh() {
     memory_.count.mesh_since = memory_.count.steps;
     const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
-    const auto found = remesh(surface().mesh(state_), state_.u.reshaped(n, d).transpose(), {});
+    Eigen::MatrixXd carried = state_.u.reshaped(n, d).transpose();
+    if (memory_.H0.size() > 0) {
+        carried.conservativeResize(d + 1, n);
+        carried.row(d) = memory_.H0.transpose();
+    }
+    const auto found = remesh(surface().mesh(state_), carried, {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
     const double time = state_.time, stretch = state_.stretch, energy = comparable(), before = total();
     const Eigen::VectorXd momenta = surface().momenta(state_);
     const int old_elements = summary.elements;
+    const Eigen::VectorXd old_H0 = memory_.H0;
     std::unique_ptr<TimeScheme> old = std::move(scheme_);
-    const auto keep_old = [&] { scheme_ = std::move(old), summary.elements = old_elements; };
+    const auto keep_old = [&] { scheme_ = std::move(old), summary.elements = old_elements, memory_.H0 = old_H0; };
     try {
+        if (old_H0.size() > 0) memory_.H0 = better->fields.row(d).transpose();
         use_mesh(better->mesh);
-        state_ = surface().start(better->mesh, better->fields.transpose().reshaped(), momenta);
+        state_ = surface().start(better->mesh, better->fields.topRows(d).transpose().reshaped(), momenta);
     } catch (const SolveError&) {
         return keep_old();
     } catch (const Paused&) {

@@ -40,6 +40,7 @@ void add_state(Record& out, const MotionState& s, const MotionMemory& memory) {
     state_fields(writer, s);
     if (s.memory) s.memory->save(writer, s);
     memory_fields(writer, memory);
+    if (memory.H0.size() > 0) writer.array("H0", memory.H0);
 }
 
 }  // namespace
@@ -58,12 +59,13 @@ Record motion_record(const MovingSurface& surface, const MotionState& s, const M
     Record out;
     out.time = s.time, out.mesh = mesh_number, out.kind = RecordKind::surface;
     out.numbers = {{"energy", m.bending.energy}};
-    Eigen::VectorXd density_at(s.X.cols());
-    for (int i = 0; i < density_at.size(); ++i) density_at[i] = density(bending, m.fields.H[i], m.fields.K[i]).f;
+    Eigen::VectorXd energy_density(s.X.cols());
+    for (int i = 0; i < energy_density.size(); ++i)
+        energy_density[i] = density_at(bending, m.fields.H0_at(bending, i), m.fields.H[i], m.fields.K[i]).f;
     const Eigen::VectorXd u_n = m.velocity.cwiseProduct(m.fields.normal).colwise().sum().transpose();
     out.arrays = {array("points", s.X), array("normal", m.fields.normal), array("u", m.velocity), array("u_n", u_n)};
     if (s.p.size() > 0) out.arrays.push_back(array("p", surface.pressure_at_nodes(s)));
-    for (const Array& more : {array("H", m.fields.H), array("K", m.fields.K), array("energy_density", density_at)})
+    for (const Array& more : {array("H", m.fields.H), array("K", m.fields.K), array("energy_density", energy_density)})
         out.arrays.push_back(more);
     add_state(out, s, memory);
     return out;
@@ -77,6 +79,7 @@ MotionRestart motion_restart(const Record& record, Scheme scheme) {
     state_fields(reader, out.state);
     if (out.state.step > 0) out.state.memory = restored_memory(scheme, reader, out.state);
     memory_fields(reader, out.memory);
+    if (find_array(record, "H0")) reader.array("H0", out.memory.H0, out.state.X.cols());
     return out;
 }
 

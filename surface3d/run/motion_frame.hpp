@@ -44,13 +44,14 @@ struct MotionMemory {
     MotionBalance balance;
     MotionCounters count;
     double next_step = 0;
-    int order = 1;     // of the last step, in time
-    double error = 0;  // largest so far, of the energy, absolute
-    double moved = 0;  // the nodes, at most, since the last look for self-intersection
+    int order = 1;       // of the last step, in time
+    double error = 0;    // largest so far, of the energy, absolute
+    double moved = 0;    // the nodes, at most, since the last look for self-intersection
+    Eigen::VectorXd H0;  // at the nodes, where it varies
 };
 
-// Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density; the rest
-// of the state under names that begin with restart_.
+// Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density, H0 (if it
+// varies); the rest of the state under names that begin with restart_.
 Record motion_record(const MovingSurface& surface, const MotionState& state, const MotionMeasures& measures,
                      const MotionMemory& memory, std::size_t mesh_number);
 

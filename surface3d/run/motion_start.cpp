@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
@@ -51,7 +52,7 @@ VectorField start_velocity(const Case& c, const StartMesh& start) {
 Observables observe_start(const Case& c, const StartMesh& start) {
     const SurfaceSpace space(start.mesh);
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
-    return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
+    return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, start_H0(c, start.mesh));
 }
 
 double free_energy(const Case& c, const Observables& o, double period) {
@@ -74,10 +75,37 @@ double reference_energy(const Case& c, const Observables& o, double period) {
     return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
 }
 
-void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K) {
+Eigen::VectorXd start_H0(const Case& c, const CurvedMesh& mesh) {
+    if (!c.energy.H0_varies()) return {};
+    constexpr double rounding = 1e-6;
+    const auto at = [&](const Eigen::Vector3d& x) {
+        const double value = evaluate(*c.energy.H0_formula, x.data());
+        if (!std::isfinite(value))
+            throw complaint(c, "energy.H0",
+                            fmt::format("is no number at ({:.4g}, {:.4g}, {:.4g}) of the start", x[0], x[1], x[2]));
+        return value;
+    };
+    Eigen::VectorXd out(mesh.size());
+    for (int i = 0; i < mesh.size(); ++i) {
+        const Eigen::Vector3d& x = mesh.nodes[i];
+        out[i] = at(x);
+        if (!(mesh.period > 0)) continue;
+        const double further = at(x + Eigen::Vector3d(0, 0, mesh.period));
+        if (std::abs(further - out[i]) > rounding * (1 + std::abs(out[i])))
+            throw complaint(
+                c, "energy.H0",
+                fmt::format("must repeat itself with the period {:.6g} along z, but is {:.6g} and {:.6g} at "
+                            "z = {:.4g} and a period further; such as -1 + 0.1*cos(2*pi*z/{:.6g})",
+                            mesh.period, out[i], further, x[2], mesh.period));
+    }
+    return out;
+}
+
+void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K,
+                     const Eigen::VectorXd& H0) {
     DensityDomain domain(c.energy);
     if (!domain.restricted()) return;
-    for (int i = 0; i < mesh.size(); ++i) domain.look(c.energy.H0, H[i], K[i], i);
+    for (int i = 0; i < mesh.size(); ++i) domain.look(H0.size() > 0 ? H0[i] : c.energy.H0, H[i], K[i], i);
     const FormulaDomain::Margin margin = domain.margin();
     const Eigen::Vector3d& x = mesh.nodes[static_cast<std::size_t>(margin.place)];
     tubule::require_defined(c, margin, fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]));
@@ -85,8 +113,9 @@ void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorX
 
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
-    const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy);
-    require_defined(c, start.mesh, fields.H, fields.K);
+    memory.H0 = start_H0(c, start.mesh);
+    const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, memory.H0);
+    require_defined(c, start.mesh, fields.H, fields.K, memory.H0);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
     memory.balance.work = c.handover ? c.handover->work : 0;
     memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);
