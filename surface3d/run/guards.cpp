@@ -29,7 +29,8 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
                                       o.integral_H2, willmore_bound),
                           advice};
     const double defect = gauss_bonnet_defect(o, mesh);
-    if (!(std::abs(defect) <= allowed * 4 * pi))
+    const int surplus = mesh.period == 0 ? std::abs(euler_characteristic(mesh)) : 0;
+    if (!(std::abs(defect) <= allowed * 2 * pi * std::max(2, surplus)))
         return StopReport{Stop::resolution_lost, 0,
                           fmt::format("INT K = {:.6g} differs by {:.3g} from 2 pi times the Euler characteristic {}",
                                       o.integral_K, defect, euler_characteristic(mesh)),

@@ -13,7 +13,7 @@ namespace tubule::surface3d {
 std::optional<StopReport> find_fold(const MeshQuality& quality);
 
 // Closed surfaces have INT H^2 >= 16 pi (Willmore), and INT K is 2 pi times the Euler characteristic (Gauss-Bonnet):
-// a report where one of them is missed by more than `allowed` of 16 pi or 4 pi.
+// a report where one of them is missed by more than `allowed` of 16 pi, or of 4 pi and that multiple of 2 pi.
 std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh,
                                                     double allowed = 0.01);
 

@@ -215,12 +215,12 @@ CurvedMesh with_volume(CurvedMesh mesh, double volume) {
     return mesh;
 }
 
-// Why a run that begins with this surface would stop at once, with half of what it allows.
+// Why a run that begins with this surface would stop at once, with four fifths of what it allows.
 std::optional<std::string> why_unusable(const CurvedMesh& surface) {
     const SurfaceSpace space(surface);
     const MotionFields fields = motion_fields(space, surface, Projection(space, surface));
     const Observables o = observe(space, surface, {fields.normal, {}, fields.H, fields.K}, Bending{});
-    if (const auto bad = find_impossible_curvature(o, surface, 0.005)) return bad->message;
+    if (const auto bad = find_impossible_curvature(o, surface, 0.008)) return bad->message;
     const MeshTurn turn = mesh_turn(surface, mesh_quality(surface), fields.H, fields.K);
     if (turn.angle > sharpest_start)
         return fmt::format("the normal turns by {:.2g} radians from node to node at {}", turn.angle, place(turn.where));

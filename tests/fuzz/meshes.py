@@ -158,7 +158,8 @@ def one(rng, box):
         raw = contents if isinstance(contents, bytes) else contents.encode()
         contents = broken_text(rng, raw.decode("latin-1"), "latin-1")
     box.write(f"mesh.{ending}", contents)
-    further = rng.choice(("", "", ", weld = 1e-6", ", weld = 10.0", ", smoothing = 2"))
+    new = (", remesh = 100", ", remesh = 100, fill_holes = true", ", remesh = 100, wrap = 0.3", ", remesh = 100, weld = 0.1")
+    further = rng.choice(("", "", ", weld = 1e-6", ", weld = 10.0", ", smoothing = 2", *new))
     box.write("case.toml", CASE.format(ending, further, rng.choice((2, 3, 4))))
     done = box.run("run", "case.toml", "--quiet", "--overwrite", limit=30)
     if done.status == 2:
