@@ -15,6 +15,7 @@ constexpr double fewer = 2.25;                         // times fewer triangles 
 constexpr double smooth_order = 4, rough_order = 2;    // of errors in the mesh width
 constexpr double per_smoothness = 2.1;                 // order, for each order of interpolation of H
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
+constexpr double growth_of_start = 1.22;               // of that number, until the energy of the start is accurate
 constexpr double spare = 1.5;                          // the next pair is to be so many times better than asked
 constexpr double part_of_asked = 0.4;                  // of space and of time, where they are known apart
 constexpr double later = 2;                            // errors grow from the start on
@@ -48,7 +49,7 @@ double order_in_space(const Case& c, double smoothness) {
 int triangles_for_start(const Case& c, const Start& start) {
     const int order = element_order(c);
     MotionSettings other{.role = Role::fewer_triangles};
-    for (int n = first_triangles;; n = static_cast<int>(least_growth * n)) {
+    for (int n = first_triangles;; n = static_cast<int>(growth_of_start * n)) {
         const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
         const Observables o = observe_start(c, mesh);
         const double energy = free_energy(c, o, mesh.mesh.period),
@@ -57,7 +58,7 @@ int triangles_for_start(const Case& c, const Start& start) {
         const double error = later * std::abs(energy - before) / (growth_in_space(other, smooth_order) - 1);
         const double asked = c.accuracy.energy * reference_energy(c, o, mesh.mesh.period);
         const bool more = error > asked || error_of_start(c, start, n, energy) > asked;
-        if (!more || least_growth * n > most_first_triangles) return n;
+        if (!more || growth_of_start * n > most_first_triangles) return n;
     }
 }
 

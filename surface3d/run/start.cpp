@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -30,6 +31,11 @@ namespace {
 constexpr double jitter = 0.2;
 constexpr unsigned seed = 1;
 
+// Tubes of as many triangles as the accuracy needs: points in a circle from which their width follows, and the largest
+// width over that of equal sides. What is as small as rounding tells nothing.
+constexpr int samples = 32;
+constexpr double widest = 2.5, axisymmetric = 1e-9, rounding = 1e-13;
+
 // For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions/time_and_memory.md.
 constexpr double bytes_per_cell_entry = 45;
 
@@ -51,11 +57,45 @@ TriangleMesh divided(const Torus& torus, int triangles) {
     return torus_grid(torus, even(std::sqrt(triangles / 2.0 * aspect), 4),
                       even(std::sqrt(triangles / 2.0 / aspect), 4));
 }
-// Rings half a spacing out of step make equilateral triangles where the height of a row is sqrt(3)/2 of the spacing.
-TriangleMesh divided(const Cylinder& tube, int triangles) {
-    const double around = 2 * pi * tube.radius, side = std::sqrt(around * tube.length / triangles * 4 / std::sqrt(3.0));
-    return tube_rings(tube.radius, tube.length, even(tube.length / (std::sqrt(0.75) * side), 2),
-                      std::max(static_cast<int>(std::lround(around / side)), 3));
+// Rings half a spacing out of step make equilateral triangles where the height of a row is sqrt(3)/2 of the spacing;
+// `wider`: by how much triangles are wider than that.
+TriangleMesh divided(const Cylinder& tube, int triangles, double wider = 1) {
+    const double around = 2 * pi * tube.radius, side = std::sqrt(around * tube.length / triangles * 4 / std::sqrt(3.0)),
+                 stretch = std::sqrt(wider);
+    return tube_rings(tube.radius, tube.length, even(tube.length * stretch / (std::sqrt(0.75) * side), 2),
+                      std::max(static_cast<int>(std::lround(around / (stretch * side))), 3));
+}
+
+// By how much triangles of elements of this order are best wider than high, so that interpolation is as accurate along
+// a tube as around it: by its differences of degree order + 1 in both directions. 1 if it has waves around its axis,
+// which add to those along it. Measured: docs/decisions/surface_motion.md.
+template <class Map>
+double best_width(const Cylinder& tube, const Map& map, int order) {
+    const auto at = [&](double theta, double z) {
+        const double periods = std::floor(z / tube.length);
+        const Eigen::Vector3d p(tube.radius * std::cos(theta), tube.radius * std::sin(theta),
+                                z - periods * tube.length);
+        return Eigen::Vector3d(map(p) + periods * tube.length * Eigen::Vector3d::UnitZ());
+    };
+    const auto seen = [&](double theta, double z) {
+        return Eigen::AngleAxisd(-theta, Eigen::Vector3d::UnitZ()) * at(theta, z);
+    };
+    const double spacing = std::min(2 * pi * tube.radius, tube.length) / samples, degree = order + 1;
+    double along = 0, around = 0;
+    for (double z = 0; z < tube.length; z += spacing) {
+        for (int i = 1; i < samples; ++i)
+            if ((seen(2 * pi * i / samples, z) - seen(0, z)).norm() > axisymmetric * tube.radius) return 1;
+        Eigen::Vector3d of_z = Eigen::Vector3d::Zero(), of_theta = of_z;
+        double binomial = 1;
+        for (int m = 0; m <= degree; ++m) {
+            of_z += binomial * at(0, z + m * spacing);
+            of_theta += binomial * at(m * spacing / tube.radius, z);
+            binomial *= -(degree - m) / (m + 1);
+        }
+        along += of_z.squaredNorm();
+        around += of_theta.squaredNorm() + std::pow(rounding * (tube.radius + tube.length), 2);
+    }
+    return std::clamp(std::pow(along / around, 0.5 / degree), 1.0, widest);
 }
 
 // A surface of revolution with waves, as a map from a base; it may move.
@@ -90,7 +130,9 @@ const T& once(const ByOrder<T>& made, int order, const MakeOne& make) {
 template <class Base, class Map>
 Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
     const ByOrder<Resolution> resolutions = std::make_shared<std::map<int, Resolution>>();
-    const auto triangulation = [=, kind = c.surface.mesh](int triangles, int order) {
+    const auto triangulation = [=, kind = c.surface.mesh, by_accuracy = !c.surface.elements](int triangles, int order) {
+        if constexpr (std::is_same_v<Base, Cylinder>)
+            if (kind == MeshKind::uniform && by_accuracy) return divided(base, triangles, best_width(base, map, order));
         if constexpr (!std::is_same_v<Base, Torus>) {
             const auto resolution = [&]() -> const Resolution& {
                 return once(resolutions, order, [&] { return resolution_of(map, profile_of(base), order); });

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <set>
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -160,6 +161,28 @@ TEST(Start, MeshesDoNotDependOnThoseMadeBefore) {
     start.mesh(300, 3), start.mesh(100, 2);
     EXPECT_EQ(start.mesh(200, 3).mesh.nodes, Start(c).mesh(200, 3).mesh.nodes);
     EXPECT_EQ(start.mesh(200, 2).mesh.nodes, Start(c).mesh(200, 2).mesh.nodes);
+}
+
+TEST(Start, WavesAlongATubeAskForWideTriangles) {
+    // Differences of degree 5 of 0.25 sin(pi z) exceed those of the circle by about 0.25 pi^5, whose fifth root is 2.4.
+    // Equal sides where the triangles are given, or where waves around the axis add to those along it.
+    const auto lowest_points = [](const std::string& rest) {
+        const Case c = parse_case(
+            "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"tube\"\nradius = 1.0\nlength = 2.0\n" + rest,
+            {}, "");
+        const CurvedMesh mesh = Start(c).mesh(240, 4).mesh;
+        std::set<int> corners;
+        for (int cell = 0; cell < mesh.triangles(); ++cell)
+            for (int a = 0; a < 3; ++a)
+                if (mesh.nodes[mesh.node(cell, a)].z() < 1e-9) corners.insert(mesh.node(cell, a));
+        EXPECT_NEAR(mesh.triangles(), 240, 40) << rest;
+        return corners.size();
+    };
+    const std::string wave = "[[shape.mode]]\namplitude = 0.25\nn = 1\n", given = "[discretisation]\nelements = 240\n";
+    EXPECT_EQ(lowest_points(""), 18u);
+    EXPECT_EQ(lowest_points(wave), 12u);
+    EXPECT_EQ(lowest_points(wave + given), 18u);
+    EXPECT_EQ(lowest_points(wave + "[[shape.mode]]\namplitude = 0.01\nn = 1\nm = 1\n"), 18u);
 }
 
 TEST(SurfaceRun, InterruptedAtOnce) {
