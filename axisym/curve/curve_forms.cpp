@@ -23,10 +23,11 @@ S stretching(const S& r1, const S& r2, const S& z1, const S& z2) {
     return (r1 * r2 + z1 * z2) * inverse(S(r1 * r1 + z1 * z1));
 }
 
-// H0 at a group of points, where it varies.
+// H0 at a group of points: where it varies, else the number.
 struct PointH0 {
     Pack value{0.0}, tension{0.0};
-    PointH0(const VaryingH0& H0, int group) {
+    PointH0() = default;
+    PointH0(const VaryingH0& H0, int group, double number) : value(number) {
         if (H0.empty()) return;
         value = H0.value[group];
         if (!H0.tension.empty()) tension = H0.tension[group];
@@ -116,8 +117,8 @@ template <int P>
                 const auto& basis = splines.basis(e, g);
                 const Local at(space_, e, g, x);
                 smallest = stdx::min(smallest, at.r);
-                const auto density =
-                    functional_density<1, added, varies>(bending_, {H0, e * splines.groups() + g}, weights, at);
+                const auto density = functional_density<1, added, varies>(
+                    bending_, varies ? PointH0(H0, e * splines.groups() + g, 0) : PointH0(), weights, at);
                 const Pack weight = images_ * load(basis.weight);
                 alignas(32) double c[5][lanes];
                 for (int i = 0; i < 5; ++i) store(weight * density.d[i], c[i]);
@@ -156,8 +157,9 @@ template <int P>
             std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
             for (int g = 0; g < splines.groups(); ++g) {
                 const auto& basis = splines.basis(e, g);
-                const auto density = functional_density<2, added, varies>(bending_, {H0, e * splines.groups() + g},
-                                                                          weights, Local(space_, e, g, x));
+                const auto density = functional_density<2, added, varies>(
+                    bending_, varies ? PointH0(H0, e * splines.groups() + g, 0) : PointH0(), weights,
+                    Local(space_, e, g, x));
                 const Pack weight = images_ * load(basis.weight);
                 alignas(32) double c[5][5][lanes];
                 for (int i = 0; i < 5; ++i)
@@ -240,7 +242,7 @@ void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
-            const PointH0 H0(fixed_H0_, e * splines.groups() + g);
+            const PointH0 H0(fixed_H0_, e * splines.groups() + g, bending_.H0);
             const auto density = functional_density<2>(bending_, H0, weights, Local(space_, e, g, x));
             const Pack weight = images_ * load(basis.weight);
             const int z1 = first_variable[1];
@@ -264,7 +266,7 @@ double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& 
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
-            const PointH0 H0(fixed_H0_, e * splines.groups() + g);
+            const PointH0 H0(fixed_H0_, e * splines.groups() + g, bending_.H0);
             const auto density = functional_density<1>(bending_, H0, weights, at);
             sum += load(splines.basis(e, g).weight) *
                    (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);

@@ -449,7 +449,7 @@ void check_varying_H0(Keys& k, const Case& c) {
     });
 }
 
-// Conditions across tables.
+// Conditions across tables. Long: a line for each.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
     const MotionLaw law = motion_law(c.model);

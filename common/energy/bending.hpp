@@ -44,16 +44,14 @@ struct CurvatureJet {
     }
     friend CurvatureJet operator+(const CurvatureJet& a, double c) { return {a.f + c, a.H, a.K, a.HH, a.HK, a.KK}; }
     friend CurvatureJet operator-(const CurvatureJet& a, double c) { return {a.f - c, a.H, a.K, a.HH, a.HK, a.KK}; }
-    friend CurvatureJet operator-(const CurvatureJet& a, const T& c)
-        requires(!std::is_same_v<T, double>)
-    {
+    friend CurvatureJet operator-(const CurvatureJet& a, const T& c) requires(!std::is_same_v<T, double>) {
         return {a.f - c, a.H, a.K, a.HH, a.HK, a.KK};
     }
 };
 
-// One term k * value(H, K, H0), all of which may be jets. `name` gives the series energy_<name>, `key` the case key of its
-// modulus, `label` the formula in pictures (mathtext). `magnitude` >= |value| never vanishes on a
-// curved membrane where value may; it scales the asked accuracy (E_ref).
+// One term k * value(H, K, H0), all of which may be jets. `name` gives the series energy_<name>, `key` the case key of
+// its modulus, `label` the formula in pictures (mathtext). `magnitude` >= |value| never vanishes on a curved membrane
+// where value may; it scales the asked accuracy (E_ref).
 template <class Value, class Magnitude>
 struct BendingTerm {
     const char* name;
@@ -70,8 +68,8 @@ inline constexpr auto bending_terms =
                     BendingTerm{"40", "k40", "k_{40}(H-H_0)^4",  //
                                 [](auto H, auto, auto H0) { return (H - H0) * (H - H0) * ((H - H0) * (H - H0)); },
                                 [](auto H, auto, double H0) { return (H - H0) * (H - H0) * ((H - H0) * (H - H0)); }},
-                    BendingTerm{"42", "k42", "k_{42}K^2",                    //
-                                [](auto, auto K, auto) { return K * K; },    //
+                    BendingTerm{"42", "k42", "k_{42}K^2",                  //
+                                [](auto, auto K, auto) { return K * K; },  //
                                 [](auto, auto K, double) { return K * K; }});
 
 inline constexpr std::size_t n_bending_terms = std::tuple_size_v<decltype(bending_terms)>;

@@ -85,8 +85,9 @@ private:
         Eigen::Matrix<double, 2, 3> B;  // e^T B
         Eigen::Matrix2d S;              // HP - B
         CurvatureJet<double> f;
-        Eigen::Vector2d bend,
-            push;  // what the slope of H0 adds to grad f_H + S grad f_K, and the force along the surface
+        // What the slope of H0 adds to grad f_H + S grad f_K; the force along the surface, and its derivatives in H and
+        // K.
+        Eigen::Vector2d bend, push, push_H, push_K;
     };
 
     void size(CellWork& work) const;
@@ -151,7 +152,7 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     at.f = density_at(bending_, H0.value, at.H, at.K);
     const Eigen::Vector2d slope = at.e.transpose() * H0.slope;
     at.bend = H0.f0.H * slope + H0.f0.K * (at.S * slope);
-    at.push = H0.f0.f * slope;
+    at.push = H0.f0.f * slope, at.push_H = H0.f0.H * slope, at.push_K = H0.f0.K * slope;
     return at;
 }
 
@@ -263,8 +264,9 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
     if (K_ >= 0) work.force.head(nv_) -= work.block.block(0, K_, nv_, n_) * space_.gather(base_.fields.K, cell);
 }
 
-// What a varying H0 adds, known on X*: -(f_HH0 grad H0 + (HP-B) f_KH0 grad H0, G(v)) - (f_H0 grad H0, v), and where
-// nothing flows (f_H0 grad H0, grad q)/friction, as u has f_H0 grad H0/friction along the surface: theory.md (10.20).
+// What a varying H0 adds, known on X* but where nothing flows: -(f_HH0 grad H0 + (HP-B) f_KH0 grad H0, G(v)) - (f_H0
+// grad H0, v), and where nothing flows (f_H0 grad H0, grad q)/friction, as u has f_H0 grad H0/friction along the
+// surface: theory.md (10.20).
 void Assembler::add_varying_H0(const std::vector<Point>& at, CellWork& work) const {
     if (base_.fields.H0.size() == 0) return;
     const CellTables& t = work.t;
@@ -276,8 +278,15 @@ void Assembler::add_varying_H0(const std::vector<Point>& at, CellWork& work) con
             const Eigen::Vector3d push = s.dS * (s.e * s.push);
             for (int d = 0; d < 3; ++d) force.segment(d * n_, n_) += push[d] * t.phi.row(q).transpose();
         } else if (p_ >= 0) {
-            work.rhs.segment(p_, t.psi.cols()) -=
-                (s.dS / law_.friction) * (t.psi_grad.middleRows<2>(2 * q).transpose() * s.push);
+            const Eigen::MatrixXd slopes = (s.dS / law_.friction) * t.psi_grad.middleRows<2>(2 * q).transpose();
+            Eigen::Vector2d known = s.push;
+            const auto add = [&](int columns, const Eigen::Vector2d& by, double value) {
+                if (columns < 0) return;
+                work.block.block(p_, columns, slopes.rows(), n_) += (slopes * by) * t.phi.row(q);
+                known -= value * by;
+            };
+            add(H_, s.push_H, s.H), add(K_, s.push_K, s.K);
+            work.rhs.segment(p_, slopes.rows()) -= slopes * known;
         }
     }
     work.rhs.head(nv_) += force;

@@ -46,7 +46,12 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
     out.u = x.head(stage.u.size());
     MotionState moving;
     moving.X = stage.X, moving.u = out.u, moving.p = out.p, moving.period = stage.period;
-    out.w = surface_.node_velocity(moving, at, base.fields, mesh_flux(base, out.u), stage.relaxation);
+    MotionFields ahead;  // explicit in H, the force along the surface would limit the step
+    const bool slips = surface_.H0().size() > 0 && !law.flows;
+    if (slips) ahead = base.fields;
+    if (slips && unknowns_.H >= 0) ahead.H = x.segment(unknowns_.H, surface_.nodes());
+    if (slips && unknowns_.K >= 0) ahead.K = x.segment(unknowns_.K, surface_.nodes());
+    out.w = surface_.node_velocity(moving, at, slips ? ahead : base.fields, mesh_flux(base, out.u), stage.relaxation);
     out.X = stage.Xbar + stage.te * (out.w + stretched(stage.X, out.stretch));
     out.period = stage.period_bar + stage.te * out.stretch * stage.period;
     out.fields = std::move(base.fields);

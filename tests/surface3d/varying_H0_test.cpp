@@ -107,11 +107,11 @@ volume = "free"
 kind = "sphere"
 radius = 1
 [discretisation]
-elements = 180
+elements = 80
 [accuracy]
 energy = 1e-2
 [time]
-end = 0.05
+end = 0.02
 )case";
 
 TEST(VaryingH0, runsLoseWhatTheyDissipate) {
@@ -121,7 +121,7 @@ TEST(VaryingH0, runsLoseWhatTheyDissipate) {
         const Outcome o = run_case(two_domains, {"model.kind=" + kind});
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         for (const double defect : o.series("identity_defect"))
-            EXPECT_LT(std::abs(defect), 3e-3 * o.summary.reference_energy);
+            EXPECT_LT(std::abs(defect), 1e-2 * o.summary.reference_energy);
         EXPECT_LT(o.series("energy").back(), 0.99 * o.series("energy").front());
         if (kind == "gradient-flow") continue;
         for (const double area : o.series("area")) EXPECT_NEAR(area / o.series("area").front(), 1, 1e-8);
@@ -131,11 +131,16 @@ TEST(VaryingH0, runsLoseWhatTheyDissipate) {
 TEST(VaryingH0, anInextensibleCellComesToRestAsTheShapeEquationsSay) {
     // Independent computation: as in tests/axisym/varying_H0_test.cpp, for these domains; on the sphere (1 + z)/2 is
     // the part of the area below.
-    const Outcome o = run_case(two_domains, {"energy.H0=\"-2 - 0.5*tanh(((1 + z)/2 - 0.6)/0.25)\"", "model.kind=stokes",
-                                             "model.gamma=1", "time.end=3", "discretisation.elements=80"});
-    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
-    EXPECT_NEAR(o.last("energy"), 0.7837975776, 1e-3);
-    EXPECT_NEAR(o.last("height"), 2.0555857309, 2e-3);
+    for (const std::vector<std::string>& model :
+         {std::vector<std::string>{"model.kind=stokes", "model.gamma=1"}, {"model.kind=overdamped"}}) {
+        std::vector<std::string> sets{"energy.H0=\"-2 - 0.5*tanh(((1 + z)/2 - 0.6)/0.25)\"", "time.end=3",
+                                      "discretisation.elements=80"};
+        sets.insert(sets.end(), model.begin(), model.end());
+        const Outcome o = run_case(two_domains, sets);
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        EXPECT_NEAR(o.last("energy"), 0.7837975776, 1e-3);
+        EXPECT_NEAR(o.last("height"), 2.0555857309, 2e-3);
+    }
 }
 
 TEST(VaryingH0, refusals) {

@@ -178,7 +178,7 @@ TEST(CaseRefusal, WrongTypes) {
         Edit{"\"test\"", "2024-01-01", "3:9: about.title must be a string, not a date or time"},
         Edit{"title = \"test\"", "source = true", "3:10: about.source must be a string, not true"},
         Edit{"0.06", "\"0.06\"", "6:7: energy.k42 must be a finite number, not the string \"0.06\""},
-        Edit{"k42 = 0.06", "H0 = [1]", "6:6: energy.H0 must be a finite number, not a list"},
+        Edit{"k42 = 0.06", "H0 = [1]", "6:6: energy.H0 must be a number, or a formula of area, r, z, not a list"},
         Edit{"[about]\ntitle = \"test\"", "about = 0.5", "2:9: about must be a table, not 0.5"},
         Edit{"[[shape.mode]]", "[shape.mode]",
              "13:1: shape.mode must be a list of tables, [[shape.mode]], not a table"},
