@@ -54,8 +54,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     const S z_t = f.z_t - n.stretch * f.v[z0];  // less the motion of the stretching
     if (!law.inextensible && law.lagrangian) {
         const S dS = (2 * pi) * (r * (g2 * ig));
-        out[kr] = dS * f.r_t;
-        out[kz] = dS * f.z_t;
+        out[kr] = dS * f.r_t, out[kz] = dS * f.z_t;
         return out;
     }
     if (!law.inextensible) {
@@ -71,8 +70,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     const S across = (2 * pi) * (r * ((dr * z_s - dz * r_s) * ig));  // (X_t - u).nu dS/g
     const S along = (2 * pi) * (r * (dr * r_s + dz * z_s));          // (X_t - u).t dS
     if (law.lagrangian) {
-        out[kr] = dS * dr;
-        out[kz] = dS * dz;
+        out[kr] = dS * dr, out[kz] = dS * dz;
     } else {
         out[kr] = across * z_s + shift * (2 * pi) * (r * r_s);
         out[kz] = shift * (2 * pi) * (r * z_s) - across * r_s;

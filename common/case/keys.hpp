@@ -449,6 +449,32 @@ void check_varying_H0(Keys& k, const Case& c) {
     });
 }
 
+template <class Keys>
+void check_surface_scheme(Keys& k, const Case& c, const MotionLaw& law, const SchemeEntry& scheme) {
+    k.check("discretisation.scheme", [&]() -> std::string {
+        if (!scheme.controls_steps && !c.surface.step)
+            return fmt::format("\"{}\" needs discretisation.step: it does not adapt the step", scheme.name);
+        if (!scheme.with_inertia && law.inertia != 0)
+            return fmt::format("must not be \"{}\" for a fluid: bending waves grow in its steps", scheme.name);
+        if (scheme.general) return {};
+        if (!law.inextensible) return fmt::format("must not be \"{}\" for a gradient flow", scheme.name);
+        if (law.inertia == 0 && law.friction == 0)
+            return fmt::format("must not be \"{}\" for a Stokes flow without friction: rigid motions are undetermined",
+                               scheme.name);
+        if (law.reservoir || law.free_period || !law.without_loads())
+            return fmt::format("must not be \"{}\" with model.{}", scheme.name,
+                               law.reservoir     ? "area = \"reservoir\""
+                               : law.free_period ? "period = \"free\""
+                                                 : "pressure");
+        if (c.energy.H0_varies())
+            return fmt::format("must not be \"{}\" where energy.H0 varies: it has no force along the surface",
+                               scheme.name);
+        if (const auto key = term_beyond_paper(c.energy); !key.empty())
+            return fmt::format("must not be \"{}\" with {}: it has k20, k40 and k42 only", scheme.name, key);
+        return {};
+    });
+}
+
 // Conditions across tables. Long: a line for each.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
@@ -471,32 +497,7 @@ void check_together(Keys& k, const Case& c) {
         if (not_axisymmetric(c.shape).first.empty()) check_neck(k, c);
         return;
     }
-    if (c.tier == Tier::surface3d) {
-        k.check("discretisation.scheme", [&]() -> std::string {
-            if (!scheme.controls_steps && !c.surface.step)
-                return fmt::format("\"{}\" needs discretisation.step: it does not adapt the step", scheme.name);
-            if (!scheme.with_inertia && law.inertia != 0)
-                return fmt::format("must not be \"{}\" for a fluid: bending waves grow in its steps", scheme.name);
-            if (scheme.general) return {};
-            if (!law.inextensible) return fmt::format("must not be \"{}\" for a gradient flow", scheme.name);
-            if (law.inertia == 0 && law.friction == 0)
-                return fmt::format(
-                    "must not be \"{}\" for a Stokes flow without friction: rigid motions are undetermined",
-                    scheme.name);
-            if (law.reservoir || law.free_period || !law.without_loads())
-                return fmt::format("must not be \"{}\" with model.{}", scheme.name,
-                                   law.reservoir     ? "area = \"reservoir\""
-                                   : law.free_period ? "period = \"free\""
-                                                     : "pressure");
-            if (c.energy.H0_varies())
-                return fmt::format("must not be \"{}\" where energy.H0 varies: it has no force along the surface",
-                                   scheme.name);
-            if (const auto key = term_beyond_paper(c.energy); !key.empty())
-                return fmt::format("must not be \"{}\" with {}: it has k20, k40 and k42 only", scheme.name, key);
-            return {};
-        });
-        return;
-    }
+    if (c.tier == Tier::surface3d) return check_surface_scheme(k, c, law, scheme);
     const auto [key, complaint] = not_axisymmetric(c.shape);
     k.check(key, [&] { return complaint; });
     k.check("discretisation.parametrisation", [&]() -> std::string {
