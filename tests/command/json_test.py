@@ -34,6 +34,13 @@ class Schemas(ProgramTest):
         self.assertGreater(found["expected"]["steps"], 10)
         self.assertIsNone(self.answer("check", "check", "case.toml", "--quick")["cases"][0]["expected"])
 
+    def test_check_warns_of_energies_without_lower_bound(self):
+        sound = self.answer("check", "check", "case.toml", "--quick")["cases"][0]
+        self.assertIsNone(sound["warning"])
+        falls = self.answer("check", "check", "case.toml", "--quick", "--set", "energy.k42=-0.01")["cases"][0]
+        self.assertTrue(falls["valid"])
+        self.assertIn("no lower bound", falls["warning"])
+
     def test_check_of_several_of_which_one_is_wrong(self):
         self.write("bad.toml", QUICK.replace("radius", "raduis").replace("k42 = 0.1", 'k42 = "much"'))
         good, bad = self.answer("check", "check", "case.toml", "bad.toml", "--set", "time.edn=1", "--quick", status=2)["cases"]

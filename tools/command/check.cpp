@@ -138,9 +138,9 @@ std::string json_of(const Checked& c) {
                                json(c.expected->bytes));
     return fmt::format(
         "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"chosen\": {}, \"expected\": {}, "
-        "\"unknown\": {}}}",
+        "\"unknown\": {}, \"warning\": {}}}",
         json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""),
-        json(c.chosen), expected, or_null(c.unknown));
+        json(c.chosen), expected, or_null(c.unknown), or_null(c.warning));
 }
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
