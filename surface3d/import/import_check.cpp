@@ -20,17 +20,6 @@ using Eigen::Vector3d;
 
 constexpr double degrees = 180 / std::numbers::pi;
 
-[[noreturn]] void fail(const ImportedMesh& in, const std::string& message) {
-    throw MeshError(in.names.file + ": " + message);
-}
-
-std::string triangle(const ImportedMesh& in, std::size_t t) {
-    return triangle_name(in.names, t);
-}
-std::string vertex(const ImportedMesh& in, int v) {
-    return vertex_name(in.names, in.mesh, std::size_t(v));
-}
-
 Vector3d area_vector(const TriangleMesh& mesh, std::size_t t) {
     const auto& [a, b, c] = mesh.triangles[t];
     return 0.5 * (mesh.points[b] - mesh.points[a]).cross(mesh.points[c] - mesh.points[a]);
@@ -38,8 +27,8 @@ Vector3d area_vector(const TriangleMesh& mesh, std::size_t t) {
 
 void check_triangles(const ImportedMesh& in) {
     const TriangleMesh& mesh = in.mesh;
-    if (mesh.period != 0) fail(in, "a periodic mesh is not closed");
-    if (mesh.triangles.empty()) fail(in, "the mesh has no triangles");
+    if (mesh.period != 0) refuse(in, "a periodic mesh is not closed");
+    if (mesh.triangles.empty()) refuse(in, "the mesh has no triangles");
     const int points = int(mesh.points.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const auto& corner = mesh.triangles[t];
@@ -47,16 +36,16 @@ void check_triangles(const ImportedMesh& in) {
         for (int i = 0; i < 3; ++i) {
             const int a = corner[i], b = corner[(i + 1) % 3];
             if (a < 0 || a >= points)
-                fail(in, fmt::format("{} uses point {}, but there are {}", triangle(in, t), a, points));
-            if (!mesh.points[a].allFinite()) fail(in, vertex(in, a) + " is not finite");
+                refuse(in, fmt::format("{} uses point {}, but there are {}", triangle_name(in, t), a, points));
+            if (!mesh.points[a].allFinite()) refuse(in, vertex_name(in, a) + " is not finite");
             if (a == b)
-                fail(in, fmt::format("{} is degenerate: {} occurs twice in it", triangle(in, t), vertex(in, a)));
+                refuse(in, fmt::format("{} is degenerate: {} occurs twice in it", triangle_name(in, t), vertex_name(in, a)));
             if (b >= 0 && b < points) longest = std::max(longest, (mesh.points[b] - mesh.points[a]).norm());
         }
         // In float coordinates (STL), heights below 1e-6 of a side are rounding.
         if (2 * area_vector(mesh, t).norm() <= 1e-6 * longest * longest) {
-            fail(in, fmt::format("{} is degenerate: {}, {} and {} are collinear", triangle(in, t),
-                                 vertex(in, corner[0]), vertex(in, corner[1]), vertex(in, corner[2])));
+            refuse(in, fmt::format("{} is degenerate: {}, {} and {} are collinear", triangle_name(in, t),
+                                 vertex_name(in, corner[0]), vertex_name(in, corner[1]), vertex_name(in, corner[2])));
         }
     }
 }
@@ -73,8 +62,8 @@ void check_duplicates(const ImportedMesh& in) {
         if (sorted[i].first == sorted[i - 1].first) first = std::min(first, {sorted[i - 1].second, sorted[i].second});
     }
     if (first.first == sorted.size()) return;
-    fail(in, fmt::format("duplicate faces: {} and {} have the same vertices", triangle(in, first.first),
-                         triangle(in, first.second)));
+    refuse(in, fmt::format("duplicate faces: {} and {} have the same vertices", triangle_name(in, first.first),
+                         triangle_name(in, first.second)));
 }
 
 struct HalfEdge {
@@ -111,20 +100,20 @@ void check_edges(const ImportedMesh& in, const std::vector<HalfEdge>& edges) {
     }
     if (first == edges.size()) return;
     const HalfEdge& e = edges[first];
-    const std::string edge = fmt::format("edge from {} to {}", vertex(in, e.forward ? e.low : e.high),
-                                         vertex(in, e.forward ? e.high : e.low));
+    const std::string edge = fmt::format("edge from {} to {}", vertex_name(in, e.forward ? e.low : e.high),
+                                         vertex_name(in, e.forward ? e.high : e.low));
     if (count == 1) {
-        fail(in, fmt::format("the mesh is open: the {} of {} belongs to no other triangle ({} such edges; if the "
+        refuse(in, fmt::format("the mesh is open: the {} of {} belongs to no other triangle ({} such edges; if the "
                              "surface is closed there, weld its vertices)",
-                             edge, triangle(in, e.triangle), open));
+                             edge, triangle_name(in, e.triangle), open));
     }
     if (count == 2) {
-        fail(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}",
-                             triangle(in, e.triangle), triangle(in, edges[first + 1].triangle), edge));
+        refuse(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}",
+                             triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle), edge));
     }
-    fail(in, fmt::format("non-manifold edge: the {} belongs to {} triangles, among them {}, {} and {}", edge, count,
-                         triangle(in, e.triangle), triangle(in, edges[first + 1].triangle),
-                         triangle(in, edges[first + 2].triangle)));
+    refuse(in, fmt::format("non-manifold edge: the {} belongs to {} triangles, among them {}, {} and {}", edge, count,
+                         triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle),
+                         triangle_name(in, edges[first + 2].triangle)));
 }
 
 // neighbour[t][i] across the edge from corner i to the next.
@@ -157,10 +146,10 @@ void check_fans(const ImportedMesh& in, const std::vector<std::array<std::size_t
             if (int(fan.size()) == std::exchange(size[v], 0)) continue;
             std::size_t other = t;
             while (fan.contains(other) || corner_of(mesh, other, v) == 3) ++other;
-            fail(in,
+            refuse(in,
                  fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
                              "them",
-                             triangle(in, t), triangle(in, other), vertex(in, v)));
+                             triangle_name(in, t), triangle_name(in, other), vertex_name(in, v)));
         }
     }
 }
@@ -184,8 +173,8 @@ void check_connected(const ImportedMesh& in, const std::vector<std::array<std::s
         ++count;
     }
     if (count > 1) {
-        fail(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}", count,
-                             triangle(in, second), triangle(in, 0)));
+        refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}", count,
+                             triangle_name(in, second), triangle_name(in, 0)));
     }
 }
 
@@ -268,8 +257,8 @@ MeshReport close_mesh(ImportedMesh& in) {
     check_fans(in, across);
     check_connected(in, across);
     if (const auto pair = first_intersection(in.mesh)) {
-        fail(in, fmt::format("the surface intersects itself: {} intersects {}", triangle(in, pair->first),
-                             triangle(in, pair->second)));
+        refuse(in, fmt::format("the surface intersects itself: {} intersects {}", triangle_name(in, pair->first),
+                             triangle_name(in, pair->second)));
     }
     MeshReport report = measure(in.mesh, edges);
     if (report.volume < 0) {
@@ -281,7 +270,7 @@ MeshReport close_mesh(ImportedMesh& in) {
         in.notes.push_back(
             fmt::format("The largest kink is {2:.0f} degrees, between {0} and {1}: a smooth surface "
                         "through such edges is a guess.",
-                        triangle(in, report.kink_first), triangle(in, report.kink_second), report.kink_max));
+                        triangle_name(in, report.kink_first), triangle_name(in, report.kink_second), report.kink_max));
     }
     return report;
 }

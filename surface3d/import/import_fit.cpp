@@ -201,7 +201,7 @@ double mean_edge(const TriangleMesh& mesh) {
 [[noreturn]] void fail(const ImportedMesh& imported, std::size_t triangle, const std::string& message) {
     throw MeshError(fmt::format(
         "{}: {}: {}; the mesh is too coarse or too rough there for a smooth surface{}", imported.names.file,
-        triangle_name(imported.names, triangle), message,
+        triangle_name(imported, triangle), message,
         imported.names.triangle_centre.empty() ? ": shape.remesh = NUMBER makes one of so many new triangles" : ""));
 }
 
@@ -263,7 +263,7 @@ void check_surface(const ImportedMesh& imported, const TriangleMesh& mesh, const
     }
     if (const auto pair = first_intersection(parts)) {
         fail(imported, pair->first / each,
-             "the fitted element intersects that of " + triangle_name(imported.names, pair->second / each));
+             "the fitted element intersects that of " + triangle_name(imported, pair->second / each));
     }
 }
 

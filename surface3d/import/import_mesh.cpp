@@ -174,7 +174,8 @@ void MeshNames::number_triangles(std::size_t count) {
     number(triangle_number, count, first);
 }
 
-std::string triangle_name(const MeshNames& names, std::size_t triangle) {
+std::string triangle_name(const ImportedMesh& mesh, std::size_t triangle) {
+    const MeshNames& names = mesh.names;
     if (!names.triangle_centre.empty()) {
         const Eigen::Vector3d& x = names.triangle_centre[triangle];
         return fmt::format("the new triangle at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]);
@@ -186,11 +187,15 @@ std::string triangle_name(const MeshNames& names, std::size_t triangle) {
     return name + (place.line ? fmt::format(" (line {})", place.line) : fmt::format(" (byte {})", place.byte));
 }
 
-std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::size_t vertex) {
-    const std::int64_t number =
-        names.vertex_number.empty() ? std::int64_t(vertex) + names.first : names.vertex_number[vertex];
-    const Eigen::Vector3d& x = mesh.points[vertex];
+std::string vertex_name(const ImportedMesh& mesh, int vertex) {
+    const std::vector<std::int64_t>& numbers = mesh.names.vertex_number;
+    const std::int64_t number = numbers.empty() ? vertex + mesh.names.first : numbers[vertex];
+    const Eigen::Vector3d& x = mesh.mesh.points[vertex];
     return fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", number, x[0], x[1], x[2]);
+}
+
+void refuse(const ImportedMesh& mesh, const std::string& message) {
+    throw MeshError(mesh.names.file + ": " + message);
 }
 
 ImportedMesh read_mesh(const std::filesystem::path& path, double weld, bool drop_degenerate) {

@@ -36,14 +36,14 @@ struct MeshNames {
     void number_vertices(std::size_t count);
     void number_triangles(std::size_t count);
 };
-std::string triangle_name(const MeshNames& names, std::size_t triangle);
-std::string vertex_name(const MeshNames& names, const TriangleMesh& mesh, std::size_t vertex);
-
 struct ImportedMesh {
     TriangleMesh mesh;
     MeshNames names;
     std::vector<std::string> notes;  // what was changed, in full sentences
 };
+std::string triangle_name(const ImportedMesh& mesh, std::size_t triangle);
+std::string vertex_name(const ImportedMesh& mesh, int vertex);
+[[noreturn]] void refuse(const ImportedMesh& mesh, const std::string& message);  // a MeshError that names the file
 
 // The triangles of a file; the extension gives the format (.obj .off .ply .stl, in either case). Polygons become
 // triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and

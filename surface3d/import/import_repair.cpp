@@ -18,16 +18,6 @@ namespace {
 constexpr double speck = 0.01;  // of the area of the largest piece
 constexpr const char* wrapping = "shape.wrap = LENGTH puts one surface around everything, closing gaps of that length";
 
-[[noreturn]] void fail(const ImportedMesh& in, const std::string& message) {
-    throw MeshError(in.names.file + ": " + message);
-}
-std::string triangle(const ImportedMesh& in, std::size_t t) {
-    return triangle_name(in.names, t);
-}
-std::string vertex(const ImportedMesh& in, int v) {
-    return vertex_name(in.names, in.mesh, std::size_t(v));
-}
-
 // Keeps the triangles for which keep(number).
 template <class Keep>
 std::size_t drop_triangles(ImportedMesh& in, const Keep& keep) {
@@ -59,7 +49,7 @@ void drop_useless(ImportedMesh& in) {
     if (degenerate > 0) in.notes.push_back(fmt::format("{} triangles with a vertex twice were dropped.", degenerate));
     if (dropped > degenerate)
         in.notes.push_back(fmt::format("{} repeated triangles were dropped.", dropped - degenerate));
-    if (in.mesh.triangles.empty()) fail(in, "no triangle has an area");
+    if (in.mesh.triangles.empty()) refuse(in, "no triangle has an area");
 }
 
 // The triangles at each edge (low vertex, high vertex).
@@ -84,10 +74,10 @@ bool runs(const std::array<int, 3>& corner, int from, int to) {
 void check_edges(const ImportedMesh& in, const Edges& edges) {
     for (const auto& [edge, at] : edges)
         if (at.size() > 2)
-            fail(in, fmt::format("non-manifold edge: the edge from {} to {} belongs to {} triangles, among them {}, {} "
+            refuse(in, fmt::format("non-manifold edge: the edge from {} to {} belongs to {} triangles, among them {}, {} "
                                  "and {}; {}",
-                                 vertex(in, edge.first), vertex(in, edge.second), at.size(), triangle(in, at[0]),
-                                 triangle(in, at[1]), triangle(in, at[2]), wrapping));
+                                 vertex_name(in, edge.first), vertex_name(in, edge.second), at.size(), triangle_name(in, at[0]),
+                                 triangle_name(in, at[1]), triangle_name(in, at[2]), wrapping));
 }
 
 void check_closed(const ImportedMesh& in, const Edges& edges) {
@@ -97,10 +87,10 @@ void check_closed(const ImportedMesh& in, const Edges& edges) {
         if (at.size() == 1 && open++ == 0) first = &edge;
     if (!first) return;
     const std::size_t t = edges.at(*first)[0];
-    fail(in, fmt::format("the mesh is open: the edge from {} to {} of {} belongs to no other triangle ({} such edges); "
+    refuse(in, fmt::format("the mesh is open: the edge from {} to {} of {} belongs to no other triangle ({} such edges); "
                          "if the surface is closed there, shape.weld joins vertices that are near each other; "
                          "shape.fill_holes = true closes holes",
-                         vertex(in, first->first), vertex(in, first->second), triangle(in, t), open));
+                         vertex_name(in, first->first), vertex_name(in, first->second), triangle_name(in, t), open));
 }
 
 // Makes each triangle face as its neighbours do, from the first of its piece on; the number of the piece of each.
@@ -125,9 +115,9 @@ std::vector<int> orient(ImportedMesh& in, const Edges& edges) {
                     std::array<int, 3>& other = in.mesh.triangles[s];
                     const bool differs = runs(other, from, to);
                     if (differs && piece[s] >= 0)
-                        fail(in, fmt::format("the surface has only one side, like a Moebius strip: {} and {} cannot "
+                        refuse(in, fmt::format("the surface has only one side, like a Moebius strip: {} and {} cannot "
                                              "face the same way, whichever way their neighbours do; {}",
-                                             triangle(in, t), triangle(in, s), wrapping));
+                                             triangle_name(in, t), triangle_name(in, s), wrapping));
                     if (piece[s] >= 0) continue;
                     if (differs) std::swap(other[1], other[2]), is_turned[s] = true;
                     piece[s] = number;
@@ -151,7 +141,7 @@ std::vector<std::string> drop_specks(ImportedMesh& in, const std::vector<int>& p
     for (std::size_t t = 0; t < piece.size(); ++t) {
         const auto& [a, b, c] = in.mesh.triangles[t];
         const auto& x = in.mesh.points;
-        if (piece[t] >= int(area.size())) area.push_back(0), name.push_back(triangle(in, t));
+        if (piece[t] >= int(area.size())) area.push_back(0), name.push_back(triangle_name(in, t));
         area[piece[t]] += (x[b] - x[a]).cross(x[c] - x[a]).norm() / 2;
     }
     const double largest = *std::ranges::max_element(area);
@@ -207,10 +197,10 @@ void part_vertices(ImportedMesh& in, const Edges& edges) {
         std::vector<Fan> fans = fans_at(mesh, edges, v, at[v]);
         if (fans.size() < 2) continue;
         if (!std::ranges::all_of(fans, &Fan::open))
-            fail(in,
+            refuse(in,
                  fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
                              "them: two surfaces, or two parts of one, touch there; move them apart, or {}",
-                             triangle(in, fans[0].triangles[0]), triangle(in, fans[1].triangles[0]), vertex(in, v),
+                             triangle_name(in, fans[0].triangles[0]), triangle_name(in, fans[1].triangles[0]), vertex_name(in, v),
                              wrapping));
         for (std::size_t i = 1; i < fans.size(); ++i) parted.emplace_back(v, std::move(fans[i]));
     }
@@ -227,7 +217,7 @@ void part_vertices(ImportedMesh& in, const Edges& edges) {
 
 void check_one_piece(const ImportedMesh& in, const std::vector<std::string>& pieces) {
     if (pieces.size() > 1)
-        fail(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}; a case has one "
+        refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}; a case has one "
                              "membrane: keep one of them in the file",
                              pieces.size(), pieces[1], pieces[0]));
 }

@@ -42,6 +42,8 @@ constexpr int smoothings = 2;
 constexpr double least_angle = 0.4, most_angle = 1.0;
 constexpr double sharpest_start = 1;  // radians from node to node
 constexpr double wrap_offset = 0.05;  // of the gaps that are closed
+// Squares of that side in the area of what is wrapped, and the seconds that each takes.
+constexpr double most_gaps = 5e4, seconds_per_gap = 1.2e-3;
 constexpr double crease = 45;         // degrees between neighbours
 constexpr double folded = 120;        // degrees, too
 constexpr double unfolding = 0.33;    // of the length
@@ -70,9 +72,20 @@ TriangleMesh filled(const ImportedMesh& file, std::vector<std::string>& notes) {
     return filled.mesh;
 }
 
+// Nothing can end the wrapping itself.
+void check_effort_of_wrapping(const ImportedMesh& file, double gap) {
+    const double area = mesh_area(file.mesh), gaps = area / (gap * gap);
+    if (gaps > most_gaps)
+        refuse(file, fmt::format("shape.wrap = {:g} is too small for a surface of area {:.3g}: a wrap would have about "
+                                 "{:.2g} triangles; try shape.wrap = {:.2g}, or remove vertices that are far away",
+                                 gap, area, 8 * gaps, std::sqrt(area / (0.2 * most_gaps))));
+    check_pause(seconds_per_gap * gaps);
+}
+
 Body body_of(ImportedMesh& file, const MeshFile& shape) {
     Body body{file.names.file, {}, 0, {}};
     if (shape.wrap) {
+        check_effort_of_wrapping(file, *shape.wrap);
         const double offset = wrap_offset * *shape.wrap;
         ImportedMesh around;
         around.names.file = file.names.file;

@@ -33,7 +33,7 @@ constexpr unsigned seed = 1;
 
 // Tubes of as many triangles as the accuracy needs: points in a circle from which their width follows, and the largest
 // width over that of equal sides. What is as small as rounding tells nothing.
-constexpr int samples = 32;
+constexpr int samples = 32, most_rings = 256;
 constexpr double widest = 2.5, axisymmetric = 1e-9, rounding = 1e-13;
 
 // For each entry of the matrix of a cell, in what is made of a mesh. Measured: docs/decisions/time_and_memory.md.
@@ -44,8 +44,8 @@ int fields_of(const SurfaceLaw& law) {
     return law.components() + 2 + law.inextensible;
 }
 
-int even(double n, int least) {
-    return std::max(2 * static_cast<int>(std::lround(n / 2)), least);
+int even(double n, int least, int most) {
+    return std::clamp(2 * static_cast<int>(std::lround(std::min(n, 1.0 * most) / 2)), least, std::max(least, most));
 }
 
 // About so many equal triangles on a base surface.
@@ -54,16 +54,16 @@ TriangleMesh divided(const UnitSphere&, int triangles) {
 }
 TriangleMesh divided(const Torus& torus, int triangles) {
     const double aspect = torus.radius / torus.tube_radius;
-    return torus_grid(torus, even(std::sqrt(triangles / 2.0 * aspect), 4),
-                      even(std::sqrt(triangles / 2.0 / aspect), 4));
+    return torus_grid(torus, even(std::sqrt(triangles / 2.0 * aspect), 4, triangles),
+                      even(std::sqrt(triangles / 2.0 / aspect), 4, triangles));
 }
 // Rings half a spacing out of step make equilateral triangles where the height of a row is sqrt(3)/2 of the spacing;
 // `wider`: by how much triangles are wider than that.
 TriangleMesh divided(const Cylinder& tube, int triangles, double wider = 1) {
     const double around = 2 * pi * tube.radius, side = std::sqrt(around * tube.length / triangles * 4 / std::sqrt(3.0)),
                  stretch = std::sqrt(wider);
-    return tube_rings(tube.radius, tube.length, even(tube.length * stretch / (std::sqrt(0.75) * side), 2),
-                      std::max(static_cast<int>(std::lround(around / (stretch * side))), 3));
+    return tube_rings(tube.radius, tube.length, even(tube.length * stretch / (std::sqrt(0.75) * side), 2, triangles),
+                      std::clamp(static_cast<int>(std::lround(around / (stretch * side))), 3, std::max(triangles, 3)));
 }
 
 // By how much triangles of elements of this order are best wider than high, so that interpolation is as accurate along
@@ -81,8 +81,10 @@ double best_width(const Cylinder& tube, const Map& map, int order) {
         return Eigen::AngleAxisd(-theta, Eigen::Vector3d::UnitZ()) * at(theta, z);
     };
     const double spacing = std::min(2 * pi * tube.radius, tube.length) / samples, degree = order + 1;
+    const int rings = static_cast<int>(std::min(std::ceil(tube.length / spacing), 1.0 * most_rings));
     double along = 0, around = 0;
-    for (double z = 0; z < tube.length; z += spacing) {
+    for (int ring = 0; ring < rings; ++ring) {
+        const double z = ring * tube.length / rings;
         for (int i = 1; i < samples; ++i)
             if ((seen(2 * pi * i / samples, z) - seen(0, z)).norm() > axisymmetric * tube.radius) return 1;
         Eigen::Vector3d of_z = Eigen::Vector3d::Zero(), of_theta = of_z;

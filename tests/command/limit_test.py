@@ -68,6 +68,15 @@ class TimeLimit(ProgramTest):
     def test_in_the_mesh_of_a_surface(self):
         self.ends_in_time("run", SURFACE, "--set", "discretisation.elements=100000", "--set", "discretisation.order=2")
 
+    def test_in_the_mesh_of_a_tube_of_almost_no_radius(self):
+        text = 'tier = "surface3d"\nenergy.k20 = 1.0\n[shape]\nkind = "formula"\nr = "1e-300"\nlength = 4.0\n'
+        case = self.write("thin.toml", text + f"[accuracy]\nenergy = 0.01\n[time]\nend = 1e-3\nlimit = {LIMIT}\n")
+        begin = time.monotonic()
+        with self.start("run", case, "-o", self.result) as process:
+            process.wait(timeout=LIMIT + 10 * ROOM)
+        self.assertNotEqual(process.returncode, 0)
+        self.assertLess(time.monotonic() - begin, LIMIT + ROOM)
+
     def test_in_a_descent_to_an_equilibrium(self):
         self.ends_in_time("equilibrium", EQUILIBRIUM)
 

@@ -86,18 +86,6 @@ def volume(points, triangles):
 
 
 class MeshesTest(ProgramTest):
-    said_at_first = None
-
-    def setUp(self):
-        super().setUp()
-        self.off("sound.off", *sphere(12))
-        path = self.write("sound.toml", CASE.format("sound.off", "remesh = 100"))
-        MeshesTest.said_at_first = MeshesTest.said_at_first or self.attempt("check", "--quick", path)[1]
-        said = MeshesTest.said_at_first
-        if "needs a build with CGAL" in said:
-            self.assertRegex(said, r"sound\.toml:7:\d+: shape\.remesh needs a build with CGAL: install libcgal-dev")
-            self.skipTest("this build has no CGAL")
-
     def attempt(self, *arguments):
         """Exit status, and what was said."""
         with self.start(*arguments) as process:

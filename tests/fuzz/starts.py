@@ -57,12 +57,12 @@ def spheroid(rng):
 
 
 def ring(rng):
-    n, a = rng.choice((40, 150)), rng.uniform(1.2, 4)
+    n, a = 150, rng.uniform(1.2, 4)
     return [[a + math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n)] for i in range(n)] + [[a + 1.0, 0.0]], None
 
 
 def tube(rng):
-    n, length, a = rng.choice((40, 150)), rng.choice((1.0, 2.0, 6.0)), rng.uniform(0, 0.4)
+    n, length, a = 150, rng.choice((1.0, 2.0, 6.0)), rng.uniform(0, 0.4)
     return [[1 + a * math.cos(2 * math.pi * i / n), length * i / n] for i in range(n + 1)], length
 
 

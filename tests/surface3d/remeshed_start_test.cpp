@@ -1,5 +1,5 @@
 // From rough meshes to smooth starts: number of triangles, volume, distances from exactly known surfaces, notes,
-// refusals; and the single steps that CGAL takes. Without CGAL there is nothing to test here.
+// refusals; and the single steps that CGAL takes. Built with CGAL alone.
 #include "surface3d/run/remeshed_start.hpp"
 
 #include <fmt/format.h>
@@ -18,13 +18,6 @@ namespace tubule::surface3d {
 namespace {
 
 using namespace samples;
-
-class NewTriangles : public testing::Test {
-protected:
-    void SetUp() override {
-        if (!cgal::available()) GTEST_SKIP() << "this build has no CGAL";
-    }
-};
 
 const Surface ellipsoid{.axes = {1, 0.8, 0.6}};
 
@@ -117,7 +110,7 @@ bool has(const std::string& text, const std::string& part) {
 
 // Marching tetrahedra of a field with noise. The smooth ellipsoid is met to a hundredth of its size, sqrt(8) = 2.83,
 // the volume is that of the mesh given.
-TEST_F(NewTriangles, FromANoisyContour) {
+TEST(NewTriangles, FromANoisyContour) {
     std::mt19937 random(5);
     const TriangleMesh mesh =
         contoured([&](const Vector3d& x) { return ellipsoid.value(x) + 0.04 * (uniform(random) - 0.5); }, 1.2, 24);
@@ -133,7 +126,7 @@ TEST_F(NewTriangles, FromANoisyContour) {
 }
 
 // Noise so strong that triangles turn over and intersect, which is no reason to refuse them: it is smoothed away.
-TEST_F(NewTriangles, NoiseOfAFifthOfAnEdge) {
+TEST(NewTriangles, NoiseOfAFifthOfAnEdge) {
     const TriangleMesh mesh = noisy(irregular(ellipsoid, 16), 0.2);
     EXPECT_TRUE(has(test::message_of<MeshError>([&] {
                         ImportedMesh raw = imported(mesh);
@@ -146,7 +139,7 @@ TEST_F(NewTriangles, NoiseOfAFifthOfAnEdge) {
 }
 
 // 980 triangles for bumps of a third of the radius, with noise: a decimated scan.
-TEST_F(NewTriangles, FromACoarseIrregularMesh) {
+TEST(NewTriangles, FromACoarseIrregularMesh) {
     const Surface bumpy{.axes = {1, 1, 1}, .bump = 0.3};
     const TriangleMesh mesh = noisy(irregular(bumpy, 7), 0.05);
     for (const int order : {2, 4}) {
@@ -160,7 +153,7 @@ TEST_F(NewTriangles, FromACoarseIrregularMesh) {
 }
 
 // The stated distance is the larger one of both directions, so no node is farther from the file.
-TEST_F(NewTriangles, StatesItsDistance) {
+TEST(NewTriangles, StatesItsDistance) {
     const TriangleMesh mesh = geodesic_sphere(4);
     const RemeshedStart start = start_of(mesh, {.path = "", .remesh = 300});
     double stated = 0;
@@ -172,7 +165,7 @@ TEST_F(NewTriangles, StatesItsDistance) {
     EXPECT_LT(stated, 1.5 * most + 0.02);
 }
 
-TEST_F(NewTriangles, CreasesAreRoundedAndSaidToBe) {
+TEST(NewTriangles, CreasesAreRoundedAndSaidToBe) {
     TriangleMesh cube;
     for (int v = 0; v < 8; ++v) cube.points.emplace_back(v & 1, v >> 1 & 1, v >> 2);
     const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
@@ -186,7 +179,7 @@ TEST_F(NewTriangles, CreasesAreRoundedAndSaidToBe) {
         << start.notes.back();
 }
 
-TEST_F(NewTriangles, HolesAreFilledWhenAsked) {
+TEST(NewTriangles, HolesAreFilledWhenAsked) {
     TriangleMesh mesh = geodesic_sphere(8);
     std::erase_if(mesh.triangles, [&](const auto& t) {
         return (mesh.points[t[0]] + mesh.points[t[1]] + mesh.points[t[2]])[2] > 3 * 0.93;
@@ -201,7 +194,7 @@ TEST_F(NewTriangles, HolesAreFilledWhenAsked) {
 
 // A ball in 20 pieces that do not join: their triangles shrunk towards their centres. The volume of what encloses them
 // is that of the ball, to the width of the gaps.
-TEST_F(NewTriangles, WrapsWhatIsNoSurface) {
+TEST(NewTriangles, WrapsWhatIsNoSurface) {
     TriangleMesh soup;
     const TriangleMesh ball = geodesic_sphere(4);
     for (const auto& t : ball.triangles) {
@@ -218,7 +211,16 @@ TEST_F(NewTriangles, WrapsWhatIsNoSurface) {
     EXPECT_LT(distance_from(start.surface, {}), 0.05);
 }
 
-TEST_F(NewTriangles, RefusesASheet) {
+// Nothing ends a wrapping once it runs.
+TEST(NewTriangles, RefusesToWrapForHours) {
+    TriangleMesh ball = geodesic_sphere(4);
+    ball.points[7] = {1e9, 0, 0};
+    const std::string message = refusal(ball, {.path = "", .remesh = 100, .wrap = 0.3});
+    EXPECT_TRUE(has(message, "mesh: shape.wrap = 0.3 is too small for a surface of area ")) << message;
+    EXPECT_TRUE(has(message, "; try shape.wrap = ")) << message;
+}
+
+TEST(NewTriangles, RefusesASheet) {
     TriangleMesh pillow = geodesic_sphere(6);
     for (Vector3d& x : pillow.points) x[2] *= 1e-4;
     const std::string message = refusal(pillow, {.path = "", .remesh = 200});
@@ -226,20 +228,20 @@ TEST_F(NewTriangles, RefusesASheet) {
 }
 
 // Through each other for a third of their radius: no noise.
-TEST_F(NewTriangles, RefusesABodyThatCrossesItself) {
+TEST(NewTriangles, RefusesABodyThatCrossesItself) {
     const std::string message = refusal(bent_body(-0.5), {.path = "", .remesh = 600});
     EXPECT_TRUE(has(message, "parts of the surface that are far from each other along it intersect at (")) << message;
     EXPECT_TRUE(has(message, "; move them apart in the file, or shape.wrap = LENGTH joins them")) << message;
 }
 
-TEST_F(NewTriangles, RefusesWhatTheyCannotResolve) {
+TEST(NewTriangles, RefusesWhatTheyCannotResolve) {
     const Surface disc{.axes = {1, 1, 0.05}};
     const std::string message = refusal(irregular(disc, 16), {.path = "", .remesh = 100, .smoothing_length = 0.01});
     EXPECT_TRUE(has(message, "mesh: smoothed over 0.01, ")) << message;
     EXPECT_TRUE(has(message, "try shape.remesh = 200, or shape.smoothing_length = 0.02")) << message;
 }
 
-TEST_F(NewTriangles, OfEqualEdges) {
+TEST(NewTriangles, OfEqualEdges) {
     const TriangleMesh mesh = cgal::isotropic(irregular({}, 10), 0.2);
     const double wanted = 4 * std::numbers::pi / (std::sqrt(3.0) / 4 * 0.04);
     EXPECT_NEAR(double(mesh.triangles.size()) / wanted, 1, 0.15);
