@@ -14,6 +14,8 @@ namespace {
 constexpr int along = 400, around = 48;  // samples
 constexpr double same = 1e-6;            // of the radius: r and its derivatives where the formula should repeat itself
 
+constexpr double least = 1e-100, most = 1e100;  // what can be computed with
+
 bool uses(const FormulaShape& shape, int variable) {
     return std::ranges::any_of(shape.r->steps, [&](const Formula::Step& step) {
         return step.op == Formula::Op::variable && step.number == variable;
@@ -36,11 +38,12 @@ std::string not_positive(const FormulaShape& shape) {
         for (int i = 0; i <= along; ++i) {
             const double first = extent(shape) * i / along, second = 2 * pi * j / around;
             const double r = radius_at(shape, first, second);
-            if (r > 0 && std::isfinite(r)) continue;
-            return std::isfinite(r)
-                       ? fmt::format("must be positive everywhere, but it is {:.6g} at {}", r,
-                                     place(shape, first, second))
-                       : fmt::format("must be defined everywhere, but not at {}", place(shape, first, second));
+            if (r > least && r < most) continue;
+            if (!std::isfinite(r))
+                return fmt::format("must be defined everywhere, but not at {}", place(shape, first, second));
+            return fmt::format("must be {} everywhere, but it is {:.6g} at {}",
+                               r > 0 ? fmt::format("between {:g} and {:g}", least, most) : "positive", r,
+                               place(shape, first, second));
         }
     return {};
 }

@@ -45,7 +45,7 @@ int fields_of(const SurfaceLaw& law) {
 }
 
 int even(double n, int least, int most) {
-    return std::clamp(2 * static_cast<int>(std::lround(std::min(n, 1.0 * most) / 2)), least, std::max(least, most));
+    return std::max(2 * static_cast<int>(std::lround(std::min(n, most - 1.0) / 2)), least);
 }
 
 // About so many equal triangles on a base surface.

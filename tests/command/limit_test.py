@@ -69,7 +69,7 @@ class TimeLimit(ProgramTest):
         self.ends_in_time("run", SURFACE, "--set", "discretisation.elements=100000", "--set", "discretisation.order=2")
 
     def test_in_the_mesh_of_a_tube_of_almost_no_radius(self):
-        text = 'tier = "surface3d"\nenergy.k20 = 1.0\n[shape]\nkind = "formula"\nr = "1e-300"\nlength = 4.0\n'
+        text = 'tier = "surface3d"\nenergy.k20 = 1.0\n[shape]\nkind = "formula"\nr = "1e-30"\nlength = 4.0\n'
         case = self.write("thin.toml", text + f"[accuracy]\nenergy = 0.01\n[time]\nend = 1e-3\nlimit = {LIMIT}\n")
         begin = time.monotonic()
         with self.start("run", case, "-o", self.result) as process:

@@ -187,6 +187,7 @@ TEST(FormulaShapes, ThatAreNoSurfacesAreRefused) {
     EXPECT_EQ(complaint(shape("1 + 0.1*cos(pi*z)*cos(2*theta)", 2)), "");
     EXPECT_EQ(complaint(shape("1 + 0.1*sin(theta)*cos(phi) + 0.05*cos(theta)")), "");
     expect(shape("1 + 1.2*cos(pi*z)", 2), "must be positive everywhere, but it is");
+    expect(shape("1e-120", 2), "must be between 1e-100 and 1e+100 everywhere, but it is 1e-120 at z = 0");
     expect(shape("sqrt(z - 1)", 2), "must be defined everywhere, but not at z = 0");
     expect(shape("1 + 0.1*z", 2), "must repeat itself in z after 2, but it is 1 at 0 and 1.2 there");
     expect(shape("1 + 0.1*(z - 1)^2", 2), "has a kink where it repeats itself in z");
