@@ -234,10 +234,12 @@ private:
     // Whether the shape intersects itself; if so, sets the message of the branch.
     bool met_itself(const CurveSpace& space, const Eigen::VectorXd& x, double parameter) {
         const auto where = self_intersection(space, x);
-        if (where)
-            branch_.message = fmt::format("at parameter {:.6g} the shape intersects itself at s = {:.4f} and {:.4f}",
-                                          parameter, (*where)[0], (*where)[1]);
-        return where.has_value();
+        if (!where) return false;
+        const CurvePoint p = space.evaluate(x, (*where)[0]);
+        branch_.message = fmt::format("at parameter {:.6g} the shape intersects itself or crosses the axis at "
+                                      "r = {:.4g}, z = {:.4g}",
+                                      parameter, p.r, p.z);
+        return true;
     }
 
     void output_at(double parameter) {

@@ -517,10 +517,13 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
         if (out.estimated_error <= settings.accuracy) {
-            if (const auto where = self_intersection(*space, x))
+            if (const auto where = self_intersection(*space, x)) {
+                const CurvePoint p = space->evaluate(x, (*where)[0]);
                 return end(Stop::self_intersection,
-                           fmt::format("the stationary shape intersects itself at s = {:.4f} and {:.4f}", (*where)[0],
-                                       (*where)[1]));
+                           fmt::format("the stationary shape intersects itself or crosses the axis at r = {:.4g}, "
+                                       "z = {:.4g}",
+                                       p.r, p.z));
+            }
             return end(Stop::finished, "");
         }
         if (elements >= settings.max_elements)

@@ -95,10 +95,11 @@ std::string unbounded_below(const Bending& bending) {
     const double before = lowest(bending, large).first;
     const auto [after, angle] = lowest(bending, larger);
     if (!(after < 0) || !(after < before - falls * std::abs(before))) return {};
+    const double larger_one = std::max(std::abs(std::cos(angle)), std::abs(std::sin(angle)));
     return fmt::format(
-        "the energy density f(H,K) has no lower bound: it falls without end for principal curvatures in the ratio "
-        "{:.2g} : {:.2g}; a membrane may gain energy by bending ever more sharply, which no mesh resolves",
-        std::cos(angle), std::sin(angle));
+        "the energy density f(H,K) has no lower bound: it falls without end as the principal curvatures grow like "
+        "{:.2g}*t and {:.2g}*t; a membrane may gain energy by bending ever more sharply, which no mesh resolves",
+        std::cos(angle) / larger_one, std::sin(angle) / larger_one);
 }
 
 }  // namespace tubule

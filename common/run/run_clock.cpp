@@ -7,7 +7,7 @@ namespace tubule {
 StopReport pause_report(const Paused& pause, double time) {
     const std::string message = pause.reason == Stop::time_limit
                                     ? fmt::format("reached the time limit of {} s (time.limit)", pause.limit.value())
-                                    : "interrupted by a signal";
+                                    : "a signal ended the run";
     return {pause.reason, time, message, "continue with --resume"};
 }
 

@@ -56,7 +56,7 @@ Progress::~Progress() {
 }
 
 void Progress::next_run(int number, int of) {
-    run_ = of > 1 ? fmt::format("run {} of {}  ", number, of) : "";
+    run_ = of > 1 ? fmt::format("run {} of at least {}  ", number, of) : "";
     last_time_ = begin_, last_wall_ = style_.clock(), speed_ = 0;
 }
 

@@ -567,6 +567,7 @@ class Refusals(InFolder):
         file = write(self.folder / "a.hdf")
         self.refused("is not a list of numbers", file, "--times", "0,x")
         self.refused("has no series r_mni; it has energy", file, "--series", "r_mni")
+        self.refused("time; did you mean energy_40 or", file, "--series", "enrgy_40")
         self.refused("no row has a time in the range; it goes from 0 to 1", file, "--series", "energy", "--from", "2")
         self.refused("energy_40 is nowhere positive in the range, as --logy needs it", file, "--series=energy_40", "--logy")
         self.refused("--x, --from, --to and --logy belong to --series", file, "--logy")

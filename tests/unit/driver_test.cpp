@@ -82,7 +82,7 @@ TEST(Driver, PausesBeforeAFinerRun) {
     watch.stop = true;
     const RunSummary s = driven(runs, watch);
     EXPECT_EQ(s.stop.reason, Stop::interrupted);
-    EXPECT_EQ(s.stop.message, "interrupted by a signal, before a finer run");
+    EXPECT_EQ(s.stop.message, "a signal ended the run, before a finer run");
     EXPECT_EQ(s.stop.time, 2);
     EXPECT_EQ(watch.discards, 0);
 }

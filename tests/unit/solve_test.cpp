@@ -409,10 +409,10 @@ TEST(Progress, namesTheRunAndIsNeverNegative) {
     screen.now += 10;
     progress(1.01, 1, 0.1);  // beyond the end, by rounding
     EXPECT_EQ(screen.text(),
-              "run 1 of 2   75%  time 0.75 of 1  energy 1  step 0.1  left 3 s\n"
-              "run 2 of 2   10%  time 0.1 of 1  energy 1  step 0.1  left 1:30\n"
-              "run 2 of 2    5%  time 0.05 of 1  energy 1  step 0.1  left 3:10\n"
-              "run 2 of 2  100%  time 1.01 of 1  energy 1  step 0.1  left 0 s\n");
+              "run 1 of at least 2   75%  time 0.75 of 1  energy 1  step 0.1  left 3 s\n"
+              "run 2 of at least 2   10%  time 0.1 of 1  energy 1  step 0.1  left 1:30\n"
+              "run 2 of at least 2    5%  time 0.05 of 1  energy 1  step 0.1  left 3:10\n"
+              "run 2 of at least 2  100%  time 1.01 of 1  energy 1  step 0.1  left 0 s\n");
 }
 
 TEST(Progress, startsWhereAResumedRunDoes) {

@@ -1,5 +1,6 @@
 """Panel of any series of results against time, or against another series: `tubule plot --series`."""
 
+import difflib
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,9 @@ class Choice:
         """x and values of a result in the range; BadInput if there is nothing to draw."""
         for wanted in (self.x, name):
             if wanted not in result.series:
-                raise BadInput(f"{result.path}: has no series {wanted}; it has {', '.join(sorted(result.series)) or 'none'}")
+                near = difflib.get_close_matches(wanted, result.series, 3, 0.5)
+                hint = f"; did you mean {' or '.join(near)}?" if near else ""
+                raise BadInput(f"{result.path}: has no series {wanted}; it has {', '.join(sorted(result.series)) or 'none'}{hint}")
         x, y = result.series[self.x], result.series[name]
         inside = (x >= (-np.inf if self.low is None else self.low)) & (x <= (np.inf if self.high is None else self.high))
         if not inside.any():
