@@ -79,6 +79,7 @@ void CurveAttempt::resume(const Record& restart) {
     past_.total_start = state.total_start, past_.dissipated = state.dissipated, past_.work = state.work;
     error = state.error;
     least_symbol = state.least_symbol;
+    mesh_need = state.mesh_need;
     summary.reference_energy = state.reference_energy;
     trace = pair_memory(restart).own;
     outputs_.go_on_from(restart.time);
@@ -150,6 +151,9 @@ std::optional<StopReport> CurveAttempt::check(double t) {
         what_may_change(t) < *stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
+    std::vector<double> lost;
+    setup_.motion->forms().observe(setup_.curve(flow_->x()), &lost);
+    mesh_need.add(setup_.space->splines(), lost);
     return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
 }
 
@@ -300,7 +304,8 @@ Record CurveAttempt::record(double t, const Snapshot& s, const double* y, const 
                              error,
                              summary.reference_energy,
                              least_symbol,
-                             work(t)};
+                             work(t),
+                             mesh_need};
     Record out = curve_record(t, *setup_.motion, state, s.o.energy);
     add_to_record(out, trace, coarser_);
     return out;

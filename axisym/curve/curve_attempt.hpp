@@ -16,6 +16,7 @@
 
 namespace tubule::axisym {
 
+// Many fields: the setup of a run, its state, and what has been seen of it.
 class CurveAttempt {
 public:
     // All references must outlive the attempt.
@@ -31,6 +32,7 @@ public:
     EnergyTrace trace;
     double error = 0;  // largest over the run, absolute: see compare() and find_rise()
     double least_symbol = std::numeric_limits<double>::max();  // over the run: theory.md (2.14)
+    MeshNeed mesh_need;
 
 private:
     struct Past {

@@ -25,6 +25,8 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_total_start", s.total_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error", s.error), f.number("restart_reference_energy", s.reference_energy);
     f.number("restart_least_symbol", s.least_symbol), f.number("restart_work", s.work);
+    f.array("restart_density", s.settings.density), f.number("restart_excess", s.settings.excess);
+    f.number("restart_lost", s.mesh_need.lost), f.array("restart_wanted", s.mesh_need.wanted);
 }
 
 // One point of the profile, with curvatures and flow.

@@ -16,6 +16,7 @@ struct CurveRestart {
     CurveSettings settings;
     double total_start = 0, dissipated = 0, error = 0, reference_energy = 0, least_symbol = 0;
     double work = 0;  // of loads that have changed
+    MeshNeed mesh_need;
 };
 
 // Numbers energy, length (of a period, or 0), velocities without the part (L_t/L) z e_z of a period L that is free;

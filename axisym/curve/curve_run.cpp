@@ -10,6 +10,7 @@ namespace tubule::axisym {
 namespace {
 
 constexpr int most_failures = 2;    // pairs of runs that fail, after which nothing else is tried
+constexpr double share_of_mesh = 1e-2;  // of the error allowed: what any state may lose to the mesh
 constexpr double too_early = 1e-6;  // of time.end: runs that fail so soon say nothing of each other's error
 
 bool failed(const StopReport& stop) {
@@ -70,7 +71,15 @@ public:
         const bool good = last.as_accurate_as_asked && !failed(last.stop);
         if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
         if (failed(last.stop) && ++failures_ > most_failures) return false;
-        settings_ = finer(settings_, last.error_is_known() ? last.estimated_error / case_.accuracy.energy : 1);
+        const double excess = last.error_is_known() ? last.estimated_error / case_.accuracy.energy : 1;
+        if (may_be_graded() && !failed(last.stop)) {
+            const double excess_of_mesh =
+                run_->mesh_need.lost / (share_of_mesh * case_.accuracy.energy * last.reference_energy);
+            settings_ = finer(settings_, mesh_growth(excess_of_mesh, excess < 0.5 * settings_.excess));
+            if (excess_of_mesh > 1) settings_.density = run_->mesh_need.density();
+        } else
+            settings_ = finer(settings_, mesh_growth(excess));
+        settings_.excess = last.error_is_known() ? excess : CurveSettings{}.excess;
         return true;
     }
 
@@ -84,6 +93,11 @@ private:
     CurveAttempt& attempt(const CurveSettings& settings, const EndedRun* coarser) {
         run_.emplace(case_, watch_, clock_, start_, settings, coarser);
         return *run_;
+    }
+
+    // Not where breaks are at jumps of curvature or of H0, nor where small elements make the waves of a fluid shorter.
+    bool may_be_graded() const {
+        return start_.meridian.seams.empty() && !case_.energy.H0_varies() && motion_law(case_.model).inertia == 0;
     }
 
     // Resumes the interrupted run if that had the same role in its pair.

@@ -8,6 +8,8 @@ namespace {
 
 // Measured choices: docs/decisions/curves.md, "Curves in motion".
 constexpr double finer_mesh = 1.5;  // elements of a pair of runs
+// From pair to pair; the least is enough for a pair to see what its mesh costs.
+constexpr double least_growth = 1.25, most_growth = 2.5;
 constexpr double finer_time = 0.1;  // tolerances of a pair of runs
 // Of the first run; the waves of a fluid, weakly damped, cost steps.
 constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;
@@ -21,7 +23,7 @@ constexpr double coarser_start = 4, coarser_growth = 8;
 CurveSettings first_settings(const Case& c, int images) {
     const bool waves = motion_law(c.model).inertia != 0;
     const double tolerance = (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy;
-    CurveSettings s = finer({first_curve_elements, tolerance, 0}, 1);
+    CurveSettings s = finer({first_curve_elements, tolerance, 0}, finer_mesh);
     if (c.discretisation.elements) s.elements = (*c.discretisation.elements + images - 1) / images;
     if (c.discretisation.time_tolerance) s.tolerance = *c.discretisation.time_tolerance;
     return s;
@@ -40,13 +42,23 @@ double step_growth_of(const CurveSettings& s) {
 }
 
 CurveSettings coarser(const CurveSettings& s) {
-    return {std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time, s.pair, true};
+    return {std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time, s.pair, true,
+            s.density, s.excess};
 }
 
 // The error of the mesh falls at least with the sixth power of its width, unless the shape is not smooth.
-CurveSettings finer(const CurveSettings& s, double excess) {
-    const double mesh = std::clamp(finer_mesh * std::pow(excess, 1.0 / 6), finer_mesh, 2.5);
-    return {static_cast<int>(std::ceil(mesh * s.elements)), std::max(finer_time * s.tolerance, 1e-13), s.pair + 1};
+double mesh_growth(double excess) {
+    return std::clamp(finer_mesh * std::pow(excess, 1.0 / 6), finer_mesh, most_growth);
+}
+
+double mesh_growth(double excess_of_mesh, bool error_falls) {
+    return std::clamp(least_growth * std::pow(excess_of_mesh, 1.0 / 6), error_falls ? least_growth : finer_mesh,
+                      most_growth);
+}
+
+CurveSettings finer(const CurveSettings& s, double mesh) {
+    return {static_cast<int>(std::ceil(mesh * s.elements)), std::max(finer_time * s.tolerance, 1e-13), s.pair + 1,
+            false, s.density, s.excess};
 }
 
 bool can_be_finer(const CurveSettings& s) {

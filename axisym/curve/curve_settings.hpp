@@ -1,6 +1,7 @@
 // The resolution of a run of a curve, and the pairs of runs that estimate its error.
 #pragma once
 
+#include "axisym/curve/element_density.hpp"
 #include "common/case/case.hpp"
 
 namespace tubule::axisym {
@@ -12,6 +13,8 @@ struct CurveSettings {
     double tolerance = 0;     // of the time integrator
     int pair = 1;             // its number
     bool is_coarser = false;  // of its pair; else it is the run that is reported
+    ElementDensity density = {};  // where the pair before needed more
+    double excess = 1e300;        // error of the pair before, of what was asked; large where it is not known
 };
 
 // The finer run of the first pair: what the case gives, or what its accuracy asks for. The case's elements are those of
@@ -28,8 +31,13 @@ double step_growth_of(const CurveSettings& s);
 // Of the other run of a pair.
 CurveSettings coarser(const CurveSettings& s);
 
-// Of the next pair, after one whose runs differed `excess` times more than asked.
-CurveSettings finer(const CurveSettings& s, double excess);
+// By how much the next pair has more elements, after one whose runs differed `excess` times more than asked; or, where
+// the part of the mesh is known, after one that lost that much too much to its mesh. That part is an estimate: if smaller
+// tolerances did not make the error smaller, more elements may.
+double mesh_growth(double excess);
+double mesh_growth(double excess_of_mesh, bool error_falls);
+// The next pair: a tenth of the tolerance, and so many times more elements.
+CurveSettings finer(const CurveSettings& s, double mesh);
 
 // Whether another pair is worth a try.
 bool can_be_finer(const CurveSettings& s);

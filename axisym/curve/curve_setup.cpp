@@ -66,7 +66,8 @@ std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& sett
     const double shrunk = std::pow(first_curve_elements * size, 2),
                  largest = seam_size * (inertia ? size : shrunk / first_curve_elements);
     const double at_seam = std::max(std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk), least);
-    return seams.empty() ? equal_breaks(settings.elements) : graded_breaks(seams, size, at_seam);
+    if (!seams.empty()) return graded_breaks(seams, size, at_seam);
+    return settings.density.empty() ? equal_breaks(settings.elements) : breaks_of(settings.density, settings.elements);
 }
 
 std::unique_ptr<CurveSpace> space_of(const Case& c, const Meridian& meridian, const std::vector<double>& breaks) {

@@ -1,5 +1,6 @@
 #include "axisym/curve/curve_snapshot.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,26 +10,40 @@
 namespace tubule::axisym {
 namespace {
 
-// The narrowest place other than a pole: a minimum of r between two larger values, over the ends of elements and their
-// midpoints. Radius infinity if there is none.
+// Between these parameters, from a place nearby: Newton's method for r' = 0, as far as it leads to smaller radii.
+CurvePoint minimum_near(const CurveSpace& space, const Eigen::VectorXd& x, double s, double low, double high) {
+    CurvePoint best = space.evaluate(x, s);
+    for (int i = 0; i < 4 && best.r2 > 0; ++i) {
+        s = std::clamp(s - best.r1 / best.r2, low, high);
+        const CurvePoint next = space.evaluate(x, s);
+        if (!(next.r < best.r)) break;
+        best = next;
+    }
+    return best;
+}
+
+// The narrowest place other than a pole: a minimum of r, found between the ends of elements and their midpoints. Radius
+// infinity if there is none.
 Neck narrowest(const CurveSpace& space, const double* y) {
     const std::vector<double>& breaks = space.splines().breaks();
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
-    std::vector<double> r, z;
+    std::vector<double> s_at, r;
     for (std::size_t i = 0; i < 2 * breaks.size() - 1; ++i) {
         const double s = i % 2 ? (breaks[i / 2] + breaks[i / 2 + 1]) / 2 : breaks[i / 2];
-        const CurvePoint p = space.evaluate(x, s);
-        r.push_back(p.r), z.push_back(p.z);
+        s_at.push_back(s), r.push_back(space.evaluate(x, s).r);
     }
     const int n = static_cast<int>(r.size());
     const bool closed = space.closed();
-    Neck neck{0, std::numeric_limits<double>::infinity()};
+    int lowest = -1;
     for (int i = closed ? 1 : 0; i < n; ++i) {
         if (space.topology() == Topology::cell && i == n - 1) continue;
         const double before = i > 0 ? r[i - 1] : r[1], after = i + 1 < n ? r[i + 1] : r[n - 2];
-        if (r[i] <= before && r[i] <= after && r[i] < neck.radius) neck = {z[i], r[i]};
+        if (r[i] <= before && r[i] <= after && (lowest < 0 || r[i] < r[lowest])) lowest = i;
     }
-    return neck;
+    if (lowest < 0) return {0, std::numeric_limits<double>::infinity()};
+    const CurvePoint p =
+        minimum_near(space, x, s_at[lowest], s_at[std::max(lowest - 1, 0)], s_at[std::min(lowest + 1, n - 1)]);
+    return {p.z, p.r};
 }
 
 }  // namespace

@@ -1,0 +1,27 @@
+// Where along a profile a run needed small elements: from that, the mesh of the next run.
+#pragma once
+
+#include <vector>
+
+#include "axisym/splines/profile_space.hpp"
+
+namespace tubule::axisym {
+
+// Elements per parameter in equal parts of a profile, relative to equal elements. Empty: not known.
+using ElementDensity = std::vector<double>;
+
+// What the states of a run have asked of their mesh.
+struct MeshNeed {
+    // `defect`: the energy lost in each element of the space, which falls with the power 2 (degree - 1) of its size.
+    void add(const ProfileSpace& space, const std::vector<double>& defect);
+    // Half of the elements stay equal. Empty if nothing was added, or nothing is lost.
+    ElementDensity density() const;
+
+    double lost = 0;             // of the energy, absolute: the most that any state loses
+    std::vector<double> wanted;  // the largest 1/size in equal parts of the profile, for a loss per length of 1
+};
+
+// So many elements of that density, whose sizes change slowly along the profile.
+std::vector<double> breaks_of(ElementDensity density, int elements);
+
+}  // namespace tubule::axisym
