@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/theory/dispersion.hpp"
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
@@ -43,17 +44,21 @@ struct Base {
 };
 
 // The radius at t and INT growth dt, by the classical Runge-Kutta method with steps far below any required error.
-Base base_at(const Material& m, double R0, double q, double t) {
+// rate(R): how fast both change.
+template <class Rate>
+Base base_at(const Rate& rate, double R0, double t) {
     Base y{R0, 0};
     const int n = 20000;
     const double h = t / n;
-    const auto rate = [&](double R) { return Base{drift(m, R), growth(m, R, q)}; };
     for (int i = 0; i < n; ++i) {
         const Base a = rate(y.R), b = rate(y.R + h / 2 * a.R), c = rate(y.R + h / 2 * b.R), d = rate(y.R + h * c.R);
         y.R += h / 6 * (a.R + 2 * b.R + 2 * c.R + d.R);
         y.log_growth += h / 6 * (a.log_growth + 2 * b.log_growth + 2 * c.log_growth + d.log_growth);
     }
     return y;
+}
+Base base_at(const Material& m, double R0, double q, double t) {
+    return base_at([&](double R) { return Base{drift(m, R), growth(m, R, q)}; }, R0, t);
 }
 
 TEST(Growth, wavesFollowTheDispersionRelation) {
@@ -96,6 +101,31 @@ TEST(Growth, wavesFollowTheDispersionRelation) {
     }
     EXPECT_TRUE(grows);
     EXPECT_TRUE(decays);
+}
+
+TEST(Growth, wavesOfTermsThatACaseAddsFollowTheDispersionRelation) {
+    // theory.md (5.3), (5.6) for any density, as common/theory has them.
+    const Bending definite = with_terms(bending(0.2, -0.5), {powers(0.02, 6, 0), powers(0.03, 4, 2), powers(0.1, 2, 2)});
+    const Bending indefinite = with_terms(bending(0.2, -0.5), {powers(0.05, 2, 1), powers(-0.03, 1, 1)});
+    const Bending odd = with_terms(bending(0.2, -0.5), {powers(0.03, 3, 0), powers(-0.02, 1, 2), powers(0.01, 0, 3)});
+    const Bending general = with_terms(bending(0.2, -0.5), {formula(0.1, "sqrt(1 + (H - H0)^2 + K^2) + 0.3*H*K")});
+    for (const Bending& energy : {definite, indefinite, odd, general}) {
+        const double amplitude = 1e-5, R0 = 0.8, length = 2, end = 0.02, q = 2 * pi / length;
+        const auto rate = [&](double R) {
+            const theory::UniformTube tube{energy, R, 0};
+            return Base{theory::radius_rate(tube), -theory::stiffness(tube, 0)(q)};
+        };
+        const Base exact = base_at(rate, R0, end);
+        ASSERT_GT(std::abs(exact.log_growth), 0.01);
+        Case c = tube_case(energy, R0, length, {{amplitude, 1, 0, 0.3}}, end);
+        explicitly(c, 24, 1e-13, 7);
+        const Outcome o = run_case(c);
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double measured = o.last("mode_1") / amplitude;
+        // Nonlinear terms change it by about (amplitude/R)^2 = 1e-10.
+        EXPECT_NEAR(std::log(measured) / exact.log_growth, 1, 1e-6);
+        EXPECT_NEAR(o.last("r_min") + measured * amplitude, exact.R, 1e-8);
+    }
 }
 
 // Energy of the exact tube of length L
