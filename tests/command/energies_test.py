@@ -98,9 +98,17 @@ class EnergiesTest(ProgramTest):
         self.assertAlmostEqual(with_K["energy_21"][0], 0, delta=1e-6)
         self.assertAlmostEqual(with_K["r_min"][-1], without["r_min"][-1], delta=1e-6)
         self.assertAlmostEqual(with_K["energy"][-1], without["energy"][-1], delta=2e-6 * about(self.result)["E_ref"])
-        sphere = QUICK_SPHERE + "[model]\nkind = 'overdamped'\n[time]\nend = 0.02\n[accuracy]\nenergy = 1e-4\n"
-        closed, _ = self.run_case(case(term(0.7, 0, 1), more=sphere))
-        np.testing.assert_allclose(closed["energy_21"], 0.7 * 4 * np.pi, rtol=1e-5)
+        profile = "[accuracy]\nenergy = 1e-6\n"
+        surface = "[accuracy]\nenergy = 1e-2\nestimate = false\n[discretisation]\nelements = 80\n"
+        for tier, more, known in (("axisym", profile, 1e-12), ("surface3d", surface, 1e-4)):
+            for model in ("gradient-flow", "overdamped"):
+                sphere = QUICK_SPHERE + f"[model]\nkind = '{model}'\n[time]\nend = 0.02\n" + more
+                closed, _ = self.run_case(case(term(0.7, 0, 1), tier=tier, more=sphere))
+                without, _ = self.run_case(case(tier=tier, more=sphere))
+                np.testing.assert_allclose(closed["energy_21"], 0.7 * 4 * np.pi, rtol=known)
+                change = without["energy_20"][-1] - without["energy_20"][0]
+                self.assertAlmostEqual((closed["energy_20"][-1] - closed["energy_20"][0]) / change, 1, delta=1e-2, msg=(tier, model))
+                self.assertLess(change, 0)
 
     def test_growth_rates_are_those_of_theory(self):
         # Waves on a tube, amplitude 1e-5, against the closed form that `tubule stability` evaluates with the same density.
