@@ -50,6 +50,7 @@ double steps_by_tolerance(const Case& c, double from, double to) {
 struct PilotRun {
     double steps = 0, seconds_per_step = 0;
     bool useful = false;
+    std::string ill_posed = {};  // why it cannot begin
 };
 
 // On so many triangles. What the mesh loses is lost by few triangles only; another one may do.
@@ -67,6 +68,7 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
         const double before = quiet_seconds();
         run.go();
         const Stop stop = run.summary.stop.reason;
+        if (stop == Stop::ill_posed && !pilot.moved()) return {.ill_posed = run.summary.stop.message};
         const bool lost = stop == Stop::resolution_lost || stop == Stop::mesh_lost || stop == Stop::solver_failed;
         if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
         const bool whole = stop != Stop::time_limit && !lost;
@@ -104,7 +106,8 @@ Forecast forecast_motion(const Case& c, const Start& start) {
                 const double per_step = pilot.seconds_per_step * std::pow(1.0 * triangles / own, cost_power);
                 out.seconds = runs_at_once(c) * *out.steps * per_step;
             }
-            if (own == triangles) break;
+            out.ill_posed = pilot.ill_posed;
+            if (own == triangles || !out.ill_posed.empty()) break;
         }
     } catch (const Paused&) {  // the start alone takes long
     }

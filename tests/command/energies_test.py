@@ -183,6 +183,20 @@ class EnergiesTest(ProgramTest):
         u = 1 - np.sqrt(1 - (2 * K20 - 1e-3 * symbol(1.6)) / (4 * k41))
         self.assertAlmostEqual(rows["r_min"][-1] * u, 1, delta=1e-5)
 
+    def test_check_names_what_makes_a_start_ill_posed(self):
+        sphere = "[shape]\nkind = 'sphere'\nradius = 1.0\n[discretisation]\nelements = 80\n[time]\nend = 1.0\n"
+        tube = SHAPE.replace("0.8", "1.0") + REST
+        for text, blamed in (
+            # f_HH = 2 k20 + 6 k30 (H - H0) < 0 at H = -1; 2 k20 + 2 k42 < 0 on the unit sphere; either of two
+            (case(term(0.5, 3, 0), more=tube), "6:11: energy.term.0.modulus"),
+            (case(tier="surface3d", listed="k20 = 1.0\nk42 = -1.05\n", more=sphere), "4:7: energy.k42"),
+            (case(term(0.5, 3, 0), term(0.1, 1, 1), more=tube), "2:1: energy"),
+        ):
+            words = self.tubule("check", self.write("case.toml", text))[1]
+            self.assertIn(f"case.toml:{blamed} makes the start ill-posed, and a run ends at once: ", words)
+        self.assertIn("ill-posed", json.loads(self.tubule("check", "--json", self.write("case.toml", text))[0])["cases"][0]["warning"])
+        self.assertNotIn("ill-posed", self.tubule("check", self.write("case.toml", case(term(0.01, 3, 0), more=tube)))[1])
+
     def test_sets_and_scans_reach_terms(self):
         path = self.write("case.toml", case(term(0.0, 2, 1)))
         rows, _ = self.run_case(path.read_text(), "--set", "energy.term.0.modulus=0.01")

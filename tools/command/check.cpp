@@ -12,6 +12,7 @@
 #include "common/case/complaints.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/solve/message.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
@@ -57,13 +58,22 @@ std::vector<std::string> chosen(const Case& c) {
 struct Checked {
     std::string path;
     std::vector<Complaint> complaints;
-    std::string toml;                  // resolved
-    std::vector<std::string> chosen;   // in words
-    std::optional<Forecast> expected;  // with --quick nothing
-    std::string unknown;               // why nothing is expected
-    std::string warning;               // of its energy
+    std::string toml;                   // resolved
+    std::vector<std::string> chosen;    // in words
+    std::optional<Forecast> expected;   // with --quick nothing
+    std::string unknown;                // why nothing is expected
+    std::vector<std::string> warnings;  // of its energy, each with its place
     bool valid() const { return complaints.empty(); }
 };
+
+// A run of it stops at once, which is a result, but hardly the one that is wanted.
+std::string ill_posed_at_the_start(const Case& c, const std::string& why) {
+    const std::string key = key_of_ill_posed(c.energy);
+    const auto what = fmt::format(
+        "makes the start ill-posed, and a run ends at once: {}; bring {} nearer to 0, or make energy.k20 larger", why,
+        key == "energy" ? "its moduli" : "it");
+    return valid_utf8(complaint(c, key, what).what());
+}
 
 // Files that the case names are read as well.
 Checked checked(const std::string& path, const CheckOptions& options) {
@@ -73,9 +83,12 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         const Case c = read_case(path, options.sets);
         out.toml = effective_toml(c);
         out.chosen = chosen(c);
-        out.warning = unbounded_below(c.energy);
+        if (const std::string falls = unbounded_below(c.energy); !falls.empty())
+            out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
         engine_for(c);
         if (!options.quick) out.expected = forecast(c);
+        if (out.expected && !out.expected->ill_posed.empty())
+            out.warnings.push_back(ill_posed_at_the_start(c, out.expected->ill_posed));
     } catch (const CaseErrors& error) {
         out.complaints = error.complaints;
     } catch (const CaseError& error) {
@@ -95,7 +108,7 @@ void tell(const Checked& c, bool quick) {
     std::string answer = fmt::format("# OK {}\n{}", shown_path(c.path), c.toml);
     for (const std::string& words : c.chosen) add(answer, "\n# by default: {}", words);
     print_answer(answer + "\n");
-    if (!c.warning.empty()) say(stderr, "{}: warning: {}\n", shown_path(c.path), c.warning);
+    for (const std::string& warning : c.warnings) say(stderr, "{}\n", warning);
     // For people: the answer itself is the case, the same at each call.
     if (c.expected)
         say(stderr, "{}: expected: {}\n", shown_path(c.path), words(*c.expected));
@@ -140,7 +153,7 @@ std::string json_of(const Checked& c) {
         "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"chosen\": {}, \"expected\": {}, "
         "\"unknown\": {}, \"warning\": {}}}",
         json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""),
-        json(c.chosen), expected, or_null(c.unknown), or_null(c.warning));
+        json(c.chosen), expected, or_null(c.unknown), or_null(fmt::format("{}", fmt::join(c.warnings, "\n"))));
 }
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).

@@ -35,6 +35,7 @@ Forecast by_its_beginning(Case c) {
     Forecast out;
     if (s.elements > 0) out.resolution = fmt::format("{} elements", s.elements);
     out.bytes = memory_in_use();
+    if (s.stop.reason == Stop::ill_posed && !pilot.moved()) out.ill_posed = s.stop.message;
     // Of a busy machine the time of the processors, else, where threads share the work, that of the clock.
     const double seconds = std::min(clock.seconds(), static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
     if (s.stop.reason != Stop::time_limit) {
