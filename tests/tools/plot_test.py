@@ -318,6 +318,12 @@ class Pictures(InFolder):
         self.assertEqual(self.plot(file, "-o", self.folder / "a.pdf").returncode, 0)
         self.assertEqual((self.folder / "a.pdf").read_bytes()[:5], b"%PDF-")
 
+    def test_spontaneous_curvature_that_varies(self):
+        """No value of H0 is white, so the scale is about the mean curvature: -1 on the straight tube of radius 1."""
+        path = write(self.folder / "a.hdf", sets=["energy.H0=-2 + 0.1*cos(pi*z)"], amplitude=0.0)
+        texts = self.drawn(path, "--kind", "profiles")
+        self.assertTrue(any("white: mean \u2248 \u22121" in words for words in texts), texts)
+
     def test_wanted_times(self):
         texts = self.drawn(write(self.folder / "a.hdf"), "--times", "0,0.2")
         self.assertIn("t\u2081 = 0.2", texts)

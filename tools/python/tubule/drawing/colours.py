@@ -1,4 +1,4 @@
-"""Colours of curvature: H orange to violet, K blue to red, white where H = H0 and K = 0."""
+"""Colours of curvature: H orange to violet, K blue to red, white where H = H0 (if that varies: at the mean) and K = 0."""
 
 from dataclasses import dataclass
 
@@ -44,8 +44,11 @@ def colour_scale(values, areas, centre):
 def curvature_colours(results, frames, areas):
     """Colours of H and K on these frames; `areas` has the area of each of their values, one list per frame."""
     common_H0 = {result.H0 for result in results}
-    centre = common_H0.pop() if len(common_H0) == 1 else 0.0
-    label = "mean curvature H = \u03ba\u2081 + \u03ba\u2082{}" + (f", white: H\u2080 = {number(centre)}" if centre else "")
+    centre, white = (common_H0.pop(), "H\u2080 = ") if len(common_H0) == 1 else (0.0, "")
+    if centre is None:
+        found = np.average(np.concatenate([frame.H.ravel() for frame in frames]), weights=np.concatenate(areas))
+        centre, white = float(f"{found:.2g}"), "mean \u2248 "
+    label = "mean curvature H = \u03ba\u2081 + \u03ba\u2082{}" + (f", white: {white}{number(centre)}" if centre else "")
     H = Colours("PuOr", *colour_scale([frame.H.ravel() for frame in frames], areas, centre), label)
     K = Colours("RdBu_r", *colour_scale([frame.K.ravel() for frame in frames], areas, 0.0), "Gaussian curvature K{}")
     return H, K

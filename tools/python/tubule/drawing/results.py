@@ -88,7 +88,9 @@ class Result:
 
     @property
     def H0(self):
-        return float(flatten(self.case).get("energy.H0", 0.0))
+        """Spontaneous curvature; none where it varies over the membrane."""
+        given = flatten(self.case).get("energy.H0", 0.0)
+        return None if isinstance(given, str) else float(given)
 
     @property
     def moves(self):
