@@ -1,17 +1,18 @@
 #!/usr/bin/python3
 """Maps of where each method is right, and where it stops being right.
 
-    atlas.py TUBULE FOLDER [MAP...] [--jobs N] [--levels N]
+    atlas.py TUBULE FOLDER [MAP...] [--jobs N] [--levels N] [--across N]
 
 A point of a map is a case that the program runs; it is judged against the truth (judging.py). A coarse lattice comes first,
 then the lines between regions are followed. FOLDER/MAP.csv gets a row a point as soon as it is judged: what is there
-is not run again. At the end: the counts, and exit status 1 if anything is silent.
+is not run again. --levels and --across make other lattices than the maps have. At the end: the counts, and exit status 1 if anything is silent.
 """
 
 import argparse
 import collections
 import concurrent.futures
 import csv
+import dataclasses
 import sys
 import tempfile
 from pathlib import Path
@@ -60,7 +61,7 @@ def judge(program, chart, variant, place):
             return Judgement("silent", finding.kind)
 
 
-def make(program, table, chart, levels, pool):
+def make(program, table, chart, pool):
     for variant in chart.variants:
         def judged(points):
             waiting = [pool.submit(judge, program, chart, variant, table.place(p)) for p in points]
@@ -70,7 +71,7 @@ def make(program, table, chart, levels, pool):
                 sorts.append(future.result().sort)
             return sorts
 
-        follow(table.known(variant), judged, chart.across, levels)
+        follow(table.known(variant), judged, chart.across, chart.levels)
 
 
 def main():
@@ -80,14 +81,15 @@ def main():
     parser.add_argument("maps", nargs="*", choices=[[], *MAPS], default=[])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--levels", type=int)
+    parser.add_argument("--across", type=int)
     a = parser.parse_args()
     a.folder.mkdir(parents=True, exist_ok=True)
     total = collections.Counter()
     with concurrent.futures.ThreadPoolExecutor(a.jobs) as pool:
         for name in a.maps or MAPS:
-            chart = MAPS[name]
+            chart = dataclasses.replace(MAPS[name], **{k: v for k in ("across", "levels") if (v := getattr(a, k)) is not None})
             table = Table(a.folder / f"{name}.csv", chart)
-            make(a.program.resolve(), table, chart, chart.levels if a.levels is None else a.levels, pool)
+            make(a.program.resolve(), table, chart, pool)
             counts = collections.Counter(row["kind"] for row in table.rows)
             total += counts
             print(f"{name}: {len(table.rows)} judged, " + ", ".join(f"{counts[k]} {k}" for k in KINDS if counts[k]), flush=True)

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Draws a map of the atlas: draw.py MAP.csv -o PICTURE. The place of a point is coloured like the nearest judged one."""
+"""Draws maps of the atlas: draw.py MAP.csv... -o PICTURE. A place is coloured like the nearest judged point, a region is
+named by how its runs ended."""
 
 import argparse
 import csv
@@ -15,6 +16,7 @@ from maps import MAPS  # noqa: E402
 from matplotlib.colors import ListedColormap  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
+from scipy import ndimage  # noqa: E402
 from scipy.interpolate import NearestNDInterpolator  # noqa: E402
 
 # In the order of the legend; lightness falls with how bad it is, so that it reads in grey, too.
@@ -26,7 +28,9 @@ COLOURS = {
     "false alarm": "#d95f0e",
     "silent": "#000000",
 }
-PIXELS = 400
+PIXELS = 300
+NAMED = 0.04  # part of a panel above which a region gets its name
+GAP, HEAD, FOOT = 0.42, 0.3, 0.36  # inches: between panels, above and below a row of them
 
 
 def label(row):
@@ -37,44 +41,71 @@ def label(row):
 
 def panel(axes, chart, rows):
     names = list(COLOURS)
+    stops = sorted({row["stop"] for row in rows})
     place = np.array([[int(r["i"]), int(r["j"])] for r in rows]) / (chart.across * FINEST)
-    nearest = NearestNDInterpolator(place, [names.index(label(r)) for r in rows])
-    at = (np.arange(PIXELS) + 0.5) / PIXELS
-    image = nearest(*np.meshgrid(at, at))
+    at = np.meshgrid(*[(np.arange(PIXELS) + 0.5) / PIXELS] * 2)
+    image = NearestNDInterpolator(place, [names.index(label(r)) for r in rows])(*at)
+    stop = NearestNDInterpolator(place, [stops.index(r["stop"]) for r in rows])(*at)
     axes.imshow(image, origin="lower", extent=(0, 1, 0, 1), aspect="auto", vmin=-0.5, vmax=len(names) - 0.5,
                 cmap=ListedColormap(list(COLOURS.values())), interpolation="nearest")  # fmt: skip
-    axes.plot(*place.T, ".", color="0.35", markersize=0.6)
+    axes.plot(*place.T, ".", color="0.35", markersize=0.4)
+    for kind in ("false alarm", "silent"):  # to be seen where they are few
+        axes.plot(*place[[row["kind"] == kind for row in rows]].T, "D", color=COLOURS[kind], markersize=3, clip_on=False)
+    for kind in np.unique(image):
+        for k, word in enumerate(stops):
+            if names[int(kind)] != "right: finished":
+                name_regions(axes, (image == kind) & (stop == k), word, dark=names[int(kind)] == "silent")
     for axis, shown in ((axes.xaxis, chart.x), (axes.yaxis, chart.y)):
-        fractions = (0, 0.25, 0.5, 0.75, 1)
-        axis.set_ticks(fractions, [f"{shown.value(f):.3g}" for f in fractions])
+        fractions = (0, 0.5, 1) if shown.log else (0, 0.25, 0.5, 0.75, 1)
+        axis.set_ticks(fractions, [f"{shown.value(f):.2g}" for f in fractions])
 
 
-def draw(path, outputs):
-    chart = MAPS[path.stem]
-    rows = list(csv.DictReader(open(path, newline="")))
-    variants = [v for v in chart.variants if any(r["variant"] == v for r in rows)]
-    wide = 0.75
-    side = (style.WIDTH - wide - 0.35 * 2) / 3
-    height = side + 0.95
+def name_regions(axes, where, word, dark):
+    """Writes `word` into each large connected region, where it is widest."""
+    regions, count = ndimage.label(np.pad(where, 1))
+    for k in range(1, count + 1):
+        region = regions == k
+        if region.sum() < NAMED * PIXELS**2:
+            continue
+        inside = ndimage.distance_transform_edt(region)
+        y, x = (np.array(np.unravel_index(inside.argmax(), inside.shape)) - 0.5) / PIXELS
+        axes.text(min(max(x, 0.22), 0.78), y, word, ha="center", va="center", fontsize=6, color="white" if dark else "0.1")
+
+
+def draw(paths, outputs):
+    tables = [(MAPS[path.stem], list(csv.DictReader(open(path, newline="")))) for path in paths]
+    columns = 3 if all(len(chart.variants) % 3 == 0 for chart, _ in tables) else 4
+    panels = []
+    for chart, rows in tables:
+        for variant in chart.variants:
+            own = [row for row in rows if row["variant"] == variant]
+            if own:
+                panels.append((chart, variant, own))
+    lines = -(-len(panels) // columns)
+    side = (style.WIDTH - 0.55 - GAP * (columns - 1) - 0.1) / columns
+    tall = min(side, 1.6)
+    height = lines * (tall + HEAD + FOOT) + 0.2
     figure = Figure(figsize=(style.WIDTH, height))
-    for k, variant in enumerate(variants):
-        axes = figure.add_axes([(0.55 + k * (side + 0.35)) / style.WIDTH, 0.42 / height, side / style.WIDTH, side / height])
-        panel(axes, chart, [r for r in rows if r["variant"] == variant])
-        axes.set_title(variant or chart.title, pad=3)
-        axes.set_xlabel(chart.x.key)
-        axes.set_ylabel(chart.y.key) if k == 0 else axes.tick_params(labelleft=False)
-    present = {label(r) for r in rows}
+    for k, (chart, variant, rows) in enumerate(panels):
+        left, top = 0.55 + k % columns * (side + GAP), height - 0.2 - k // columns * (tall + HEAD + FOOT) - HEAD
+        axes = figure.add_axes([left / style.WIDTH, (top - tall) / height, side / style.WIDTH, tall / height])
+        panel(axes, chart, rows)
+        axes.set_title(f"{chart.title}\n{variant}" if variant else chart.title, pad=3, fontsize=7)
+        axes.set_xlabel(chart.x.key, labelpad=1)
+        if k % columns == 0 or panels[k - 1][0] is not chart:
+            axes.set_ylabel(chart.y.key, labelpad=1)
+        else:
+            axes.tick_params(labelleft=False)
+    present = {label(row) for _, _, rows in panels for row in rows}
     handles = [Patch(facecolor=c, edgecolor="0.4", linewidth=0.4, label=n) for n, c in COLOURS.items() if n in present]
-    if len(variants) == 1:
-        figure.legend(handles=handles, loc="center left", bbox_to_anchor=((0.75 + side) / style.WIDTH, 0.5))
-    else:
-        figure.legend(handles=handles, loc="upper center", ncols=len(handles), bbox_to_anchor=(0.5, 1.0))
+    figure.legend(handles=handles, loc="upper center", ncols=len(handles), bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
     style.save(figure, outputs)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table", type=Path)
+    parser.add_argument("tables", type=Path, nargs="+")
     parser.add_argument("-o", "--output", nargs="+", required=True)
     a = parser.parse_args()
-    draw(a.table, a.output)
+    style.apply()
+    draw(a.tables, a.output)

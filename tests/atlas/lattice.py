@@ -1,4 +1,4 @@
-"""Points of a map: a coarse lattice first, then finer ones along the lines between regions."""
+"""A map, and its points: a coarse lattice first, then finer ones along the lines between regions."""
 
 from dataclasses import dataclass
 
@@ -18,6 +18,18 @@ class Axis:
         else:
             x = self.low + (self.high - self.low) * fraction
         return round(x) if self.whole else float(f"{x:.5g}")
+
+
+@dataclass
+class Map:
+    title: str
+    x: Axis
+    y: Axis
+    judge: object  # (box, variant, x, y) -> Judgement
+    variants: tuple = ("",)
+    across: int = 8  # intervals of the coarse lattice
+    levels: int = 2
+    tier: str = "axisym"
 
 
 FINEST = 16  # intervals of the finest lattice in one of the coarse one
