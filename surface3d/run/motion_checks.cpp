@@ -24,6 +24,18 @@ std::string where(const Eigen::Vector3d& x) {
     return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
 }
 
+// A neck that gets too thin for its triangles closes; of one that is too thin at the start nobody knows.
+StopReport find_sharp_turn(const MeshTurn& turn, double time) {
+    const bool closes = turn.saddle && time > 0;
+    return {closes ? Stop::pinch_off : Stop::resolution_lost, time,
+            fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
+                        closes        ? "a neck is closing"
+                        : turn.saddle ? "a neck is too thin for the triangles"
+                                      : "the surface bends too sharply",
+                        where(turn.where), turn.angle),
+            closes ? "use more elements to follow the neck further" : "use more elements"};
+}
+
 }  // namespace
 
 StopReport undefined_energy(const MotionMeasures& m, double time) {
@@ -45,12 +57,7 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
                           "lower accuracy.r_min to follow the neck further"};
-    if (!(m.turn.angle <= sharpest_turn))
-        return StopReport{m.turn.saddle ? Stop::pinch_off : Stop::resolution_lost, time,
-                          fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
-                                      m.turn.saddle ? "a neck is closing" : "the surface bends too sharply",
-                                      where(m.turn.where), m.turn.angle),
-                          m.turn.saddle ? "use more elements to follow the neck further" : "use more elements"};
+    if (!(m.turn.angle <= sharpest_turn)) return find_sharp_turn(m.turn, time);
     if (!(m.quality.worst > worst_quality))
         return StopReport{Stop::mesh_lost, time,
                           fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),

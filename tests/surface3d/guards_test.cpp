@@ -137,6 +137,16 @@ TEST(Guards, SpeakWhereANumberIsNone) {
     EXPECT_TRUE(find_bad_shape(m, 1e-3, 3));
 }
 
+TEST(Guards, ANeckThatIsTooThinForItsTrianglesAtTheStartIsNotClosing) {
+    // It may open: tubes of tier axisym with necks of 0.02 radii do, and 180 triangles do not tell.
+    MotionMeasures m = sound_shape();
+    m.turn.angle = 3, m.turn.saddle = true;
+    EXPECT_EQ(find_bad_shape(m, 1e-3, 0)->reason, Stop::resolution_lost);
+    EXPECT_EQ(find_bad_shape(m, 1e-3, 3)->reason, Stop::pinch_off);
+    m.turn.saddle = false;
+    EXPECT_EQ(find_bad_shape(m, 1e-3, 3)->reason, Stop::resolution_lost);
+}
+
 TEST(Guards, AStateIsFiniteInAllItsParts) {
     const double none = std::numeric_limits<double>::quiet_NaN();
     const CurvedMesh mesh = mapped_mesh(icosphere(1), 2, map_of(Sphere{.radius = 1, .modes = {}}));
