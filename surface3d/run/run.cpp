@@ -22,7 +22,14 @@ namespace {
 
 constexpr int fewest_triangles = 80, most_triangles = 100000;
 // From a mesh to one of half the width, errors fall by a factor between these: what the estimate takes for possible.
-constexpr double slowest_fall = 1.0 / 2, fastest_fall = 1.0 / 8;
+constexpr double slowest_fall = 1.0 / 2, second_order_fall = 1.0 / 4, fastest_fall = 1.0 / 8;
+
+// Second derivatives of the elements are of order 2, however fast the first meshes seem to get better.
+double fall_of(Recovery recovery) {
+    const bool from_nodes =
+        recovery == Recovery::patch || recovery == Recovery::patch_nodal || recovery == Recovery::exact;
+    return from_nodes ? fastest_fall : second_order_fall;
+}
 
 // A surface fitted to 720 points of an ellipsoid was 1.2 times further off than its two orders were apart.
 constexpr double given_mesh_margin = 2;
@@ -58,7 +65,7 @@ Measured measure(const Case& c, StartMesh start, Recovery recovery) {
 }
 
 // The error of the last of these energies, each on a mesh of half the width of the one before it.
-double estimated_error(const std::vector<double>& energies, double least_fall = fastest_fall) {
+double estimated_error(const std::vector<double>& energies, double least_fall) {
     const std::size_t n = energies.size();
     if (n < 2) return std::numeric_limits<double>::infinity();
     const double change = std::abs(energies[n - 1] - energies[n - 2]);
@@ -171,7 +178,7 @@ public:
 private:
     double measure_next() override {
         energies_.push_back(measure_on(elements_ / part_));
-        return estimated_error(energies_, 1.0 / 4);
+        return estimated_error(energies_, second_order_fall);
     }
 
     int elements_, part_ = 16;
@@ -194,8 +201,9 @@ private:
     double measure_next() override {
         std::vector<double>& same = energies_[meshes_ % 2];
         same.push_back(measure_on(triangles_));
-        const double before = std::exchange(before_, estimated_error(same));
-        return std::max(before_, std::sqrt(fastest_fall) * before);
+        const double fall = fall_of(case_.surface.recovery);
+        const double before = std::exchange(before_, estimated_error(same, fall));
+        return std::max(before_, std::sqrt(fall) * before);
     }
 
     int triangles_ = fewest_triangles;
