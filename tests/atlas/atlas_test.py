@@ -66,7 +66,6 @@ class Judging(unittest.TestCase):
         for value, doubt, kind in ((1e-3, 1e-4, "right"), (1.9e-3, 0, "right"), (3e-3, 1e-4, "silent"), (2.1e-3, 1e-3, "undecided"), (1e-3, 5e-3, "undecided")):
             self.assertEqual(kind_of_error(run(), 1e-2, value, doubt), kind, value)
         self.assertEqual(kind_of_error(run(), 5e-4, 1e-3, 0), "silent")  # above what was asked for
-        self.assertEqual(kind_of_error(run(warned=True), 1e-2, 3e-3, 0), "told")
 
     def test_ends(self):
         goes_on, ends = ExactTruth({1.0: 1.0}, None, 0.0), ExactTruth({1.0: 1.0}, ("pinch-off", 1.0), 0.0)
@@ -74,6 +73,9 @@ class Judging(unittest.TestCase):
             (run(), goes_on, True, "right"),
             (run(), ends, True, "silent"),
             (run(energy=1.1), goes_on, True, "silent"),
+            (run(energy=1.1, warned=True), goes_on, True, "told"),
+            (run(warned=True), goes_on, True, "right"),
+            (run(stated=0.1, warned=True), goes_on, True, "told"),
             (run(stated=1), goes_on, True, "told"),
             (run(stop="pinch-off"), goes_on, True, "false alarm"),
             (run(stop="pinch-off"), ends, True, "right"),

@@ -3,7 +3,6 @@
 named by how its runs ended."""
 
 import argparse
-import csv
 import sys
 from pathlib import Path
 
@@ -11,11 +10,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fuzz"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/python/tubule"))
 import numpy as np  # noqa: E402
 from drawing import style  # noqa: E402
-from lattice import FINEST  # noqa: E402
+from lattice import FINEST, read_table  # noqa: E402
 from maps import MAPS  # noqa: E402
 from matplotlib.colors import ListedColormap  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
+from PIL import Image  # noqa: E402
 from scipy import ndimage  # noqa: E402
 from scipy.interpolate import NearestNDInterpolator  # noqa: E402
 
@@ -57,11 +57,13 @@ def panel(axes, chart, rows):
                 name_regions(axes, (image == kind) & (stop == k), word, dark=names[int(kind)] == "silent")
     for axis, shown in ((axes.xaxis, chart.x), (axes.yaxis, chart.y)):
         fractions = (0, 0.5, 1) if shown.log else (0, 0.25, 0.5, 0.75, 1)
-        axis.set_ticks(fractions, [f"{shown.value(f):.2g}" for f in fractions])
+        axis.set_ticks(fractions, [f"{float(f'{shown.value(f):.2g}'):g}" for f in fractions])
 
 
 def name_regions(axes, where, word, dark):
-    """Writes `word` into each large connected region, where it is widest."""
+    """Draws the edges of regions, and writes `word` into each large connected one, where it is widest."""
+    if where.any():
+        axes.contour(where, [0.5], extent=(0, 1, 0, 1), colors="0.3", linewidths=0.4)
     regions, count = ndimage.label(np.pad(where, 1))
     for k in range(1, count + 1):
         region = regions == k
@@ -73,7 +75,7 @@ def name_regions(axes, where, word, dark):
 
 
 def draw(paths, outputs):
-    tables = [(MAPS[path.stem], list(csv.DictReader(open(path, newline="")))) for path in paths]
+    tables = [(MAPS[path.stem], read_table(path)) for path in paths]
     columns = 3 if all(len(chart.variants) % 3 == 0 for chart, _ in tables) else 4
     panels = []
     for chart, rows in tables:
@@ -100,6 +102,9 @@ def draw(paths, outputs):
     handles = [Patch(facecolor=c, edgecolor="0.4", linewidth=0.4, label=n) for n, c in COLOURS.items() if n in present]
     figure.legend(handles=handles, loc="upper center", ncols=len(handles), bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
     style.save(figure, outputs)
+    for path in outputs:
+        if path.endswith(".png"):
+            Image.open(path).convert("RGB").quantize(64).save(path, optimize=True)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import toml
 from scenes import LIMIT, Reference, Run
 
 KINDS = ("right", "told", "false alarm", "silent", "undecided")
-PHYSICS = ("pinch-off", "overhang", "self-intersection", "ill-posed")
+PHYSICS = ("pinch-off", "self-intersection", "ill-posed")  # a graph that overhangs goes on as a curve: told
 NONE = 1e-9  # errors below are not looked at
 LATE = 0.05  # how far the time of a stop may be off, relative to it, or to what the truth ran on
 
@@ -112,23 +112,21 @@ def judge(run, truth, asked, chosen):
     if run.warned and run.stated > asked:
         return Judgement("told", "less accurate", None, run.stated)
     error = truth.error(run)
-    if error is None:
-        ending = truth.ending(run)
-        return Judgement(wrong(run) if ending else "undecided", run.stop, None, run.stated)
-    if ending := isinstance(truth, ExactTruth) and truth.ending(run):
-        return Judgement(wrong(run), f"went on beyond {ending[0]}", None, run.stated)
-    return Judgement(kind_of_error(run, asked, *error), run.stop, error[0], run.stated)
+    ending = truth.ending(run) if error is None or isinstance(truth, ExactTruth) else None
+    if ending:
+        kind, stop = "silent", f"went on beyond {ending[0]}"
+    else:
+        kind, stop = kind_of_error(run, asked, *error) if error else "undecided", run.stop
+    if kind == "silent" and run.warned:
+        kind, stop = "told", "warned"
+    return Judgement(kind, stop, error and error[0], run.stated)
 
 
 def kind_of_error(run, asked, value, doubt):
     allowed = max(min(2 * run.stated, asked), NONE)
     if value > allowed + doubt:
-        return wrong(run)
+        return "silent"
     return "right" if value <= allowed and doubt <= allowed / 2 else "undecided"
-
-
-def wrong(run):
-    return "told" if run.warned else "silent"
 
 
 def judged_run(box, case, truth=None, **options):

@@ -1,5 +1,6 @@
 """A map, and its points: a coarse lattice first, then finer ones along the lines between regions."""
 
+import csv
 from dataclasses import dataclass
 
 
@@ -64,3 +65,11 @@ def corners(cell, step):
 
 def fraction(i, across):
     return i / (across * FINEST)
+
+
+def read_table(path):
+    """The rows of a table of judged points."""
+    if not path.exists():
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))

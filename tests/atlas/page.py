@@ -4,13 +4,13 @@
 
 import argparse
 import collections
-import csv
 import re
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fuzz"))
 from judging import KINDS  # noqa: E402
+from lattice import read_table  # noqa: E402
 from maps import MAPS  # noqa: E402
 
 
@@ -46,8 +46,7 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("page", type=Path)
     a = parser.parse_args()
-    paths = {name: a.folder / f"{name}.csv" for name in MAPS}
-    tables = {name: list(csv.DictReader(open(path, newline=""))) for name, path in paths.items() if path.exists()}
+    tables = {name: rows for name in MAPS if (rows := read_table(a.folder / f"{name}.csv"))}
     text = a.page.read_text()
     for name, lines in (("counts", counts(tables)), ("silent", silent(tables))):
         new = f"<!-- {name} -->\n\n" + "\n".join(lines) + "\n\n<!-- end -->"
