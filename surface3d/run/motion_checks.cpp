@@ -51,7 +51,8 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
     if (!(m.symbol > 0))
         return StopReport{Stop::ill_posed, time,
                           "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
-                          "refinement does not help: the energy does not resist short waves there"};
+                          "the energy does not resist short waves there; more elements help only if these do not "
+                          "resolve the curvature"};
     if (m.domain.is_small()) return undefined_energy(m, time);
     if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,

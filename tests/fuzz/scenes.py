@@ -146,12 +146,14 @@ class Run:
         words = box.run(command, "case.toml", "--quiet", "--overwrite", *(f"--set={x}" for x in (*bounds, *sets)), limit=20 * limit)
         self.seconds = processor_seconds() - used
         self.warned, self.stop, self.stated, self.energy = bool(words.err.strip()), "no result", math.inf, {}
+        self.time_tolerance, self.warnings = None, ""
         if not result.exists():
             return
         with h5py.File(result) as file:
             about, series = file["about"].attrs, file["series"]
             self.stop, self.scale, self.stated = about.get("stop", "none"), float(about["E_ref"]), float(about["estimated_error"])
-            self.warned = bool(about["warnings"])
+            self.warnings, self.time_tolerance = about["warnings"], about.get("time_tolerance")
+            self.warned = bool(self.warnings)
             self.energy = dict(zip(series["time"][:], series[quantity][:]))
 
     @property
