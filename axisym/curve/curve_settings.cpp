@@ -9,7 +9,7 @@ namespace {
 // Measured choices: docs/decisions/curves.md, "Curves in motion".
 constexpr double finer_mesh = 1.5;  // elements of a pair of runs
 // From pair to pair; the least is enough for a pair to see what its mesh costs.
-constexpr double least_growth = 1.25, most_growth = 2.5;
+constexpr double least_growth = 1.4, most_growth = 2.5;
 constexpr double finer_time = 0.1;  // tolerances of a pair of runs
 // Of the first run; the waves of a fluid, weakly damped, cost steps.
 constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;

@@ -60,6 +60,8 @@ class Damage(unittest.TestCase):
                 if sample.kind == "scan":
                     self.assertIn("nothing of it can be rescued", box.run("show", "case.hdf", "--verify", statuses=(2,)).err)
                     continue
+                (box.folder / "round.hdf").symlink_to("round.hdf")
+                self.assertIn("round.hdf exists already", box.run("show", "case.hdf", "--rescue", "round.hdf", statuses=(2,)).err)
                 done = box.run("show", "case.hdf", "--rescue", "good.hdf", statuses=(1,))
                 self.assertIn("it is damaged", done.out)
                 rows = box.run("show", "good.hdf", "--csv").out.splitlines()
