@@ -123,6 +123,6 @@ MAPS = {
     "flows": Map("Viscosity and friction", GAMMA, RE, flows, ("stokes, bdf2", "fluid, bdf2", "fluid, alpha"), across=4, levels=0, tier="surface3d"),
     "roughness": Map("Waves on a sphere", DEGREE, WAVE, roughness, ("gradient-flow", "overdamped", "fluid"), across=4, levels=0, tier="surface3d"),
     "necks": Map("Necks, 3D", NECK, ASKED, necks, ("uniform", "graded", "follow_curvature"), across=4, levels=0, tier="surface3d"),
-    "ellipsoids": Map("Ellipsoids at rest", RATIO, AT_REST, spheroids, ("patch", "normal", "weak", "elementwise", "graded", "irregular"), across=5, levels=0, tier="surface3d"),
+    "ellipsoids": Map("Ellipsoids at rest", RATIO, AT_REST, spheroids, ("patch", "normal", "graded", "irregular", "weak", "elementwise"), across=5, levels=0, tier="surface3d"),
     "scans": Map("Scanned spheres", NOISE, PARTS, scanned, ("as it is", "smoothing", "remesh"), across=4, levels=0, tier="surface3d"),
 }
