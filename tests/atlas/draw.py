@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Draws maps of the atlas: draw.py MAP.csv... -o PICTURE. A place is coloured like the nearest judged point, a region is
-named by how its runs ended."""
+"""Draws maps of the atlas: draw.py MAP.csv... -o PICTURE. A place is coloured like the nearest judged point, or
+white where there is none near; a region is named by how its runs ended."""
 
 import argparse
 import sys
@@ -17,7 +17,7 @@ from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from PIL import Image  # noqa: E402
 from scipy import ndimage  # noqa: E402
-from scipy.interpolate import NearestNDInterpolator  # noqa: E402
+from scipy.spatial import cKDTree  # noqa: E402
 
 # In the order of the legend; lightness falls with how bad it is, so that it reads in grey, too.
 COLOURS = {
@@ -44,14 +44,16 @@ def panel(axes, chart, rows):
     stops = sorted({row["stop"] for row in rows})
     place = np.array([[int(r["i"]), int(r["j"])] for r in rows]) / (chart.across * FINEST)
     at = np.meshgrid(*[(np.arange(PIXELS) + 0.5) / PIXELS] * 2)
-    image = NearestNDInterpolator(place, [names.index(label(r)) for r in rows])(*at)
-    stop = NearestNDInterpolator(place, [stops.index(r["stop"]) for r in rows])(*at)
+    away, near = cKDTree(place).query(np.stack(at, axis=-1))
+    judged = away < 0.8 / chart.across  # else no point of its cell is judged: white
+    image = np.where(judged, np.array([names.index(label(r)) for r in rows])[near], np.nan)
+    stop = np.array([stops.index(r["stop"]) for r in rows])[near]
     axes.imshow(image, origin="lower", extent=(0, 1, 0, 1), aspect="auto", vmin=-0.5, vmax=len(names) - 0.5,
                 cmap=ListedColormap(list(COLOURS.values())), interpolation="nearest")  # fmt: skip
     axes.plot(*place.T, ".", color="0.35", markersize=0.4)
     for kind in ("false alarm", "silent"):  # to be seen where they are few
         axes.plot(*place[[row["kind"] == kind for row in rows]].T, "D", color=COLOURS[kind], markersize=3, clip_on=False)
-    for kind in np.unique(image):
+    for kind in np.unique(image[judged]):
         for k, word in enumerate(stops):
             if names[int(kind)] != "right: finished":
                 name_regions(axes, (image == kind) & (stop == k), word, dark=names[int(kind)] == "silent")
