@@ -118,8 +118,8 @@ def judged(n, program, tier):
     with tempfile.TemporaryDirectory() as top:
         box = Sandbox(program, Path(top) / "scene")
         case = surface_scene(n) if tier == "surface3d" else profile_scene(n)
-        truth = FinerSurface(box, case) if tier == "surface3d" else FinerTruth(box, case)
         run = scenes.Run(box, case, limit=SECONDS[tier])
+        truth = FinerSurface(box, case) if tier == "surface3d" else FinerTruth(box, case, run)
         run.warned = any(SMALL_CHANGE not in words for words in run.warnings.splitlines())
         judgement = judge(run, truth, case["accuracy"]["energy"], "discretisation" not in case)
     line = {"scene": n, "sort": sort_of(n), "model": case["model"]["kind"], "shape": case["shape"]["kind"]}
