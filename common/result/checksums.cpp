@@ -33,7 +33,7 @@ constexpr auto crc_tables = [] {
     return t;
 }();
 
-constexpr std::array<char, 8> magic{'T', 'U', 'B', 'U', 'L', 'E', 'C', '1'};
+constexpr std::array<char, 8> seal_magic{'T', 'U', 'B', 'U', 'L', 'E', 'C', '1'};
 
 struct Seal {
     std::array<char, 8> magic;
@@ -96,7 +96,7 @@ std::optional<std::uint64_t> hdf5_end(const Source& file) {
 
 std::optional<Seal> seal_at(const Source& file, std::uint64_t offset) {
     const auto found = file.at<Seal>(offset);
-    if (!found || found->magic != magic) return std::nullopt;
+    if (!found || found->magic != seal_magic) return std::nullopt;
     const std::uint64_t rest = file.size() - std::min<std::uint64_t>(file.size(), 2 * sizeof(Seal));
     if (found->hdf5_size > rest || found->index_size != rest - found->hdf5_size) return std::nullopt;
     return found;
@@ -137,7 +137,7 @@ Extent extent_of(std::uint64_t offset, std::span<const std::byte> data) {
 }
 
 void seal(Bytes& hdf5, std::span<const std::byte> index) {
-    const Seal seal{magic, hdf5.size(), index.size(), crc32(0, hdf5), crc32(0, index)};
+    const Seal seal{seal_magic, hdf5.size(), index.size(), crc32(0, hdf5), crc32(0, index)};
     const auto bytes = std::as_bytes(std::span(&seal, 1));
     hdf5.reserve(hdf5.size() + index.size() + 2 * bytes.size());
     put(hdf5, bytes);

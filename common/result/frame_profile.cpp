@@ -8,19 +8,19 @@ namespace tubule {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& what) {
+[[noreturn]] void refuse_frame(const std::string& what) {
     throw std::invalid_argument(what);
 }
 
 double number(const Record& frame, const char* name) {
     const std::optional<double> found = find_number(frame, name);
-    if (!found) refuse(fmt::format("it is damaged: {} is missing", name));
+    if (!found) refuse_frame(fmt::format("it is damaged: {} is missing", name));
     return *found;
 }
 
 const std::vector<double>& values(const Record& frame, const char* name) {
     const Array* found = find_array(frame, name);
-    if (!found) refuse(fmt::format("it is damaged: {} is missing", name));
+    if (!found) refuse_frame(fmt::format("it is damaged: {} is missing", name));
     return found->data;
 }
 
@@ -29,16 +29,16 @@ Revolution spline_of(const Record& frame) {
                    values(frame, "coefficients")};
     if (out.degree < 1 || out.degree > 7 || !(out.length > 0) || out.coefficients.empty() ||
         out.knots.size() != out.coefficients.size() + static_cast<std::size_t>(out.degree) + 1)
-        refuse("it is damaged: degree, length, knots and coefficients do not define a spline");
+        refuse_frame("it is damaged: degree, length, knots and coefficients do not define a spline");
     return out;
 }
 
 }  // namespace
 
 ProfilePoints profile_points(const Record& frame) {
-    if (!find_array(frame, "r") && !find_array(frame, "z")) refuse("it holds neither a surface nor a profile");
+    if (!find_array(frame, "r") && !find_array(frame, "z")) refuse_frame("it holds neither a surface nor a profile");
     ProfilePoints out{values(frame, "r"), values(frame, "z"), number(frame, "length")};
-    if (out.r.empty() || out.r.size() != out.z.size()) refuse("it is damaged: r and z differ in length");
+    if (out.r.empty() || out.r.size() != out.z.size()) refuse_frame("it is damaged: r and z differ in length");
     return out;
 }
 

@@ -22,7 +22,7 @@ namespace tubule {
 
 namespace {
 
-constexpr std::string_view magic = "TUBULEJ1";
+constexpr std::string_view journal_magic = "TUBULEJ1";
 constexpr std::size_t header_size = 16;
 
 struct Head {
@@ -105,7 +105,7 @@ void Journal::restart(std::uint64_t id) {
     file_.truncate(0);
     size_ = header_size;  // even if the header fails now: there was a journal, leave its file alone
     Bytes header;
-    put(header, std::as_bytes(std::span(magic)));
+    put(header, std::as_bytes(std::span(journal_magic)));
     put(header, id);
     file_.write(header);
     seed_ = seed_of(id);
@@ -219,7 +219,7 @@ std::size_t replay(std::span<const std::byte> journal, std::uint64_t id, std::ui
     if (journal.size() < header_size) return 0;
     // Whose journal it is the records tell as well: one damaged byte of the header must not cost them.
     const std::uint32_t seed = seed_of(id);
-    const bool says_so = std::memcmp(journal.data() + magic.size(), &id, sizeof(id)) == 0;
+    const bool says_so = std::memcmp(journal.data() + journal_magic.size(), &id, sizeof(id)) == 0;
     auto rest = journal.subspan(header_size);
     while (rest.size() >= sizeof(Head)) {
         Head head;

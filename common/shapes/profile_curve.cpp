@@ -8,18 +8,18 @@ namespace tubule {
 
 namespace {
 
-using Point = std::array<double, 2>;  // two values of x
+using Pair = std::array<double, 2>;  // two values of x
 constexpr int terms = BlendedCurve::terms;
 
 // The polynomials through the values at x; periodic: the last point is the first one, of x greater by 1.
-BlendedCurve blended(const std::vector<double>& x, const std::vector<Point>& values, bool periodic) {
+BlendedCurve blended(const std::vector<double>& x, const std::vector<Pair>& values, bool periodic) {
     const int n = static_cast<int>(x.size());
     BlendedCurve out{x, {}, {}};
     for (int i = 0; i < n; ++i) {
         int first = i - terms / 2;
         if (!periodic) first = std::clamp(first, 0, n - terms);
         std::array<double, terms> away;
-        std::array<Point, terms> value;
+        std::array<Pair, terms> value;
         double scale = 0;
         for (int k = 0; k < terms; ++k) {
             const int index = first + k, turn = index < 0 ? -1 : index > n - 1 ? 1 : 0;
@@ -60,7 +60,7 @@ double extrapolated(const double* x, const double* values, double at) {
 BlendedCurve functions_of(ProfileCurve::Kind kind, const std::vector<double>& first, const std::vector<double>& second,
                           const std::vector<double>& s) {
     const std::size_t n = s.size();
-    std::vector<Point> values(n);
+    std::vector<Pair> values(n);
     if (kind != ProfileCurve::Kind::cell) {
         for (std::size_t i = 0; i < n; ++i) values[i] = {first[i], second[i]};
         return blended(s, values, true);

@@ -54,7 +54,7 @@ Sparse with_diagonal(Sparse matrix, const Eigen::VectorXd& added) {
     return matrix;
 }
 
-Columns vertex_normals(const TriangleMesh& mesh) {
+Columns normal_columns(const TriangleMesh& mesh) {
     Columns n = Columns::Zero(Eigen::Index(mesh.points.size()), 3);
     for (const auto& t : mesh.triangles)
         for (const int v : t) n.row(v) += area_vector(mesh, t).transpose();
@@ -112,7 +112,7 @@ TriangleMesh smoothed(const TriangleMesh& mesh, double halved) {
     const Eigen::VectorXd hold = of.area / (halved * halved);
     SparseCholesky solver;
     solver.factor(with_diagonal(of.stiffness, hold));
-    const Columns normal = filtered(of, halved, vertex_normals(mesh));
+    const Columns normal = filtered(of, halved, normal_columns(mesh));
     return points.moved(mesh, solver.solve(Columns(projected_edges(mesh, normal) + hold.asDiagonal() * points.x)));
 }
 
@@ -122,7 +122,7 @@ TriangleMesh unfolded(const TriangleMesh& mesh, double halved) {
 }
 
 TriangleMesh with_volume(const TriangleMesh& mesh, double volume) {
-    const Columns normal = vertex_normals(mesh);
+    const Columns normal = normal_columns(mesh);
     TriangleMesh out = mesh;
     double moved = 0;
     for (int step = 0; step < 5; ++step) {  // Newton's method: the third step is already rounding

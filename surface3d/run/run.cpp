@@ -20,7 +20,7 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr int fewest_triangles = 80, most_triangles = 100000;
+constexpr int fewest_triangles = 80, most_refined_triangles = 100000;
 // From a mesh to one of half the width, errors fall by a factor between these: what the estimate takes for possible.
 constexpr double slowest_fall = 1.0 / 2, second_order_fall = 1.0 / 4, fastest_fall = 1.0 / 8;
 
@@ -191,7 +191,7 @@ class MoreAndMore : public MeshSequence {
 public:
     using MeshSequence::MeshSequence;
     bool refine(const RunSummary& last) override {
-        if ((last.as_accurate_as_asked && !measured_->stop) || 2 * triangles_ > most_triangles) return false;
+        if ((last.as_accurate_as_asked && !measured_->stop) || 2 * triangles_ > most_refined_triangles) return false;
         triangles_ *= 2;
         return true;
     }

@@ -16,3 +16,19 @@ function(tubule_precompile target)
     target_precompile_headers(${target} REUSE_FROM tubule_axisym)
   endif()
 endfunction()
+
+# tubule_compile_together(target FOLDERS folder... [ALONE file...]): the files of a folder as one, except for these. Compiling
+# is mostly the making of templates, which they then share (docs/decisions/packages.md). Kernels stay alone: what is inlined
+# into them does not depend on their neighbours.
+function(tubule_compile_together target)
+  cmake_parse_arguments(PARSE_ARGV 1 of "" "" "FOLDERS;ALONE")
+  get_target_property(sources ${target} SOURCES)
+  list(REMOVE_ITEM sources ${of_ALONE})
+  foreach(source IN LISTS sources)
+    cmake_path(GET source PARENT_PATH folder)
+    if(folder IN_LIST of_FOLDERS)
+      set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
+    endif()
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+endfunction()
