@@ -8,16 +8,16 @@ namespace tubule::axisym {
 namespace {
 
 constexpr int parts = 256;
-constexpr double equal = 0.5;     // share of elements that does not follow the wish
-constexpr double growth = 0.4;    // of sizes per distance, as at seams
-constexpr double steepest = 0.3;  // from part to part
+constexpr double equal = 0.5;        // share of elements that does not follow the wish
+constexpr double growth = 0.4;       // of sizes per distance, as at seams
+constexpr double most_change = 0.3;  // from part to part
 
 // 1/density, in proportion to sizes, grows by no more than `growth` per distance.
 void limit_growth(ElementDensity& density, int elements) {
     const int n = static_cast<int>(density.size());
     const double rise = growth * elements / n;
     const auto limit = [&](int i, int from) {
-        density[i] = std::max(density[i], density[from] / (1 + std::min(rise * density[from], steepest)));
+        density[i] = std::max(density[i], density[from] / (1 + std::min(rise * density[from], most_change)));
     };
     for (int i = 1; i < n; ++i) limit(i, i - 1);
     for (int i = n - 2; i >= 0; --i) limit(i, i + 1);
