@@ -9,9 +9,9 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr int most_failures = 2;    // pairs of runs that fail, after which nothing else is tried
+constexpr int most_failures = 2;        // pairs of runs that fail, after which nothing else is tried
 constexpr double share_of_mesh = 1e-4;  // of the error allowed: what any state may lose to the mesh
-constexpr double too_early = 1e-6;  // of time.end: runs that fail so soon say nothing of each other's error
+constexpr double too_early = 1e-6;      // of time.end: runs that fail so soon say nothing of each other's error
 
 bool failed(const StopReport& stop) {
     return exit_code(stop.reason) == exit_code(Stop::solver_failed);

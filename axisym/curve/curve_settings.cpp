@@ -42,8 +42,11 @@ double step_growth_of(const CurveSettings& s) {
 }
 
 CurveSettings coarser(const CurveSettings& s) {
-    return {std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh))), s.tolerance / finer_time, s.pair, true,
-            s.density, s.excess};
+    CurveSettings out = s;
+    out.elements = std::max(2, static_cast<int>(std::floor(s.elements / finer_mesh)));
+    out.tolerance /= finer_time;
+    out.is_coarser = true;
+    return out;
 }
 
 // The error of the mesh falls at least with the sixth power of its width, unless the shape is not smooth.
@@ -57,8 +60,11 @@ double mesh_growth(double excess_of_mesh, bool error_falls) {
 }
 
 CurveSettings finer(const CurveSettings& s, double mesh) {
-    return {static_cast<int>(std::ceil(mesh * s.elements)), std::max(finer_time * s.tolerance, 1e-13), s.pair + 1,
-            false, s.density, s.excess};
+    CurveSettings out = s;
+    out.elements = static_cast<int>(std::ceil(mesh * s.elements));
+    out.tolerance = std::max(finer_time * s.tolerance, 1e-13);
+    ++out.pair;
+    return out;
 }
 
 bool can_be_finer(const CurveSettings& s) {

@@ -9,10 +9,10 @@ namespace tubule::axisym {
 constexpr int first_curve_elements = 12;  // of one cell
 
 struct CurveSettings {
-    int elements = 0;         // requested, of one cell; there are more at seams
-    double tolerance = 0;     // of the time integrator
-    int pair = 1;             // its number
-    bool is_coarser = false;  // of its pair; else it is the run that is reported
+    int elements = 0;             // requested, of one cell; there are more at seams
+    double tolerance = 0;         // of the time integrator
+    int pair = 1;                 // its number
+    bool is_coarser = false;      // of its pair; else it is the run that is reported
     ElementDensity density = {};  // where the pair before needed more
     double excess = 1e300;        // error of the pair before, of what was asked; large where it is not known
 };
@@ -32,8 +32,8 @@ double step_growth_of(const CurveSettings& s);
 CurveSettings coarser(const CurveSettings& s);
 
 // By how much the next pair has more elements, after one whose runs differed `excess` times more than asked; or, where
-// the part of the mesh is known, after one that lost that much too much to its mesh. That part is an estimate: if smaller
-// tolerances did not make the error smaller, more elements may.
+// the part of the mesh is known, after one that lost that much too much to its mesh. That part is an estimate: if
+// smaller tolerances did not make the error smaller, more elements may.
 double mesh_growth(double excess);
 double mesh_growth(double excess_of_mesh, bool error_falls);
 // The next pair: a tenth of the tolerance, and so many times more elements.

@@ -39,13 +39,14 @@ void check_triangles(const ImportedMesh& in) {
                 refuse(in, fmt::format("{} uses point {}, but there are {}", triangle_name(in, t), a, points));
             if (!mesh.points[a].allFinite()) refuse(in, vertex_name(in, a) + " is not finite");
             if (a == b)
-                refuse(in, fmt::format("{} is degenerate: {} occurs twice in it", triangle_name(in, t), vertex_name(in, a)));
+                refuse(in, fmt::format("{} is degenerate: {} occurs twice in it", triangle_name(in, t),
+                                       vertex_name(in, a)));
             if (b >= 0 && b < points) longest = std::max(longest, (mesh.points[b] - mesh.points[a]).norm());
         }
         // In float coordinates (STL), heights below 1e-6 of a side are rounding.
         if (2 * area_vector(mesh, t).norm() <= 1e-6 * longest * longest) {
             refuse(in, fmt::format("{} is degenerate: {}, {} and {} are collinear", triangle_name(in, t),
-                                 vertex_name(in, corner[0]), vertex_name(in, corner[1]), vertex_name(in, corner[2])));
+                                   vertex_name(in, corner[0]), vertex_name(in, corner[1]), vertex_name(in, corner[2])));
         }
     }
 }
@@ -63,7 +64,7 @@ void check_duplicates(const ImportedMesh& in) {
     }
     if (first.first == sorted.size()) return;
     refuse(in, fmt::format("duplicate faces: {} and {} have the same vertices", triangle_name(in, first.first),
-                         triangle_name(in, first.second)));
+                           triangle_name(in, first.second)));
 }
 
 struct HalfEdge {
@@ -104,16 +105,16 @@ void check_edges(const ImportedMesh& in, const std::vector<HalfEdge>& edges) {
                                          vertex_name(in, e.forward ? e.high : e.low));
     if (count == 1) {
         refuse(in, fmt::format("the mesh is open: the {} of {} belongs to no other triangle ({} such edges; if the "
-                             "surface is closed there, weld its vertices)",
-                             edge, triangle_name(in, e.triangle), open));
+                               "surface is closed there, weld its vertices)",
+                               edge, triangle_name(in, e.triangle), open));
     }
     if (count == 2) {
         refuse(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}",
-                             triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle), edge));
+                               triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle), edge));
     }
     refuse(in, fmt::format("non-manifold edge: the {} belongs to {} triangles, among them {}, {} and {}", edge, count,
-                         triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle),
-                         triangle_name(in, edges[first + 2].triangle)));
+                           triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle),
+                           triangle_name(in, edges[first + 2].triangle)));
 }
 
 // neighbour[t][i] across the edge from corner i to the next.
@@ -147,9 +148,9 @@ void check_fans(const ImportedMesh& in, const std::vector<std::array<std::size_t
             std::size_t other = t;
             while (fan.contains(other) || corner_of(mesh, other, v) == 3) ++other;
             refuse(in,
-                 fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
-                             "them",
-                             triangle_name(in, t), triangle_name(in, other), vertex_name(in, v)));
+                   fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
+                               "them",
+                               triangle_name(in, t), triangle_name(in, other), vertex_name(in, v)));
         }
     }
 }
@@ -174,7 +175,7 @@ void check_connected(const ImportedMesh& in, const std::vector<std::array<std::s
     }
     if (count > 1) {
         refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}", count,
-                             triangle_name(in, second), triangle_name(in, 0)));
+                               triangle_name(in, second), triangle_name(in, 0)));
     }
 }
 
@@ -258,7 +259,7 @@ MeshReport close_mesh(ImportedMesh& in) {
     check_connected(in, across);
     if (const auto pair = first_intersection(in.mesh)) {
         refuse(in, fmt::format("the surface intersects itself: {} intersects {}", triangle_name(in, pair->first),
-                             triangle_name(in, pair->second)));
+                               triangle_name(in, pair->second)));
     }
     MeshReport report = measure(in.mesh, edges);
     if (report.volume < 0) {

@@ -27,7 +27,7 @@ struct Place {
 // and coordinates, both counted as the file does (OBJ from 1, the others from 0).
 struct MeshNames {
     std::string file = "mesh";
-    std::int64_t first = 0;                   // number of the first vertex and triangle
+    std::int64_t first = 0;                                    // number of the first vertex and triangle
     std::vector<std::int64_t> vertex_number, triangle_number;  // empty: as in memory
     std::vector<Place> triangle_place;                         // empty: without
     std::vector<Eigen::Vector3d> triangle_centre;  // of triangles that are not the file's: they are named by these

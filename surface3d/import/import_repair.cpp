@@ -74,10 +74,11 @@ bool runs(const std::array<int, 3>& corner, int from, int to) {
 void check_edges(const ImportedMesh& in, const Edges& edges) {
     for (const auto& [edge, at] : edges)
         if (at.size() > 2)
-            refuse(in, fmt::format("non-manifold edge: the edge from {} to {} belongs to {} triangles, among them {}, {} "
-                                 "and {}; {}",
-                                 vertex_name(in, edge.first), vertex_name(in, edge.second), at.size(), triangle_name(in, at[0]),
-                                 triangle_name(in, at[1]), triangle_name(in, at[2]), wrapping));
+            refuse(in,
+                   fmt::format("non-manifold edge: the edge from {} to {} belongs to {} triangles, among them {}, {} "
+                               "and {}; {}",
+                               vertex_name(in, edge.first), vertex_name(in, edge.second), at.size(),
+                               triangle_name(in, at[0]), triangle_name(in, at[1]), triangle_name(in, at[2]), wrapping));
 }
 
 void check_closed(const ImportedMesh& in, const Edges& edges) {
@@ -87,10 +88,11 @@ void check_closed(const ImportedMesh& in, const Edges& edges) {
         if (at.size() == 1 && open++ == 0) first = &edge;
     if (!first) return;
     const std::size_t t = edges.at(*first)[0];
-    refuse(in, fmt::format("the mesh is open: the edge from {} to {} of {} belongs to no other triangle ({} such edges); "
-                         "if the surface is closed there, shape.weld joins vertices that are near each other; "
-                         "shape.fill_holes = true closes holes",
-                         vertex_name(in, first->first), vertex_name(in, first->second), triangle_name(in, t), open));
+    refuse(in,
+           fmt::format("the mesh is open: the edge from {} to {} of {} belongs to no other triangle ({} such edges); "
+                       "if the surface is closed there, shape.weld joins vertices that are near each other; "
+                       "shape.fill_holes = true closes holes",
+                       vertex_name(in, first->first), vertex_name(in, first->second), triangle_name(in, t), open));
 }
 
 // Makes each triangle face as its neighbours do, from the first of its piece on; the number of the piece of each.
@@ -116,8 +118,8 @@ std::vector<int> orient(ImportedMesh& in, const Edges& edges) {
                     const bool differs = runs(other, from, to);
                     if (differs && piece[s] >= 0)
                         refuse(in, fmt::format("the surface has only one side, like a Moebius strip: {} and {} cannot "
-                                             "face the same way, whichever way their neighbours do; {}",
-                                             triangle_name(in, t), triangle_name(in, s), wrapping));
+                                               "face the same way, whichever way their neighbours do; {}",
+                                               triangle_name(in, t), triangle_name(in, s), wrapping));
                     if (piece[s] >= 0) continue;
                     if (differs) std::swap(other[1], other[2]), is_turned[s] = true;
                     piece[s] = number;
@@ -198,10 +200,10 @@ void part_vertices(ImportedMesh& in, const Edges& edges) {
         if (fans.size() < 2) continue;
         if (!std::ranges::all_of(fans, &Fan::open))
             refuse(in,
-                 fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
-                             "them: two surfaces, or two parts of one, touch there; move them apart, or {}",
-                             triangle_name(in, fans[0].triangles[0]), triangle_name(in, fans[1].triangles[0]), vertex_name(in, v),
-                             wrapping));
+                   fmt::format("non-manifold vertex: {} and {} meet at {}, but no fan of triangles around it connects "
+                               "them: two surfaces, or two parts of one, touch there; move them apart, or {}",
+                               triangle_name(in, fans[0].triangles[0]), triangle_name(in, fans[1].triangles[0]),
+                               vertex_name(in, v), wrapping));
         for (std::size_t i = 1; i < fans.size(); ++i) parted.emplace_back(v, std::move(fans[i]));
     }
     if (parted.empty()) return;
@@ -218,8 +220,8 @@ void part_vertices(ImportedMesh& in, const Edges& edges) {
 void check_one_piece(const ImportedMesh& in, const std::vector<std::string>& pieces) {
     if (pieces.size() > 1)
         refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}; a case has one "
-                             "membrane: keep one of them in the file",
-                             pieces.size(), pieces[1], pieces[0]));
+                               "membrane: keep one of them in the file",
+                               pieces.size(), pieces[1], pieces[0]));
 }
 
 }  // namespace

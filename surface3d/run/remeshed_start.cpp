@@ -44,10 +44,10 @@ constexpr double sharpest_start = 1;  // radians from node to node
 constexpr double wrap_offset = 0.05;  // of the gaps that are closed
 // Squares of that side in the area of what is wrapped, and the seconds that each takes.
 constexpr double most_gaps = 5e4, seconds_per_gap = 1.2e-3;
-constexpr double crease = 45;         // degrees between neighbours
-constexpr double folded = 120;        // degrees, too
-constexpr double unfolding = 0.33;    // of the length
-constexpr double flattest = 1e-3;     // of the volume of a ball of the same area
+constexpr double crease = 45;       // degrees between neighbours
+constexpr double folded = 120;      // degrees, too
+constexpr double unfolding = 0.33;  // of the length
+constexpr double flattest = 1e-3;   // of the volume of a ball of the same area
 
 std::string place(const Vector3d& x) {
     return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);

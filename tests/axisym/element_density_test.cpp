@@ -57,7 +57,8 @@ TEST(MeshNeed, knowsNothingBeforeAnythingWasLost) {
 // 1e-12; energies that differ by 6e-8 of E_ref.
 TEST(MeshNeed, leavesAFineMeshAsItIs) {
     const Case c = parse_case(
-        "tier = \"axisym\"\n[energy]\nk20 = 1.0\nk42 = 0.5\nH0 = -2.0\n[model]\nkind = \"overdamped\"\nvolume = \"free\"\n"
+        "tier = \"axisym\"\n[energy]\nk20 = 1.0\nk42 = 0.5\nH0 = -2.0\n[model]\nkind = \"overdamped\"\nvolume = "
+        "\"free\"\n"
         "[shape]\nkind = \"tube\"\nradius = 1.0\nlength = 9.0\n[[shape.mode]]\namplitude = 1e-3\nn = 1\n"
         "[accuracy]\nenergy = 1e-5\nr_min = 0.05\n[time]\nend = 20.0\noutput = [12, 14]\n",
         {}, "case.toml");
