@@ -29,8 +29,8 @@ struct StabilityOptions {
 struct StabilitySubject {
     Case c;
     bool case_is_known = true;  // not if a result to be fitted has a case of another version's keys
-    std::optional<Result> result;
-    std::optional<Record> frame;
+    std::optional<Result> result = {};
+    std::optional<Record> frame = {};
 };
 
 // A tube whose waves are known in closed form.
