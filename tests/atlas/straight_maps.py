@@ -49,7 +49,7 @@ class Tube:
         self.f, self.tension, self.pressure = density(terms, H0), tension, pressure
 
     def rate(self, R):
-        """dR/dt: the force (theory.md (2.7)) with |B|^2 = H^2, and the loads."""
+        """dR/dt: the force (theory.md (2.8)) with |B|^2 = H^2, and the loads."""
         H = -1 / R
         return -(H * H * self.f(H, 0, 1) - H * self.f(H, 0)) - self.tension / R + self.pressure
 
