@@ -143,6 +143,12 @@ double CurveAttempt::what_may_change(double t) const {
     return std::max({now_.balance.dissipation * left, now_.balance.kinetic, now_.balance.acceleration * left * left});
 }
 
+void CurveAttempt::look_at_mesh() {
+    std::vector<double> lost;
+    setup_.motion->forms().observe(setup_.curve(flow_->x()), &lost);
+    mesh_need.add(setup_.space->splines(), lost);
+}
+
 std::optional<StopReport> CurveAttempt::check(double t) {
     const std::optional<double> stationary = setup_.c.time.stationary;
     if (auto pause = clock_.find_pause(t)) return pause;
@@ -151,9 +157,7 @@ std::optional<StopReport> CurveAttempt::check(double t) {
         what_may_change(t) < *stationary * summary.reference_energy)
         return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
     if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
-    std::vector<double> lost;
-    setup_.motion->forms().observe(setup_.curve(flow_->x()), &lost);
-    mesh_need.add(setup_.space->splines(), lost);
+    look_at_mesh();
     return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
 }
 
@@ -250,6 +254,7 @@ std::optional<StopReport> CurveAttempt::check_start() {
 }
 
 void CurveAttempt::go() {
+    look_at_mesh();
     std::optional<StopReport> stop = check_start();
     try {
         while (!stop) stop = step();

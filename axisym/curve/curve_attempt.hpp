@@ -32,7 +32,7 @@ public:
     EnergyTrace trace;
     double error = 0;  // largest over the run, absolute: see compare() and find_rise()
     double least_symbol = std::numeric_limits<double>::max();  // over the run: theory.md (2.14)
-    MeshNeed mesh_need;
+    MeshNeed mesh_need;  // of all states that were looked at, the first one among them
 
 private:
     struct Past {
@@ -52,6 +52,7 @@ private:
     std::optional<StopReport> step();
     std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);
+    void look_at_mesh();
     void compare(double t, const Snapshot& s);
     double share(double t) const;
     double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }

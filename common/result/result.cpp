@@ -428,7 +428,8 @@ Verification verify_result(const fs::path& file, const fs::path& rescued) {
         out.lost = drop_what_is_lost(contents);
         out.rows = contents.rows.size() / contents.series.size(), out.frames = contents.frames.size();
         if (rescued.empty()) return out;
-        if (fs::exists(fs::symlink_status(rescued))) throw std::runtime_error(fmt::format("{} exists already", rescued.string()));
+        if (fs::exists(fs::symlink_status(rescued)))
+            throw std::runtime_error(fmt::format("{} exists already", rescued.string()));
         if (!out.lost.empty()) contents.about.emplace_back("lost", fmt::format("{}", fmt::join(out.lost, "\n")));
         durable::replace(rescued, hdf5_image(contents));
     } catch (const std::runtime_error& e) {

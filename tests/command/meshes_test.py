@@ -3,6 +3,7 @@
 refused, with its place. Argument: the program."""
 import re
 import struct
+import time
 import unittest
 
 import numpy as np
@@ -156,6 +157,16 @@ class MeshesTest(ProgramTest):
         rows, _, words = self.run_mesh("open.off", "remesh = 300\nfill_holes = true")
         self.assertRegex(words, r"1 holes were filled; the longest border, at \(.*\), measures 1\.")
         self.assertAlmostEqual(rows["volume"][-1] / (4 / 3 * np.pi), 1, delta=0.03)
+
+    def test_a_wrap_that_takes_longer_than_the_limit_is_not_begun(self):
+        """0.02 into a sphere's area of 12.5: 31000 squares, some 40 s that nothing can end."""
+        self.off("ball.off", *sphere(24))
+        path = self.write("case.toml", CASE.format("ball.off", "remesh = 300\nwrap = 0.02") + MOVES)
+        begin = time.monotonic()
+        status, words = self.attempt("run", path, "-o", self.result, "--set", "time.limit=1")
+        self.assertEqual(status, 5, words)
+        self.assertIn("reached the time limit of 1 s (time.limit) before the first state was computed", words)
+        self.assertLess(time.monotonic() - begin, 15)
 
     def test_touching_vesicles_are_refused_with_the_place(self):
         points, triangles = sphere(12)

@@ -38,8 +38,6 @@ SORTS = {
 }
 LARGEST = 0.3  # of a term, in parts of k20: with more, most of the starts are ill-posed
 SECONDS = {"axisym": 10 * scenes.LIMIT, "surface3d": 300}  # of a run; in three dimensions of its reference 4 times as many
-
-
 SMALL_CHANGE = "the energy changed by only"
 
 
