@@ -1,5 +1,9 @@
-// A tube with a wave, in gradient flow: run in memory, then written as a result that `tubule show` and `plot` read.
+// A tube with a wave, in gradient flow, as a result that `tubule show` and `plot` read.
+//
+// run_a_tube [CASE RESULT]      a case of tier axisym from a file, or the one below
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -31,10 +35,7 @@ private:
     int rows_ = 0;
 };
 
-}  // namespace
-
-int main() {
-    const std::string text = R"(
+const char* const example = R"(
 tier = "axisym"
 [energy]
 k20 = 0.2
@@ -51,10 +52,22 @@ energy = 1e-4
 end = 0.4
 output = [0.1, 0.2, 0.3]
 )";
+
+std::string text_of(const char* path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const bool given = argc > 2;
+    const CaseText source =
+        given ? CaseText{text_of(argv[1]), {}} : CaseText{example, {"energy.k42=0.12"}};  // overrides as in --set
     try {
-        const Case c = parse_case(text, {"energy.k42=0.12"}, "in memory");  // overrides as in --set
+        const Case c = parse_case(source.text, source.sets, given ? argv[1] : "in memory");
         const auto series = axisym::series_names(c);
-        ResultWriter writer = ResultWriter::create("run_a_tube.hdf", {text, {"energy.k42=0.12"}}, {}, series);
+        ResultWriter writer = ResultWriter::create(given ? argv[2] : "run_a_tube.hdf", source, {}, series);
         Watch watch(writer, series);
         const RunSummary run = axisym::run(c, watch);
         writer.finish({{"stop", std::string(name(run.stop.reason))}});

@@ -70,6 +70,10 @@ class Install(unittest.TestCase):
         last = lambda name: run(self.prefix / "bin/tubule", "show", self.folder / name, "--csv").splitlines()[-1]  # noqa: E731
         energy = lambda line: line.split(",")[1]  # noqa: E731
         self.assertEqual(energy(last("run_a_tube.hdf")), energy(last("tube.hdf")))
+        run(self.prefix / "bin/tubule", "run", case, "-o", self.folder / "given.hdf")
+        run(build / "run_a_tube", case, self.folder / "from_file.hdf")
+        self.assertEqual(energy(last("from_file.hdf")), energy(last("given.hdf")))
+        self.assertNotEqual(energy(last("given.hdf")), energy(last("tube.hdf")))
 
         text = printed("run_a_surface")
         energies = [float(value) for value in re.findall(r"energy ([\d.]+)", text)]
