@@ -177,6 +177,30 @@ void drop_rows(Contents& contents, std::vector<std::string>& words) {
     contents.rows = std::move(good);
 }
 
+// Series that lack more than half of their numbers: to drop them costs less than to drop the rows that lack them. Without
+// its times a row means nothing, and without all series no run goes on.
+void drop_series(Contents& contents, std::vector<std::string>& words) {
+    const std::size_t width = contents.series.size(), rows = contents.rows.size() / width;
+    std::vector<std::size_t> kept;
+    for (std::size_t j = 0; j < width; ++j) {
+        std::size_t lost = 0;
+        for (std::size_t i = 0; i < rows; ++i) lost += std::isnan(contents.rows[i * width + j]);
+        if (contents.series[j] == "time" || 2 * lost <= rows)
+            kept.push_back(j);
+        else
+            words.push_back(fmt::format("series {}: {} of {} rows", contents.series[j], lost, rows));
+    }
+    if (kept.size() == width) return;
+    std::vector<double> good;
+    for (std::size_t i = 0; i < rows; ++i)
+        for (const std::size_t j : kept) good.push_back(contents.rows[i * width + j]);
+    std::vector<std::string> names;
+    for (const std::size_t j : kept) names.push_back(contents.series[j]);
+    contents.rows = std::move(good), contents.series = std::move(names);
+    if (contents.checkpoint) words.push_back("checkpoint: a run goes on with all of its series only");
+    contents.checkpoint.reset();
+}
+
 void drop_meshes(Contents& contents) {
     std::vector<Record*> records;
     for (Record& frame : contents.frames) records.push_back(&frame);
@@ -252,6 +276,7 @@ Contents contents_by_index(std::span<const std::byte> index, std::span<const std
 
 std::vector<std::string> drop_what_is_lost(Contents& contents) {
     std::vector<std::string> words;
+    drop_series(contents, words);
     drop_rows(contents, words);
     std::vector<Record> good;
     for (std::size_t i = 0; i < contents.frames.size(); ++i) {

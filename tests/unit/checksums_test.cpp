@@ -185,6 +185,20 @@ TEST_F(Checksums, RowsOfGoodChunksAreRescued) {
     EXPECT_NE(message_of([&] { verify_result(file, rescued); }).find("exists already"), std::string::npos);
 }
 
+TEST_F(Checksums, ASeriesThatIsLostCostsNoRows) {
+    written(3).finish({{"stop", "finished"}});
+    damage(1.0 / 3);
+    const Verification found = verify_result(file, rescued);
+    EXPECT_EQ(found.lost, (std::vector<std::string>{"series energy: 3 of 3 rows",
+                                                    "checkpoint: a run goes on with all of its series only"}));
+    EXPECT_EQ(found.rows, 3u);
+    const Result result = read_result(rescued);
+    EXPECT_EQ(result.series_names, std::vector<std::string>{"time"});
+    EXPECT_EQ(result.series.at("time"), (std::vector<double>{0, 1, 2}));
+    EXPECT_FALSE(result.checkpoint);
+    EXPECT_EQ(result.frames.size(), 3u);
+}
+
 // HDF5 structures of all kinds are gone; the numbers are where they were.
 TEST_F(Checksums, HDF5IsNotNeeded) {
     written(3).finish({{"stop", "finished"}});
