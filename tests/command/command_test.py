@@ -321,7 +321,7 @@ class Check(ProgramTest):
 class Others(ProgramTest):
     def test_version(self):
         out, _ = self.tubule("--version")
-        for name in ("version", "git_hash", "compiler", "sundials", "suitesparse", "hdf5", "blas"):
+        for name in ("version", "git_hash", "compiler", "sundials", "suitesparse", "cgal", "hdf5", "blas"):
             self.assertRegex(out, rf"(?m)^{name} +\S")
 
     def test_help(self):

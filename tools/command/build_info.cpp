@@ -80,6 +80,7 @@ std::vector<std::pair<std::string, std::string>> build_info() {
             {"sundials", sundials()},
             {"suitesparse", suitesparse()},
             {"eigen", TUBULE_EIGEN},
+            {"cgal", TUBULE_CGAL},
             {"hdf5", hdf5()},
             {"gsl", gsl_version},
             {"blas", blas()},
