@@ -385,7 +385,8 @@ class Drawing(Folder):
     def test_refusals(self):
         result = tubule.run(TUBE)
         for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "must be one of"),
-                               ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame")):  # fmt: skip
+                               ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame"),
+                               ({"dpi": 5}, "not between 30 and 1200")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, words):
                 tubule.draw(result, **options)
 

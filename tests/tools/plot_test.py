@@ -117,14 +117,14 @@ class InFolder(unittest.TestCase):
         said = [line for line in done.stderr.splitlines(True) if "has no checksums" not in line]
         return subprocess.CompletedProcess(done.args, done.returncode, done.stdout, "".join(said))
 
-    def drawn(self, *arguments, **options):
+    def drawn(self, *arguments, dpi=100, **options):
         """Texts of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
-        done = self.plot(*arguments, "-o", self.folder / "p.png", "-o", self.folder / "p.svg", **options)
+        done = self.plot(*arguments, f"--dpi={dpi}", "-o", self.folder / "p.png", "-o", self.folder / "p.svg", **options)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         width, height = png_size(self.folder / "p.png")
-        self.assertEqual(width, 2100)  # 7 inches at 300 dpi
-        self.assertGreater(height, 300)
-        self.assertGreater((self.folder / "p.png").stat().st_size, 20000)
+        self.assertEqual(width, 7 * dpi)  # the page's width in inches
+        self.assertGreater(height, dpi)
+        self.assertGreater((self.folder / "p.png").stat().st_size, 50 * dpi)
         return svg_texts(self.folder / "p.svg")
 
     def refused(self, words, *arguments, status=2, **options):
@@ -579,6 +579,7 @@ class Refusals(InFolder):
         self.refused("--x, --from, --to and --logy belong to --series", file, "--logy")
         self.refused("is no scan, to which --confirmed belongs", file, "--confirmed", "points.json")
         self.refused("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3")
+        self.refused("--dpi: 20 is not between 30 and 1200 pixels per inch", file, "--dpi=20")
         self.refused("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg")
         self.refused("does not exist", file, "-o", self.folder / "none/x.png")
         (self.folder / "taken.png").mkdir()

@@ -40,6 +40,7 @@ struct PlotOptions {
     std::vector<double> times;
     std::string kind = "all", plane = "z=0", scale = "run", confirmed, movie;
     double fps = 10;  // frames of a film per second
+    double dpi = 300;
 };
 
 bool is_plane(const std::string& text) {
@@ -83,6 +84,7 @@ std::vector<std::string> script_arguments(const PlotOptions& options) {
     if (options.series.from) arguments.push_back(fmt::format("--from={}", *options.series.from));
     if (options.series.to) arguments.push_back(fmt::format("--to={}", *options.series.to));
     if (options.series.logy) arguments.push_back("--logy");
+    arguments.push_back(fmt::format("--dpi={}", options.dpi));
     if (!options.movie.empty())
         arguments.insert(arguments.end(), {"--movie=" + options.movie, fmt::format("--fps={}", options.fps)});
     if (!options.confirmed.empty()) arguments.push_back("--confirmed=" + options.confirmed);
@@ -148,6 +150,9 @@ void add_scan_options(CLI::App& command, PlotOptions& options) {
 }
 
 void add_movie_options(CLI::App& command, PlotOptions& options) {
+    command.add_option("--dpi", options.dpi, "pixels per inch of a .png, and of surfaces within .svg and .pdf")
+        ->check(CLI::Range(30.0, 1200.0))
+        ->capture_default_str();
     command.add_option("--movie", options.movie,
                        "film to write instead, .mp4 (needs ffmpeg) or .gif: the shape of one result, frame by frame, "
                        "coloured by H or the given --colour, and its energy");

@@ -14,7 +14,7 @@ from .results import Frame, Result, read
 def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = None, *, kind: str = "all",
          times: Iterable[float] = (), colour: Iterable[str] = (), labels: Iterable[str] = (), plane: tuple[str, float] = ("z", 0.0),
          scale: str = "run", series: Iterable[str] = (), x: str = "time", logy: bool = False, quantity: str = "",
-         slices: Iterable[str] = ()):  # fmt: skip
+         slices: Iterable[str] = (), dpi: float = 300):  # fmt: skip
     """The picture that `tubule plot` makes, as a matplotlib.figure.Figure. Needs the packages matplotlib and h5py.
 
     what      a Result, several ones (labelled by what differs in their cases), or names of result files; a Scan that
@@ -25,6 +25,7 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
     colour    of surfaces: "u_n", "H", "K", "p"
     series    draws these series against the series x, and nothing else
     quantity, slices    of a scan: what its map shows; KEY=VALUE of axes that are cut
+    dpi       pixels per inch, 30 to 1200
     The others are as the options of `tubule plot`. Raises ValueError for what cannot be drawn.
 
     >>> figure = draw(tubule.run(tube), kind="energy")
@@ -39,7 +40,7 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
     outputs = [os.fspath(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
     try:
         style.check_outputs(outputs)
-        with matplotlib.rc_context(style.SETTINGS):
+        with matplotlib.rc_context(style.SETTINGS), style.resolution(dpi):
             file = _scan_file(what)
             if file is not None:
                 figure = scan.figure_of(file, quantity, list(slices))

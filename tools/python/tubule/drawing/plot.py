@@ -46,6 +46,7 @@ def arguments():
     parser.add_argument("--from", type=float, dest="low", help="from this value of it")
     parser.add_argument("--to", type=float, dest="high", help="up to this one")
     parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
+    parser.add_argument("--dpi", type=float, default=style.DPI, help="pixels per inch")
     parser.add_argument("--movie", default="", help="film to write, .mp4 or .gif, and nothing else")
     parser.add_argument("--fps", type=float, default=10.0, help="of a film: frames per second, 0.1 to 100")
     parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
@@ -218,4 +219,9 @@ def main():
             return 130
         command_line.say(options.movie, sys.stdout)
         return 0
-    return command_line.run(lambda pictures: draw_any(options, pictures), outputs, str)
+
+    def draw(pictures):
+        with style.resolution(options.dpi):
+            draw_any(options, pictures)
+
+    return command_line.run(draw, outputs, str)

@@ -1,6 +1,7 @@
 """Style and output of pictures."""
 
 import os
+from contextlib import contextmanager
 
 import matplotlib.pyplot as plt
 
@@ -8,7 +9,8 @@ from .labels import formula, number
 from .results import BadInput
 
 WIDTH = 7.0  # inches: the text width of a two-column page
-DPI = 300  # of PNG, and of pictures within SVG and PDF
+DPI = 300  # of PNG, and of pictures within SVG and PDF; see resolution()
+DPI_RANGE = 30, 1200
 FORMATS = (".png", ".svg", ".pdf")
 MARKERS = "os^Dv<>p"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # of energy terms; the total is solid
@@ -41,6 +43,19 @@ def apply():
     """For a process that does nothing but draw."""
     plt.switch_backend("agg")  # no windows
     plt.rcParams.update(SETTINGS)
+
+
+@contextmanager
+def resolution(dpi):
+    """Draws and writes with this DPI meanwhile."""
+    global DPI
+    if not DPI_RANGE[0] <= dpi <= DPI_RANGE[1]:
+        raise BadInput(f"--dpi: {number(dpi)} is not between {DPI_RANGE[0]} and {DPI_RANGE[1]} pixels per inch")
+    before, DPI = DPI, dpi
+    try:
+        yield
+    finally:
+        DPI = before
 
 
 def line_colours(n):

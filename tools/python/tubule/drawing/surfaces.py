@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from . import flow, raster
+from . import flow, raster, style
 from .colours import Colours, colour_scale, curvature_colours, draw_bar
 from .labels import power, wrapped
 from .results import BadInput
-from .style import DPI, WIDTH, draw_scale_bar, time_title
+from .style import WIDTH, draw_scale_bar, time_title
 from .tubes import caption
 
 MAX_HEIGHT = 5.4  # inches of all rows together
@@ -202,8 +202,8 @@ class SurfacePanel:
 
     def _samples(self, surface, row, size):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
-        per_pixel = self.scale * DPI  # pixels per unit of length
-        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * DPI)) for extent in (size.width, size.height))
+        per_pixel = self.scale * style.DPI  # pixels per unit of length
+        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in (size.width, size.height))
         rim = (np.array([wide, tall]) / per_pixel - (size.width, size.height)) / 2
         fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]
         if self.arrows:
@@ -230,10 +230,10 @@ class SurfacePanel:
             y = self.top - self.middles[row * self.pictures + (0 if self.beside else picture)]
             image = raster.shaded(samples, quantity.colours.rgb(samples.values[there, picture]))
             # On whole pixels, so that nothing is drawn in between.
-            left, low = round(x * DPI - wide / 2) / DPI, round(y * DPI - tall / 2) / DPI
+            left, low = round(x * style.DPI - wide / 2) / style.DPI, round(y * style.DPI - tall / 2) / style.DPI
             axes.imshow(
                 image,
-                extent=(left, left + wide / DPI, low, low + tall / DPI),
+                extent=(left, left + wide / style.DPI, low, low + tall / style.DPI),
                 interpolation="none",
                 aspect="auto",
                 zorder=2,
@@ -241,8 +241,8 @@ class SurfacePanel:
             motion = self.motions[row]
             u_t = motion.scale(motion.u_t, surface) if quantity.name == "u_n" else 0
             if u_t:
-                per_inch, velocity = DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
-                flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / DPI, per_inch)
+                per_inch, velocity = style.DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
+                flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / style.DPI, per_inch)
         words = self.captions[row][index]
         if words:
             below = y - self.scale * self.heights[row] / 2 - 0.05
