@@ -27,6 +27,9 @@ constexpr double shortest_step = 1e-9;         // of the relaxation time: shorte
 // Nodes of the coarser run of a pair are so much farther apart, and turn so much more.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
+// A coarser run gets over some steps of the run in so many trials at most: the trials of one whose mesh is no longer good
+// enough would otherwise have no end.
+constexpr int most_at_once = 40;
 constexpr double one_condition = 1e-6;  // lack of volume, relative: below, meshes cannot keep both area and volume
 constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
 constexpr double kept = 1e-8;           // area and volume, relative: a larger drift is reported
@@ -306,9 +309,16 @@ void MotionAttempt::advance() {
 
 void MotionAttempt::advance_to(double time) {
     until_ = time;
+    memory_.next_step = time - state_.time;
+    const auto tried = [this] { return memory_.count.steps + memory_.count.rejected; };
+    const auto before = tried();
     while (!stop_ && is_before(state_.time, time)) {
-        memory_.next_step = time - state_.time;
         advance();
+        if (!stop_ && tried() - before > most_at_once)
+            end({Stop::resolution_lost, state_.time,
+                 fmt::format("{} triangles need steps of {:.2g} where the run takes {:.2g}", summary.elements,
+                             memory_.next_step, time - state_.time),
+                 ""});
     }
 }
 

@@ -11,6 +11,7 @@
 
 #include "common/case/read.hpp"
 #include "common/run/energy_trace.hpp"
+#include "surface3d/run/motion_attempt.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/run.hpp"
@@ -245,6 +246,25 @@ end = 0.06
 )");
     EXPECT_EQ(o.summary.stop.reason, Stop::finished);
     EXPECT_LT(o.summary.estimated_error, 0.1);
+}
+
+TEST(MotionAttempt, ACoarserRunThatTakesFarShorterStepsIsLost) {
+    Outcome o = begin(wavy, {"model.kind=overdamped"});
+    const Start start(o.c);
+    const RunClock clock(o.c, o.watch);
+    const auto got_to = [&](double tolerance) {
+        MotionAttempt run(o.c, o.watch, clock, {80, tolerance, 0, 1, Role::fewer_triangles}, nullptr);
+        run.begin(start);
+        run.advance_to(1e-3);
+        EXPECT_EQ(run.stop().has_value(), tolerance < 1e-6);
+        if (run.stop()) {
+            EXPECT_EQ(run.stop()->reason, Stop::resolution_lost);
+            EXPECT_EQ(run.stop()->message.find("80 triangles need steps of "), 0u) << run.stop()->message;
+        }
+        return run.state().time;
+    };
+    EXPECT_DOUBLE_EQ(got_to(1e-4), 1e-3);
+    EXPECT_LT(got_to(1e-9), 1e-3);
 }
 
 TEST(MotionRun, TheOtherRunHasOtherElementsWhereFewerTrianglesLoseTheSurface) {
