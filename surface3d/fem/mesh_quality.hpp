@@ -6,9 +6,9 @@
 
 namespace tubule::surface3d {
 
-// The shape that the map of a cell gives to a small equilateral triangle: sqrt(3) area/(mean of its squared sides), 1
-// if it stays equilateral, 0 if it has no area; negative where the cell folds, its normal being turned by 90 degrees or
-// more from that in its middle. At the worst of the points where integrals are taken.
+// The shape that the map of a cell gives to a small equilateral triangle: 4 area/sqrt(3)/(mean of its squared sides),
+// 1 if it stays equilateral, 0 if it has no area; negative where the cell folds, its normal being turned by 90 degrees
+// or more from that in its middle. At the worst of the points where integrals are taken.
 struct MeshQuality {
     double worst = 1, mean = 1;  // of the cells
     int worst_cell = -1;
