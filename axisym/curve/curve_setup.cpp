@@ -83,7 +83,7 @@ void fix_H0(const Case& c, CurveForms& forms, const Eigen::VectorXd& x) {
     try {
         forms.fix_H0(x);
     } catch (const std::invalid_argument& error) {
-        throw complaint(c, "energy.H0", error.what());
+        throw complaint_about_H0(c, error.what());
     }
 }
 

@@ -104,13 +104,12 @@ void check_varying_H0(const Case& c, const Meridian& start) {
     for (int i = 0; i <= points; ++i) {
         const double area = static_cast<double>(i) / points, here = H0(area), there = H0(1 - area);
         if (!std::isfinite(here))
-            throw complaint(c, "energy.H0", fmt::format("is no number where {:.4g} of the area is below", area));
+            throw complaint_about_H0(c, fmt::format("is no number where {:.4g} of the area is below", area));
         if (symmetric && std::abs(here - there) > 1e-6 * (1 + std::abs(here)))
-            throw complaint(
-                c, "energy.H0",
-                fmt::format("must be mirror-symmetric as this shape is, but at {:.4g} and {:.4g} of the area "
-                            "it is {:.6g} and {:.6g}",
-                            area, 1 - area, here, there));
+            throw complaint_about_H0(
+                c, fmt::format("must be mirror-symmetric as this shape is, but at {:.4g} and {:.4g} of the area it is "
+                               "{:.6g} and {:.6g}",
+                               area, 1 - area, here, there));
     }
 }
 

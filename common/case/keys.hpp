@@ -421,8 +421,9 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
 template <class Keys>
 void check_varying_H0(Keys& k, const Case& c) {
     if (!c.energy.H0_varies()) return;
-    const std::string number = "must be a number ";
-    k.check("energy.H0", [&]() -> std::string {
+    const bool from_points = c.energy.H0_from_points();
+    const std::string number = from_points ? "has a column H0, but H0 must be a number " : "must be a number ";
+    k.check(from_points ? "shape.path" : "energy.H0", [&]() -> std::string {
         const MotionLaw law = motion_law(c.model);
         if (c.tier == Tier::automatic)
             return number + "in tier \"auto\", whose growth rates are those of a constant H0; try tier = \"axisym\"";

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/case/complaints.hpp"
 #include "common/case/input_file.hpp"
 #include "common/case/overrides.hpp"
 #include "common/case/reader.hpp"
@@ -30,24 +31,49 @@ void merge_terms(Case& c) {
     varied = static_cast<int>(number);
 }
 
+// What its keys say; all that is wrong is thrown. `H0`: from the points of its profile.
+Case read_keys(const toml::table& root, const std::vector<std::string>& sets, const std::string& path,
+               std::shared_ptr<const Formula> H0) {
+    Case c;
+    c.energy.H0_formula = std::move(H0);
+    Complaints complaints;
+    Reader::read(root, "", path + ":1:1", complaints, [&](Reader& k) { keys(k, c); });
+    if (!complaints.any()) return c;
+    for (Complaint& one : complaints.found)  // several keys may cause it, among them an override
+        if (!sets.empty() && !one.place.starts_with("--set "))
+            one.what += fmt::format(" (with --set {})", fmt::join(sets, " --set "));
+    throw CaseErrors(std::move(complaints.found));
+}
+
+// That of the points of a profile, if its file has it; where the file cannot be read, the start says so.
+std::shared_ptr<const Formula> H0_of_points(const Case& c, const toml::table& root, const std::string& case_path) {
+    const auto* file = std::get_if<ProfileFile>(&c.shape);
+    if (!file) return nullptr;
+    const std::filesystem::path path = std::filesystem::path(case_path).parent_path() / file->path;
+    const std::string column = place_of_H0(path);
+    if (column.empty()) return nullptr;
+    if (const toml::node_view given = root.at_path("energy.H0"))
+        throw CaseErrors(
+            {{place(given.node()->source()), "energy.H0",
+              fmt::format("energy.H0 must be absent: {} has H0 in a column; or take that out", column), ""}});
+    try {
+        return read_profile(path, *file).H0;
+    } catch (const ProfileError& error) {
+        throw CaseError(error.what());
+    }
+}
+
 }  // namespace
 
 Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path) {
     toml::table root = parse_toml(text, path);
     for (const std::string& set : sets) apply_override(root, set);
 
-    Case c;
+    Case c = read_keys(root, sets, path, nullptr);
+    if (auto H0 = H0_of_points(c, root, path)) c = read_keys(root, sets, path, std::move(H0));  // other conditions hold
     c.path = path;
     c.text = text;
     c.sets = sets;
-    Complaints complaints;
-    Reader::read(root, "", path + ":1:1", complaints, [&](Reader& k) { keys(k, c); });
-    if (complaints.any()) {
-        for (Complaint& one : complaints.found)  // several keys may cause it, among them an override
-            if (!sets.empty() && !one.place.starts_with("--set "))
-                one.what += fmt::format(" (with --set {})", fmt::join(sets, " --set "));
-        throw CaseErrors(std::move(complaints.found));
-    }
     note_places(root, "", c.places);
     merge_terms(c);
     std::visit(
@@ -71,6 +97,11 @@ CaseError complaint(const Case& c, const std::string& key, const std::string& wh
     std::string held = key;
     while (!held.empty() && !c.places.contains(held)) held.erase(held.find('.') == held.npos ? 0 : held.rfind('.'));
     return CaseError(fmt::format("{}: {} {}", held.empty() ? c.path : c.places.at(held), key, what));
+}
+
+CaseError complaint_about_H0(const Case& c, const std::string& what) {
+    return c.energy.H0_from_points() ? complaint(c, "shape.path", "has a column H0, but H0 " + what)
+                                     : complaint(c, "energy.H0", what);
 }
 
 }  // namespace tubule

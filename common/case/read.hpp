@@ -26,6 +26,9 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
 // absent, that of its table.
 CaseError complaint(const Case& c, const std::string& key, const std::string& what);
 
+// The same of a spontaneous curvature that varies, which may come from the file of a profile.
+CaseError complaint_about_H0(const Case& c, const std::string& what);
+
 // The case as TOML text that stands alone: overrides applied, defaults written out. Comments are not kept.
 std::string effective_toml(const Case& c);
 

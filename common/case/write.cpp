@@ -69,6 +69,7 @@ public:
 
     void number_or_formula(const std::string& key, double number, const std::shared_ptr<const Formula>& formula,
                            std::span<const std::string_view>) {
+        if (formula && formula->text.empty()) return;  // from the file of a profile
         line(key, formula ? toml_string(formula->text) : toml_number(number));
     }
 

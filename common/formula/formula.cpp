@@ -238,7 +238,39 @@ std::string_view words_for(Op op) {
     }
 }
 
+// Chebyshev's polynomials of y = 1 - 2 x, by their recursion and its derivatives.
+FunctionValues polynomial_values(const std::vector<double>& c, double x) {
+    const double y = 1 - 2 * x;
+    FunctionValues before{0, 0, 0}, here{1, 0, 0}, sum{0, 0, 0};
+    for (std::size_t k = 0; k < c.size(); ++k) {
+        sum = {sum.f + c[k] * here.f, sum.f1 - 2 * c[k] * here.f1, sum.f2 + 4 * c[k] * here.f2};
+        const double twice = k == 0 ? 1 : 2;
+        const FunctionValues next{twice * y * here.f - before.f, twice * (here.f + y * here.f1) - before.f1,
+                                  twice * (2 * here.f1 + y * here.f2) - before.f2};
+        before = here, here = next;
+    }
+    return sum;
+}
+
+FunctionValues wave_values(const std::vector<double>& c, double x) {
+    FunctionValues sum{c[0], 0, 0};
+    for (std::size_t k = 1; k + 1 < c.size(); k += 2) {
+        const double q = std::numbers::pi * static_cast<double>(k + 1), cosine = std::cos(q * x),
+                     sine = std::sin(q * x), wave = c[k] * cosine + c[k + 1] * sine;
+        sum = {sum.f + wave, sum.f1 + q * (c[k + 1] * cosine - c[k] * sine), sum.f2 - q * q * wave};
+    }
+    return sum;
+}
+
 }  // namespace
+
+Formula fitted_formula(Op op, std::vector<double> coefficients) {
+    Formula out;
+    out.steps = {{.op = Op::variable},
+                 {.op = op, .coefficients = std::make_shared<const std::vector<double>>(std::move(coefficients))}};
+    out.depth = 1;
+    return out;
+}
 
 Formula parse_formula(const std::string& text, std::span<const std::string_view> variables) {
     return Parser(text, variables).parse();
@@ -284,6 +316,10 @@ FunctionValues function_values(const Formula::Step& step, double x) {
             const double f1 = 1 / (1 + x * x);
             return {std::atan(x), f1, -2 * x * f1 * f1};
         }
+        case Op::polynomial:
+            return polynomial_values(*step.coefficients, x);
+        case Op::waves:
+            return wave_values(*step.coefficients, x);
         default:
             break;
     }

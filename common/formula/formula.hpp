@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -42,15 +43,20 @@ struct Formula {
         sinh,
         cosh,
         tanh,
-        atan
+        atan,
+        polynomial,  // of texts none; see Step::coefficients
+        waves
     };
     struct Step {
         Op op;
         double value = 0;  // of a constant, an exponent
         int number = 0;    // of a variable, a whole exponent >= 2
         std::size_t column = 1;
+        // Of a fit, for x in [0, 1]: of a polynomial those of T_k(1 - 2 x), k = 0, 1, ..., Chebyshev's; of waves those
+        // of 1, cos(2 pi x), sin(2 pi x), cos(4 pi x), ...
+        std::shared_ptr<const std::vector<double>> coefficients = {};
     };
-    std::string text;
+    std::string text;  // empty: made from numbers, not from a text
     std::vector<Step> steps;
     std::size_t depth = 0;  // of the stack
 };
@@ -58,6 +64,9 @@ struct Formula {
 // Variables are told apart by their names. Allowed: numbers, pi, + - * / ^ and parentheses, sqrt exp log sin cos sinh
 // cosh tanh atan. Exponents are constants. Throws FormulaError.
 Formula parse_formula(const std::string& text, std::span<const std::string_view> variables);
+
+// A fit as a formula of its first variable: Op::polynomial or Op::waves.
+Formula fitted_formula(Formula::Op op, std::vector<double> coefficients);
 
 // Whether it depends on the variable of this number.
 bool uses(const Formula& formula, int variable);

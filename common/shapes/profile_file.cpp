@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -17,40 +18,55 @@ namespace {
 using Kind = ProfileCurve::Kind;
 
 constexpr int fewest_points = 9, most_points = 20000, most_waves = 256;
-constexpr double default_tolerance = 1e-4;  // of the largest extent
+constexpr double default_tolerance = 1e-4;  // of the largest extent, of the largest |H0|
 constexpr double at_end = 1e-6;             // of the largest extent: r = 0 at a pole, ends that are the same point
 constexpr int rounds = 4;                   // of fitting, each with the arc length of the curve before
 constexpr int points_per_wave = 24;         // of the curve that is made of a fit
 
-struct Point {
-    double r, z;
-    int line;
+// In a file; columns count characters from 1.
+struct Place {
+    int line, column;
 };
 
-[[noreturn]] void refuse(const std::filesystem::path& path, int line, const std::string& what) {
-    throw ProfileError(line > 0 ? fmt::format("{}:{}: {}", path.string(), line, what)
-                                : fmt::format("{}: {}", path.string(), what));
+struct Point {
+    double r, z, H0;  // H0 is 0 where the file has none
+    Place at;
+};
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what) {
+    throw ProfileError(fmt::format("{}: {}", path.string(), what));
+}
+[[noreturn]] void refuse(const std::filesystem::path& path, Place at, const std::string& what) {
+    throw ProfileError(fmt::format("{}:{}:{}: {}", path.string(), at.line, at.column, what));
 }
 
-// Cells between commas, semicolons or blanks.
-std::vector<std::string> cells(const std::string& line) {
-    std::vector<std::string> out{""};
+struct Cell {
+    std::string text;
+    int column;
+};
+
+// Between commas, semicolons or blanks.
+std::vector<Cell> cells(const std::string& line) {
+    std::vector<Cell> out{{"", 1}};
     bool open = false;  // a blank ends a cell, but blanks beside a comma do not make one
-    for (const char c : line) {
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        const char c = line[i];
+        const int column = static_cast<int>(i) + 1;
         const bool blank = c == ' ' || c == '\t' || c == '\r', comma = c == ',' || c == ';';
-        if (comma)
-            out.emplace_back(), open = false;
-        else if (blank)
-            open = !out.back().empty();
-        else {
-            if (open) out.emplace_back();
-            out.back() += c, open = false;
+        if (comma) {
+            out.push_back({"", column + 1}), open = false;
+        } else if (blank) {
+            open = !out.back().text.empty();
+        } else {
+            if (open) out.push_back({"", column});
+            if (out.back().text.empty()) out.back().column = column;
+            out.back().text += c, open = false;
         }
     }
     return out;
 }
 
-std::optional<double> number(const std::string& cell) {
+std::optional<double> number_in(const std::string& cell) {
     double value = 0;
     const char* end = cell.data() + cell.size();
     const auto [at, error] = std::from_chars(cell.data(), end, value);
@@ -58,37 +74,108 @@ std::optional<double> number(const std::string& cell) {
     return value;
 }
 
-std::vector<Point> read_points(const std::filesystem::path& path) {
-    std::ifstream file(path);
-    if (!file || !std::filesystem::is_regular_file(path)) refuse(path, 0, "cannot be read");
-    std::vector<Point> out;
-    std::size_t r = 0, z = 1, columns = 2;
+// The rows of a file: what is neither empty nor a comment.
+class Rows {
+public:
+    explicit Rows(const std::filesystem::path& path) : file_(path) {}
+    // The next row; false at the end.
+    bool next() {
+        for (std::string text; std::getline(file_, text);) {
+            ++line;
+            if (line == 1 && text.starts_with("\xef\xbb\xbf")) text.replace(0, 3, "");
+            const std::size_t first = text.find_first_not_of(" \t\r");
+            if (first == text.npos || text[first] == '#') continue;
+            row = cells(text);
+            return true;
+        }
+        return false;
+    }
+
     int line = 0;
-    bool header_allowed = true;
-    for (std::string text; std::getline(file, text);) {
-        ++line;
-        if (line == 1 && text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
-        const std::size_t first = text.find_first_not_of(" \t\r");
-        if (first == text.npos || text[first] == '#') continue;
-        const std::vector<std::string> row = cells(text.substr(first));
-        const auto named = [&](const char* name) { return std::find(row.begin(), row.end(), name) - row.begin(); };
-        if (header_allowed && !number(row[0])) {
-            r = static_cast<std::size_t>(named("r")), z = static_cast<std::size_t>(named("z")), columns = row.size();
-            if (r == columns || z == columns) refuse(path, line, "a heading must name the columns r and z");
-            header_allowed = false;
+    std::vector<Cell> row;
+
+private:
+    std::ifstream file_;
+};
+
+// Which column holds what; those of other names are ignored.
+struct Columns {
+    std::size_t r = 0, z = 1, count = 2;
+    std::optional<std::size_t> H0;
+};
+
+std::optional<std::size_t> column_of(const std::vector<Cell>& row, std::string_view name) {
+    const auto found = std::ranges::find(row, name, &Cell::text);
+    if (found == row.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - row.begin());
+}
+
+// Nobody means to have H0 ignored.
+bool means_H0(std::string name) {
+    std::erase_if(name, [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); });
+    std::ranges::transform(name, name.begin(), [](char c) { return static_cast<char>(std::tolower(c)); });
+    return name == "h0" || name == "c0" || name == "spontaneouscurvature";
+}
+
+Columns columns_of(const std::filesystem::path& path, int line, const std::vector<Cell>& heading) {
+    const auto r = column_of(heading, "r"), z = column_of(heading, "z");
+    if (!r || !z) refuse(path, {line, heading[0].column}, "a heading must name the columns r and z");
+    const Columns out{*r, *z, heading.size(), column_of(heading, "H0")};
+    for (std::size_t i = 0; i < heading.size(); ++i) {
+        const std::string& name = heading[i].text;
+        const bool known = i == out.r || i == out.z || i == out.H0;
+        if (!known && (name == "r" || name == "z" || name == "H0"))
+            refuse(path, {line, heading[i].column}, fmt::format("a second column {}", name));
+        if (!known && means_H0(name))
+            refuse(path, {line, heading[i].column},
+                   fmt::format("there is no column '{:.40}': the spontaneous curvature is called H0", name));
+    }
+    return out;
+}
+
+// The values of a row, as many as there are columns.
+Point point_of(const std::filesystem::path& path, int line, const std::vector<Cell>& row, const Columns& columns) {
+    if (row.size() != columns.count)
+        refuse(path, {line, row[std::min(row.size() - 1, columns.count)].column},
+               fmt::format("has {} value{} where {} are expected: r, z{}", row.size(), row.size() == 1 ? "" : "s",
+                           columns.count, columns.H0 ? ", H0" : ""));
+    const auto value = [&](std::size_t column, const char* name) {
+        const auto& [text, at] = row[column];
+        if (text.empty()) refuse(path, {line, at}, fmt::format("{} is missing", name));
+        const auto found = number_in(text);
+        if (!found)
+            refuse(path, {line, at},
+                   fmt::format("'{:.40}{}' is not a finite number", text, text.size() > 40 ? "..." : ""));
+        return *found;
+    };
+    return {value(columns.r, "r"),
+            value(columns.z, "z"),
+            columns.H0 ? value(*columns.H0, "H0") : 0,
+            {line, row[columns.r].column}};
+}
+
+struct Points {
+    std::vector<Point> points;
+    bool have_H0 = false;
+};
+
+Points read_points(const std::filesystem::path& path) {
+    Rows rows(path);
+    Points out;
+    Columns columns;
+    for (bool first = true; rows.next(); first = false) {
+        if (first && !number_in(rows.row[0].text)) {
+            columns = columns_of(path, rows.line, rows.row);
             continue;
         }
-        header_allowed = false;
-        if (row.size() != columns)
-            refuse(path, line, fmt::format("has {} values where {} are expected: r, z", row.size(), columns));
-        const auto at = number(row[r]), up = number(row[z]);
-        if (const std::string& cell = row[at ? z : r]; !at || !up)
-            refuse(path, line, fmt::format("'{:.40}{}' is not a finite number", cell, cell.size() > 40 ? "..." : ""));
-        if (out.size() == most_points) refuse(path, line, fmt::format("more than {} points", most_points));
-        out.push_back({*at, *up, line});
+        const Point point = point_of(path, rows.line, rows.row, columns);
+        if (out.points.size() == most_points) refuse(path, point.at, fmt::format("more than {} points", most_points));
+        out.points.push_back(point);
     }
-    if (out.size() < fewest_points)
-        refuse(path, line, fmt::format("{} points are too few: a profile needs {}", out.size(), fewest_points));
+    if (out.points.size() < fewest_points)
+        refuse(path, {std::max(rows.line, 1), 1},
+               fmt::format("{} points are too few: a profile needs {}", out.points.size(), fewest_points));
+    out.have_H0 = columns.H0.has_value();
     return out;
 }
 
@@ -122,10 +209,10 @@ void refuse_crossing(const std::filesystem::path& path, const std::vector<Point>
                 std::min(points[i].z, points[i + 1].z) > std::max(points[j].z, points[j + 1].z))
                 continue;
             if (cross(points[i], points[i + 1], points[j], points[j + 1]))
-                refuse(path, points[j + 1].line,
+                refuse(path, points[j + 1].at,
                        fmt::format("the profile crosses itself: the segment that ends here meets that from line {} to "
                                    "line {}; points must be in order along the profile",
-                                   points[i].line, points[i + 1].line));
+                                   points[i].at.line, points[i + 1].at.line));
         }
 }
 
@@ -141,19 +228,23 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
         kind = Kind::tube;
         if (points.back().z < points.front().z) std::ranges::reverse(points);
         const Point first = points.front();
-        if (meets(first, points.back(), *file.length)) points.pop_back();
+        Point end{first.r, first.z + *file.length, first.H0, points.back().at};
+        if (meets(first, points.back(), *file.length)) {
+            end.H0 = points.back().H0;
+            points.pop_back();
+        }
         if (!(points.back().z - first.z < *file.length))
-            refuse(path, points.back().line,
+            refuse(path, points.back().at,
                    fmt::format("the profile rises by {:.6g}, more than shape.length = {:.6g}",
                                points.back().z - first.z, *file.length));
-        points.push_back({first.r, first.z + *file.length, points.back().line});
+        points.push_back(end);
     } else if (std::abs(points.front().r) <= same && std::abs(points.back().r) <= same) {
         points.front().r = points.back().r = 0;
     } else if (meets(points.front(), points.back(), 0)) {
         kind = Kind::ring;
-        points.back() = {points.front().r, points.front().z, points.back().line};
+        points.back().r = points.front().r, points.back().z = points.front().z;
     } else {
-        refuse(path, points.back().line,
+        refuse(path, points.back().at,
                fmt::format(
                    "the profile is not closed: r = {:.6g} at its first and {:.6g} at its last point; it must begin "
                    "and end on the axis, r = 0, or end where it begins; one that is periodic needs shape.length",
@@ -162,9 +253,9 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool pole = kind == Kind::cell && (i == 0 || i + 1 == points.size());
         if (!pole && !(points[i].r > 0))
-            refuse(path, points[i].line, fmt::format("r = {:.6g}: the profile meets the axis", points[i].r));
+            refuse(path, points[i].at, fmt::format("r = {:.6g}: the profile meets the axis", points[i].r));
         if (i > 0 && points[i].r == points[i - 1].r && points[i].z == points[i - 1].z)
-            refuse(path, points[i].line, "the same point as before");
+            refuse(path, points[i].at, "the same point as before");
     }
     refuse_crossing(path, points, file.length.value_or(0), tolerance);
     double volume = 0;  // below 0 where the profile runs downwards on the outside
@@ -223,25 +314,37 @@ double nearest(const SmoothProfile& fit, const Point& p, double s, bool fixed) {
     return s;
 }
 
-// Parameters become fractions of the arc length of the curve.
-void measure_by_length(const SmoothProfile& fit, std::vector<double>& s) {
+// Parameters become fractions of the integral of density(point) over the parameter.
+template <class Density>
+void measure_by(const Density& density, const SmoothProfile& fit, std::vector<double>& s) {
     const int n = 16 * fit.waves + 64;
-    std::vector<double> length(n + 1, 0.0);
-    const auto speed = [&](double at) {
-        const auto [r, r1, z, z1] = point_at(fit, at);
-        return std::hypot(r1, z1);
-    };
+    std::vector<double> sum(n + 1, 0.0);
+    const auto at_parameter = [&](double at) { return density(point_at(fit, at)); };
     for (int i = 0; i < n; ++i)  // Simpson
-        length[i + 1] = length[i] + (speed(double(i) / n) + 4 * speed((i + 0.5) / n) + speed((i + 1.0) / n)) / (6 * n);
+        sum[i + 1] =
+            sum[i] +
+            (at_parameter(double(i) / n) + 4 * at_parameter((i + 0.5) / n) + at_parameter((i + 1.0) / n)) / (6 * n);
     for (double& at : s) {
         const int i = std::clamp(static_cast<int>(at * n), 0, n - 1);
         const double from = double(i) / n, part = at - from;
-        at = (length[i] + part / 6 * (speed(from) + 4 * speed(from + part / 2) + speed(at))) / length[n];
+        at = (sum[i] + part / 6 * (at_parameter(from) + 4 * at_parameter(from + part / 2) + at_parameter(at))) / sum[n];
     }
 }
 
+double length_of(const std::array<double, 4>& point) {
+    return std::hypot(point[1], point[3]);
+}
+double area_of(const std::array<double, 4>& point) {
+    return point[0] * length_of(point);
+}
+
 // Fits of so many waves: coefficients, and how far the points are.
-SmoothProfile fit_waves(Kind kind, const std::vector<Point>& points, double length, int waves, std::vector<double> s) {
+// The parameters of the points come with it.
+struct Fit {
+    SmoothProfile profile;
+    std::vector<double> s;
+};
+Fit fit_waves(Kind kind, const std::vector<Point>& points, double length, int waves, std::vector<double> s) {
     SmoothProfile fit{.kind = kind, .length = length, .r = {}, .z = {}};
     const int n = static_cast<int>(points.size());
     fit.points = n, fit.waves = waves;
@@ -256,11 +359,50 @@ SmoothProfile fit_waves(Kind kind, const std::vector<Point>& points, double leng
             const auto at = point_at(fit, s[i]);
             const double off = std::hypot(at[0] - points[i].r, at[2] - points[i].z);
             fit.distance = std::isfinite(off) ? std::max(fit.distance, off) : std::numeric_limits<double>::infinity();
-            if (!std::isfinite(off)) return fit;  // numbers so far apart that no waves fit them
+            if (!std::isfinite(off)) return {fit, s};  // numbers so far apart that no waves fit them
         }
-        if (round + 1 < rounds) measure_by_length(fit, s);
+        if (round + 1 < rounds) measure_by(length_of, fit, s);
     }
-    return fit;
+    return {fit, s};
+}
+
+// More waves are not determined by so many points, or take too long.
+int most_waves_of(Kind kind, std::size_t points) {
+    return std::min(static_cast<int>(points) / (kind == Kind::cell ? 2 : 4), most_waves);
+}
+
+// H0 by the fewest waves of the area below, which are smooth at the poles, too.
+void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points, const ProfileFile& file, Fit& fit) {
+    std::vector<double> area = fit.s;
+    measure_by(area_of, fit.profile, area);
+    const Kind kind = fit.profile.kind;
+    std::vector<double> at = area;  // T_k(1 - 2 area) = cos(k pi at) of a cell
+    if (kind == Kind::cell)
+        for (double& a : at) a = std::acos(std::clamp(1 - 2 * a, -1.0, 1.0)) / pi;
+    const auto n = static_cast<Eigen::Index>(points.size());
+    Eigen::VectorXd values(n);
+    for (Eigen::Index i = 0; i < n; ++i) values[i] = points[i].H0;
+    const double tolerance = file.H0_tolerance.value_or(default_tolerance * values.cwiseAbs().maxCoeff());
+    double best = std::numeric_limits<double>::infinity();
+    Place worst = points.front().at;
+    for (int waves = 0; waves <= most_waves_of(kind, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
+        const Eigen::VectorXd c = least_squares({kind, waves, false}, at, values);
+        const Formula H0 = fitted_formula(kind == Kind::cell ? Formula::Op::polynomial : Formula::Op::waves,
+                                          {c.data(), c.data() + c.size()});
+        double off = 0;
+        Place here = worst;
+        for (Eigen::Index i = 0; i < n; ++i)
+            if (const double d = std::abs(evaluate(H0, &area[i]) - values[i]); !(d <= off))
+                off = d, here = points[i].at;
+        if (!(off < best)) continue;
+        best = off, worst = here;
+        fit.profile.H0 = std::make_shared<const Formula>(H0), fit.profile.H0_distance = off;
+        if (off <= tolerance) return;
+    }
+    refuse(path, worst,
+           fmt::format("no smooth H0 comes within {:.3g} of all {} values: the best is {:.3g} off, here; set "
+                       "shape.H0_tolerance to that, or give transitions a width and more points",
+                       tolerance, points.size(), best));
 }
 
 }  // namespace
@@ -278,7 +420,8 @@ std::array<double, 4> point_at(const SmoothProfile& profile, double s) {
 }
 
 SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile& file) {
-    std::vector<Point> points = read_points(path);
+    if (!std::filesystem::is_regular_file(path) || !std::ifstream(path)) refuse(path, "cannot be read");
+    auto [points, have_H0] = read_points(path);
     const double tolerance = file.tolerance.value_or(default_tolerance * extent(points));
     const Kind kind = put_in_order(path, points, file, tolerance);
     std::vector<double> s{0};
@@ -286,32 +429,40 @@ SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile&
         s.push_back(s.back() + std::hypot(points[i].r - points[i - 1].r, points[i].z - points[i - 1].z));
     for (double& at : s) at /= s.back();
     s.back() = 1;
-    const int per_wave = kind == Kind::cell ? 2 : 4;  // fewer points do not determine the waves
-    const int most = std::min(static_cast<int>(points.size()) / per_wave, most_waves);
-    SmoothProfile best;
+    Fit fit;
+    SmoothProfile& best = fit.profile;
     best.distance = std::numeric_limits<double>::infinity();
-    for (int waves = 2; waves <= most; waves = std::max(waves + 1, waves * 6 / 5)) {
-        SmoothProfile fit = fit_waves(kind, points, file.length.value_or(0), waves, s);
-        if (fit.distance < best.distance) best = std::move(fit);
+    for (int waves = 2; waves <= most_waves_of(kind, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
+        Fit next = fit_waves(kind, points, file.length.value_or(0), waves, s);
+        if (next.profile.distance < best.distance) fit = std::move(next);
         if (best.distance <= tolerance) break;
     }
     if (!(best.distance <= tolerance))
-        refuse(path, 0,
-               fmt::format("no smooth curve comes within {:.3g} of all {} points: the best is {:.3g} off; set "
-                           "shape.tolerance to that, or give more points where the profile bends",
-                           tolerance, points.size(), best.distance));
+        refuse(path, fmt::format("no smooth curve comes within {:.3g} of all {} points: the best is {:.3g} off; set "
+                                 "shape.tolerance to that, or give more points where the profile bends",
+                                 tolerance, points.size(), best.distance));
     for (int i = 1; i < points_per_wave * best.waves; ++i) {
         const auto at = point_at(best, double(i) / (points_per_wave * best.waves));
         if (!(at[0] > 0))
-            refuse(path, 0,
+            refuse(path,
                    fmt::format("the smooth curve meets the axis at z = {:.6g}: set a smaller shape.tolerance", at[2]));
     }
+    if (have_H0) fit_H0(path, points, file, fit);
     return best;
 }
 
+std::string place_of_H0(const std::filesystem::path& path) {
+    if (std::error_code error; !std::filesystem::is_regular_file(path, error)) return {};
+    Rows rows(path);
+    if (!rows.next() || number_in(rows.row[0].text)) return {};
+    const auto column = column_of(rows.row, "H0");
+    return column ? fmt::format("{}:{}:{}", path.string(), rows.line, rows.row[*column].column) : "";
+}
+
 std::string SmoothProfile::note() const {
-    return fmt::format("a smooth curve of {} waves is at most {:.2g} from the {} points of the profile", waves,
-                       distance, points);
+    const std::string fitted = fmt::format(
+        "a smooth curve of {} waves is at most {:.2g} from the {} points of the profile", waves, distance, points);
+    return H0 ? fmt::format("{}, a smooth H0 at most {:.2g} from its values", fitted, H0_distance) : fitted;
 }
 
 Meridian meridian(const SmoothProfile& profile) {
@@ -332,6 +483,21 @@ ProfileCurve profile_curve(const SmoothProfile& profile) {
     if (profile.kind == Kind::cell) r.front() = r.back() = 0;
     if (profile.kind != Kind::cell) r.back() = r.front(), z.back() = z.front() + profile.length;
     return profile_curve(r, z, profile.length);
+}
+
+BlendedCurve area_below(const SmoothProfile& profile, const ProfileCurve& curve) {
+    const std::size_t n = curve.functions.x.size();
+    std::vector<double> area(n);
+    for (std::size_t i = 0; i < n; ++i) area[i] = static_cast<double>(i) / static_cast<double>(n - 1);
+    measure_by(area_of, profile, area);
+    if (profile.kind == Kind::cell) {
+        area.back() = 1;
+    } else {
+        std::vector<double> s = curve.functions.x;
+        for (std::size_t i = 0; i < n; ++i) area[i] -= s[i];
+        area.back() = area.front();
+    }
+    return along_curve(curve, std::vector<double>(n, 0.0), area);
 }
 
 }  // namespace tubule

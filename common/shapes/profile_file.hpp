@@ -1,14 +1,17 @@
-// Shape "profile": a surface of revolution from points (r, z) in a file, CSV, with a smooth curve fitted to them.
+// Shape "profile": a surface of revolution from points (r, z) in a file, CSV, with a smooth curve fitted to them; and
+// the spontaneous curvature, where the file has that of each point.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "common/formula/formula.hpp"
 #include "common/shapes/meridian.hpp"
 #include "common/shapes/profile_curve.hpp"
 
@@ -19,6 +22,7 @@ struct ProfileFile {
     std::string path;                 // relative to the case file
     std::optional<double> length;     // of a period; without, the profile is closed
     std::optional<double> tolerance;  // how far the curve may be from the points; by default 1e-4 of the largest extent
+    std::optional<double> H0_tolerance;  // how far H0 may be from its values; by default 1e-4 of the largest |H0|
 };
 
 template <class Keys>
@@ -26,9 +30,10 @@ void keys(Keys& k, ProfileFile& file) {
     k.text("path", file.path, k.required);
     k.number("length", file.length, {.above = 0});
     k.number("tolerance", file.tolerance, {.above = 0});
+    k.number("H0_tolerance", file.H0_tolerance, {.above = 0});
 }
 
-// What is wrong with such a file: "FILE:LINE: what".
+// What is wrong with such a file: "FILE:LINE:COLUMN: what".
 class ProfileError : public std::invalid_argument {
 public:
     using std::invalid_argument::invalid_argument;
@@ -42,10 +47,15 @@ struct SmoothProfile {
     Eigen::VectorXd r, z;  // coefficients: of a cell by k, else 1, cos, sin, cos, sin, ...
     double distance = 0;   // of the points, at most, from the curve
     int points = 0, waves = 0;
+    // Of the part of the area below, from 0 to 1, where the file has it: with as few waves as suffice, too.
+    std::shared_ptr<const Formula> H0 = {};
+    double H0_distance = 0;  // of the values, at most
 
     std::string note() const;  // the report of the fit, a sentence
 };
 
+// Where the file has a column H0: "FILE:LINE:COLUMN" of its heading; else, and where it cannot be read, empty.
+std::string place_of_H0(const std::filesystem::path& path);
 // Throws ProfileError.
 SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile& file);
 
@@ -54,5 +64,8 @@ std::array<double, 4> point_at(const SmoothProfile& profile, double s);
 Meridian meridian(const SmoothProfile& profile);
 // Through so many points that the fit counts for more than what is between them.
 ProfileCurve profile_curve(const SmoothProfile& profile);
+// On that curve, as along_curve() has functions: its second one is the part of the area below, without that of s where
+// the curve is no cell.
+BlendedCurve area_below(const SmoothProfile& profile, const ProfileCurve& curve);
 
 }  // namespace tubule

@@ -52,7 +52,7 @@ VectorField start_velocity(const Case& c, const StartMesh& start) {
 Observables observe_start(const Case& c, const StartMesh& start) {
     const SurfaceSpace space(start.mesh);
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
-    return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, start_H0(c, start.mesh));
+    return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, start_H0(c, start));
 }
 
 double free_energy(const Case& c, const Observables& o, double period) {
@@ -75,8 +75,9 @@ double reference_energy(const Case& c, const Observables& o, double period) {
     return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
 }
 
-Eigen::VectorXd start_H0(const Case& c, const CurvedMesh& mesh) {
-    if (!c.energy.H0_varies()) return {};
+Eigen::VectorXd start_H0(const Case& c, const StartMesh& start) {
+    if (!c.energy.H0_varies() || c.energy.H0_from_points()) return start.H0;
+    const CurvedMesh& mesh = start.mesh;
     constexpr double rounding = 1e-6;
     const auto at = [&](const Eigen::Vector3d& x) {
         const double value = evaluate(*c.energy.H0_formula, x.data());
@@ -113,7 +114,7 @@ void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorX
 
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
-    memory.H0 = start_H0(c, start.mesh);
+    memory.H0 = start_H0(c, start);
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, memory.H0);
     require_defined(c, start.mesh, fields.H, fields.K, memory.H0);
     memory.scale.area = o.area, memory.scale.volume = o.volume;

@@ -21,9 +21,9 @@ double free_energy(const Case& c, const Observables& start, double period);
 double error_of_start(const Case& c, const Start& start, int elements, double energy);
 double reference_energy(const Case& c, const Observables& start, double period);
 
-// The spontaneous curvature at the nodes, where it varies; else nothing. Throws CaseError where it is no number, or not
-// the same at both ends of a period.
-Eigen::VectorXd start_H0(const Case& c, const CurvedMesh& mesh);
+// The spontaneous curvature at the nodes, where it varies; else nothing. Throws CaseError where a formula is no number,
+// or not the same at both ends of a period.
+Eigen::VectorXd start_H0(const Case& c, const StartMesh& start);
 
 // Area, volume, reference energy, relaxation of the mesh, how well H is known.
 // Throws CaseError where the formula of the energy is not defined for H, K and H0 at the nodes of the start.

@@ -118,6 +118,26 @@ struct WavedMap {
     }
 };
 
+// The same with a spontaneous curvature of the area below.
+struct ProfileMap : WavedMap {
+    BlendedCurve area_below;  // as tubule::area_below() has it
+    std::shared_ptr<const Formula> H0_of_area;
+
+    double H0_at(const Eigen::Vector3d& p) const {
+        const double along = place_of(surface.curve, base, p).along;
+        const double rise = surface.curve.kind == ProfileCurve::Kind::cell ? 0 : along;
+        const double area = value_at(area_below, along)[1] + rise;
+        return evaluate(*H0_of_area, &area);
+    }
+    Eigen::VectorXd H0(const TriangleMesh& triangles, int order) const {
+        const CurvedMesh nodes =
+            mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return Eigen::Vector3d(H0_at(p), 0, 0); });
+        Eigen::VectorXd out(nodes.size());
+        for (int i = 0; i < out.size(); ++i) out[i] = nodes.nodes[i].x();
+        return out;
+    }
+};
+
 // What is needed for every order of elements is made once for each.
 template <class T>
 using ByOrder = std::shared_ptr<std::map<int, T>>;
@@ -128,7 +148,7 @@ const T& once(const ByOrder<T>& made, int order, const MakeOne& make) {
 }
 
 // Meshes of the shape map(base), of the kind that the case asks for, with exact curvatures where it asks for them, and
-// the velocity of the map if it has one.
+// the velocity and H0 of the map if it has these.
 template <class Base, class Map>
 Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
     const ByOrder<Resolution> resolutions = std::make_shared<std::map<int, Resolution>>();
@@ -153,6 +173,7 @@ Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
         const TriangleMesh flat = triangulation(triangles, order);
         StartMesh start{mapped_mesh(flat, order, map), {}, {}};
         if constexpr (requires { map.velocities(flat, order); }) start.velocity = map.velocities(flat, order);
+        if constexpr (requires { map.H0(flat, order); }) start.H0 = map.H0(flat, order);
         if (exact) start.exact = exact_curvature(start.mesh, exact_nodes(flat, order, map));
         return start;
     };
@@ -216,10 +237,13 @@ struct Prepare {
         return on(base(shape), [shape](const auto& p) { return position(shape, p); });
     }
     Prepared operator()(const WavedProfile& surface) const {
-        const ProfileCurve& curve = surface.curve;
+        return of_profile(surface.curve, [&](const Torus& torus) { return WavedMap{surface, torus}; });
+    }
+    template <class MapOn>
+    Prepared of_profile(const ProfileCurve& curve, const MapOn& map_on) const {
         // Where the torus is only a base, its grid must be one of cells about as long as wide.
         const Torus torus{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
-        const WavedMap map{surface, torus};
+        const auto map = map_on(torus);
         if (curve.kind == ProfileCurve::Kind::ring) return on(torus, map);
         if (curve.kind == ProfileCurve::Kind::cell) return on(profile_of(UnitSphere{}), map);
         return on(profile_of(Cylinder{curve.mean_radius, curve.length}), map);
@@ -236,7 +260,11 @@ struct Prepare {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
         try {
             const SmoothProfile profile = read_profile(path, file);
-            Prepared out = (*this)(WavedProfile{profile_curve(profile), {}, {}});
+            const WavedProfile surface{profile_curve(profile), {}, {}};
+            const auto with_H0 = [&](const Torus& torus) {
+                return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
+            };
+            Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
             out.notes.push_back(profile.note());
             return out;
         } catch (const ProfileError& error) {

@@ -16,6 +16,7 @@ struct StartMesh {
     CurvedMesh mesh;
     std::optional<CurvatureField> exact;  // where the case asks for Recovery::exact
     VectorField velocity = {};            // of the nodes, where the start has one
+    Eigen::VectorXd H0 = {};              // of the nodes, where the file of a profile has it
 };
 
 // The shape of the case, or what is handed over to it. Files are read, checked and fitted once, and so is what meshes

@@ -12,6 +12,7 @@
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/profile_points.hpp"
 #include "tests/support/random_vector.hpp"
 
 #define EXPECT_SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
@@ -20,7 +21,7 @@ namespace tubule::axisym {
 namespace {
 
 using Vector = Eigen::VectorXd;
-using test::message_of, test::random_vector;
+using test::message_of, test::ProfilePoints, test::random_vector;
 
 std::vector<double> uneven_breaks(int n) {
     std::vector<double> breaks = equal_breaks(n);
@@ -239,6 +240,79 @@ TEST(VaryingH0, aConstantFormulaIsTheNumber) {
         const Outcome number = run_text(text, sets), formula = run_text(text, {sets[0], "energy.H0=\"-1 + 0*area\""});
         EXPECT_NEAR(formula.last("energy"), number.last("energy"), 2e-6 * number.summary.reference_energy) << model;
     }
+}
+
+// The unit sphere, on which (1 + z)/2 is the part of the area below, with the domains of the tests above.
+ProfilePoints domains_by_points() {
+    return {
+        200, [](double t) {
+            const double z = -std::cos(pi * t);
+            return std::array{t == 0 || t == 1 ? 0 : std::sin(pi * t), z, -2 - std::tanh(((1 + z) / 2 - 0.6) / 0.1)};
+        }};
+}
+
+TEST(VaryingH0, ofThePointsOfAProfileIsThatOfTheFormula) {
+    // Definition: both say the same, to the tolerances of the fit, 1e-8 and 1e-7; the energy of a run is asked to 1e-6.
+    const ProfilePoints points = domains_by_points();
+    const std::string energy = "[energy]\nk20 = 0.5\n";
+    for (const char* model : {"gradient-flow", "overdamped"}) {
+        SCOPED_TRACE(model);
+        const std::string more = "[time]\nend = 0.1\n[accuracy]\nenergy = 1e-6\n";
+        const std::vector<std::string> sets{std::string("model.kind=") + model, "model.volume=free"};
+        const Outcome formula = run_text(two_domains + more, sets),
+                      column = run_text(energy + points.shape(more), sets);
+        ASSERT_EQ(column.summary.stop.reason, Stop::finished) << column.summary.stop.message;
+        EXPECT_NEAR(column.first("energy"), formula.first("energy"), 1e-6 * formula.summary.reference_energy);
+        EXPECT_NEAR(column.last("energy"), formula.last("energy"), 2e-6 * formula.summary.reference_energy);
+        EXPECT_LT(column.last("energy"), 0.98 * column.first("energy"));
+        EXPECT_NEAR(column.last("height"), formula.last("height"), 1e-5);
+        for (const auto& row : column.log.rows)
+            EXPECT_LT(std::abs(row[column.column("identity_defect")]), 3e-6 * column.summary.reference_energy);
+        const auto [low, high] = std::ranges::minmax(column.array("H0"));
+        EXPECT_NEAR(low, -2 - std::tanh(4), 1e-6);
+        EXPECT_NEAR(high, -2 + std::tanh(6), 1e-6);
+    }
+    // Independent computation: as aCellOfTwoDomainsRests.
+    const Outcome rest =
+        run_text(energy + points.shape("[model]\nvolume = \"free\"\n[equilibrium]\n[accuracy]\nenergy = 1e-8\n"));
+    ASSERT_EQ(rest.summary.stop.reason, Stop::finished) << rest.summary.stop.message;
+    EXPECT_NEAR(rest.last("energy"), 4.3320484329, 1e-6);
+    EXPECT_NEAR(rest.last("height"), 2.1703008982, 1e-5);
+}
+
+TEST(VaryingH0, ofThePointsOfATubeIsThatOfTheFormula) {
+    // Definition: as above; the area of the wavy tube up to z, by integration along it.
+    const auto radius = [](double z) { return 1 + 0.1 * std::cos(pi * z / 4); };
+    const auto area_below = [&](double z) {
+        double sum = 0;
+        const int n = 2000;
+        for (int i = 0; i < n; ++i) {
+            const double at = z * (i + 0.5) / n, slope = -0.1 * pi / 4 * std::sin(pi * at / 4);
+            sum += radius(at) * std::hypot(1, slope) * z / n;
+        }
+        return sum;
+    };
+    const double whole = area_below(8);
+    const ProfilePoints points(160, [&](double t) {
+        return std::array{radius(8 * t), 8 * t, -1 + 0.2 * std::cos(2 * pi * area_below(8 * t) / whole)};
+    });
+    const std::string energy = "[energy]\nk20 = 0.5\n", more = "[time]\nend = 1.0\n[accuracy]\nenergy = 1e-6\n";
+    const Outcome formula =
+        run_text(energy + "H0 = \"-1 + 0.2*cos(2*pi*area)\"\n[shape]\nkind = \"tube\"\nradius = 1.0\nlength = 8.0\n" +
+                 "mode = [{amplitude = 0.1, n = 1}]\n" + more);
+    const Outcome column = run_text(energy + points.shape("length = 8.0\n" + more));
+    ASSERT_EQ(column.summary.stop.reason, Stop::finished) << column.summary.stop.message;
+    EXPECT_NEAR(column.first("energy"), formula.first("energy"), 1e-6 * formula.summary.reference_energy);
+    EXPECT_NEAR(column.last("energy"), formula.last("energy"), 2e-6 * formula.summary.reference_energy);
+    EXPECT_LT(column.last("energy"), 0.9 * column.first("energy"));
+    // In equilibria, half of a tube: the column must have its symmetry.
+    EXPECT_SAYS(message_of<CaseError>([&] {
+                    const ProfilePoints slanted(160, [&](double t) {
+                        return std::array{1.0, 8 * t, -1 + 0.2 * std::sin(2 * pi * t)};
+                    });
+                    run_text(energy + slanted.shape("length = 8.0\n[equilibrium]\n"));
+                }),
+                "shape.path has a column H0, but H0 must be mirror-symmetric");
 }
 
 TEST(VaryingH0, isWrittenAsItIsRead) {

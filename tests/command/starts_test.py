@@ -3,6 +3,7 @@
 result; what is refused. Argument: the program."""
 import unittest
 
+import h5py
 import numpy as np
 
 from program import ProgramTest, about, series
@@ -83,12 +84,47 @@ class StartsTest(ProgramTest):
     def test_bad_files_are_refused(self):
         self.write("bad.csv", "r,z\n0,-1\n0.5,oops\n")
         path = self.write("case.toml", case('kind = "profile"\npath = "bad.csv"\n', MOVES.format(1e-4)))
-        self.assertIn("bad.csv:3: 'oops' is not a finite number", self.refused("run", path))
-        self.assertIn("bad.csv:3: 'oops' is not a finite number", self.refused("check", path))
+        self.assertIn("bad.csv:3:5: 'oops' is not a finite number", self.refused("run", path))
+        self.assertIn("bad.csv:3:5: 'oops' is not a finite number", self.refused("check", path))
         path = self.write("case.toml", case('kind = "formula"\nr = "1 + 0.1*cos(phi"\n', MOVES.format(1e-4)))
         self.assertRegex(self.refused("run", path), r"case\.toml:8:17: shape\.r, character 12: this parenthesis is not closed")
         path = self.write("case.toml", case('kind = "formula"\nr = "1 + 0.1*sin(theta)^2*cos(2*phi)"\n', MOVES.format(1e-4)))
         self.assertIn("shape.r must not contain phi", self.refused("run", path))
+
+    def test_H0_of_the_points_goes_with_them(self):
+        # A run that is resumed has the H0 that it began with, and ends like one that went through.
+        t = np.linspace(0, np.pi, 121)
+        rho, z = np.sin(t), -np.cos(t)
+        rho[[0, -1]] = 0
+        rows = zip(rho, z, -2 - np.tanh(((1 + z) / 2 - 0.6) / 0.25))
+        self.write("domains.csv", "r,z,H0\n" + "".join(f"{a:.17g},{b:.17g},{c:.17g}\n" for a, b, c in rows))
+        shape = 'kind = "profile"\npath = "domains.csv"\ntolerance = 1e-6\n'
+        energy, model = "[energy]\nk20 = 0.5\n", '[model]\nkind = "overdamped"\nvolume = "free"\n'
+        surface = "[accuracy]\nenergy = 1e-2\nestimate = false\n[discretisation]\nelements = 80\n[time]\nend = 0.02\n"
+        for tier, more, relative in (("axisym", MOVES.format(1e-6).replace("0.01", "0.02"), 4e-6), ("surface3d", surface, 1e-3)):
+            text = f'tier = "{tier}"\n{energy}{model}[shape]\n{shape}{more}'
+            whole, words = self.run_case(text)
+            scale = about(self.result)["E_ref"]
+            if tier == "axisym":
+                self.assertRegex(words, r"a smooth curve of \d+ waves is at most \S+ from the 121 points of the profile, a smooth H0 at most")
+            with h5py.File(self.result) as file:
+                H0 = file["frames/000000/H0"][:] if "H0" in file["frames/000000"] else file["frames/000000/PointData/H0"][:]
+            self.assertAlmostEqual(H0.max(), -2 + np.tanh(0.6 / 0.25), delta=1e-3)
+            self.run_case(text.replace("end = 0.02", "end = 0.008"))
+            self.tubule("run", self.result, "--resume", "--until", "0.02")
+            resumed = series(self.result)
+            self.assertEqual(resumed["time"][-1], 0.02)
+            self.assertAlmostEqual(resumed["energy"][-1], whole["energy"][-1], delta=relative * scale)
+            self.assertLess(whole["energy"][-1], 0.99 * whole["energy"][0])
+        # Given twice; and what has no law for it.
+        path = self.write("case.toml", text.replace("k20 = 0.5", "k20 = 0.5\nH0 = -1.0"))
+        self.assertRegex(self.refused("run", path), r"case\.toml:4:6: energy\.H0 must be absent: .*domains\.csv:1:5 has H0 in a column")
+        path = self.write("case.toml", f'tier = "axisym"\n{energy}{model}[shape]\n{shape}{MOVES.format(1e-4)}')
+        self.assertIn("shape.path has a column H0, but H0 must be a number for growth rates", self.refused("stability", path))
+        self.assertIn("must be a number in a scan", self.refused("scan", path, "--over", "energy.k20=1:2:2"))
+        self.write("domains.csv", "r,z\n" + "".join(f"{a:.17g},{b:.17g}\n" for a, b in zip(rho, z)))
+        # A result remembers, whatever became of the file.
+        self.assertIn("must be a number for growth rates", self.refused("stability", self.result))
 
     def test_a_fluid_goes_on_with_the_velocity_of_a_result(self):
         # Kinetic energy at the start is that of the frame; the energies at 2T are those of a run that went through.

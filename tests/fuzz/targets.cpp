@@ -150,6 +150,8 @@ void profile_text(Input input) {
     try {
         const SmoothProfile profile = read_profile(file_of(input, "csv"), {});
         if (!profile.r.allFinite() || !profile.z.allFinite()) throw std::logic_error("a curve of nan or inf");
+        const double middle = 0.5;
+        if (profile.H0 && !std::isfinite(evaluate(*profile.H0, &middle))) throw std::logic_error("an H0 of nan or inf");
     } catch (const ProfileError&) {
     }
 }
@@ -161,7 +163,12 @@ std::vector<std::string> profile_seeds() {
         ring += fmt::format("{} {}\n", 2 + std::cos(i % 16 * std::numbers::pi / 8), std::sin(t) * (i % 8 != 0));
         cell += fmt::format("{};{}\n", i % 16 == 0 ? 0 : std::sin(s), -1.5 * std::cos(s));
     }
-    return {"r, z\n" + cell, "# a ring\n" + ring};
+    std::string with_H0 = "r z H0\n";
+    for (int i = 0; i <= 16; ++i) {
+        const double s = std::numbers::pi * i / 16;
+        with_H0 += fmt::format("{} {} {}\n", i % 16 == 0 ? 0 : std::sin(s), -std::cos(s), -1 + 0.1 * std::cos(s));
+    }
+    return {"r, z\n" + cell, "# a ring\n" + ring, with_H0};
 }
 
 // Jets of a formula agree with it, and what looks for its limits does not end otherwise than by an answer.

@@ -11,6 +11,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/motion/motion_forms.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/profile_points.hpp"
 #include "tests/surface3d/run_case.hpp"
 #include "tests/surface3d/smooth_field.hpp"
 
@@ -140,6 +141,46 @@ TEST(VaryingH0, anInextensibleCellComesToRestAsTheShapeEquationsSay) {
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         EXPECT_NEAR(o.last("energy"), 0.7837975776, 1e-3);
         EXPECT_NEAR(o.last("height"), 2.0555857309, 2e-3);
+    }
+}
+
+TEST(VaryingH0, ofThePointsOfAProfileIsThatOfTheFormula) {
+    // Definition: on a sphere, whose area below is (1 + z)/2, and on a straight tube, both say the same.
+    const auto domains = [](double below) { return -2 - std::tanh((below - 0.6) / 0.25); };
+    const auto waves = [](double z) { return -1 + 0.3 * std::cos(2 * pi * z / 4) + 0.1 * std::sin(2 * pi * z / 4); };
+    struct Scene {
+        int n;
+        std::function<std::array<double, 3>(double)> at;
+        std::string formula, length;
+    };
+    const Scene cell{120,
+                     [&](double t) {
+                         const double z = -std::cos(pi * t);
+                         return std::array{t == 0 || t == 1 ? 0 : std::sin(pi * t), z, domains((1 + z) / 2)};
+                     },
+                     "-2 - tanh(((1 + z)/2 - 0.6)/0.25)", ""};
+    const Scene tube{60,
+                     [&](double t) {
+                         return std::array{1.0, 4 * t, waves(4 * t)};
+                     },
+                     "-1 + 0.3*cos(2*pi*z/4) + 0.1*sin(2*pi*z/4)", "length = 4.0\n"};
+    for (const auto& [n, at, formula, length] : {cell, tube}) {
+        SCOPED_TRACE(formula);
+        const std::string energy = "[energy]\nk20 = 0.5\n",
+                          more = length +
+                                 "[discretisation]\nelements = 80\n[accuracy]\nenergy = 1e-2\nestimate = "
+                                 "false\n[model]\nkind = \"overdamped\"\n[time]\nend = 0.005\n";
+        const test::ProfilePoints points(n, at), ignored(n, at, "weight");
+        const Outcome by_points = run_case(energy + points.shape(more)),
+                      by_formula = run_case(energy + "H0 = \"" + formula + "\"\n" + ignored.shape(more));
+        ASSERT_EQ(by_points.summary.stop.reason, Stop::finished) << by_points.summary.stop.message;
+        const auto H0_at_start = [](const Outcome& o) { return find_array(o.watch.frames.front(), "H0")->data; };
+        const std::vector<double> a = H0_at_start(by_points), b = H0_at_start(by_formula);
+        ASSERT_EQ(a.size(), b.size());
+        for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-6) << i;
+        EXPECT_NEAR(by_points.last("energy"), by_formula.last("energy"), 1e-5 * by_formula.summary.reference_energy);
+        EXPECT_LT(std::abs(by_points.last("identity_defect")), 1e-2 * by_points.summary.reference_energy);
+        EXPECT_LT(by_points.last("energy"), by_points.series("energy").front());
     }
 }
 

@@ -66,7 +66,7 @@ double from_spheroid(double r, double z) {
 }
 
 ProfileFile within(double tolerance, std::optional<double> length = {}) {
-    return {.path = "p.csv", .length = length, .tolerance = tolerance};
+    return {.path = "p.csv", .length = length, .tolerance = tolerance, .H0_tolerance = {}};
 }
 
 TEST_F(ProfileFiles, ComeAsCloseAsStated) {
@@ -121,18 +121,18 @@ TEST_F(ProfileFiles, RunEitherWayWithOrWithoutTheLastPoint) {
 
 TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     const std::string half = "0,-1\n.5,-.8\n.8,-.5\n", rest = ".9,.1\n.8,.3\n.7,.6\n.5,.8\n.3,.9\n0,1\n";
-    EXPECT_EQ(refusal(half + "x,0\n" + rest), "p.csv:4: 'x' is not a finite number");
-    EXPECT_EQ(refusal(half + "1,nan\n" + rest), "p.csv:4: 'nan' is not a finite number");
-    EXPECT_EQ(refusal(half + "1,0,2\n" + rest), "p.csv:4: has 3 values where 2 are expected: r, z");
-    EXPECT_EQ(refusal("a,b\n" + half + rest), "p.csv:1: a heading must name the columns r and z");
-    EXPECT_EQ(refusal(half), "p.csv:3: 3 points are too few: a profile needs 9");
-    EXPECT_EQ(refusal(half + "-.1,0\n" + rest), "p.csv:4: r = -0.1: the profile meets the axis");
-    EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4: the same point as before");
-    EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6: the profile crosses itself"), std::string::npos);
-    EXPECT_NE(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n").find("p.csv:9: the profile is not closed"),
+    EXPECT_EQ(refusal(half + "x,0\n" + rest), "p.csv:4:1: 'x' is not a finite number");
+    EXPECT_EQ(refusal(half + "1,nan\n" + rest), "p.csv:4:3: 'nan' is not a finite number");
+    EXPECT_EQ(refusal(half + "1,0,2\n" + rest), "p.csv:4:5: has 3 values where 2 are expected: r, z");
+    EXPECT_EQ(refusal("a,b\n" + half + rest), "p.csv:1:1: a heading must name the columns r and z");
+    EXPECT_EQ(refusal(half), "p.csv:3:1: 3 points are too few: a profile needs 9");
+    EXPECT_EQ(refusal(half + "-.1,0\n" + rest), "p.csv:4:1: r = -0.1: the profile meets the axis");
+    EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before");
+    EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6:1: the profile crosses itself"), std::string::npos);
+    EXPECT_NE(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n").find("p.csv:9:1: the profile is not closed"),
               std::string::npos);
     EXPECT_NE(refusal(".5,0\n.5,.1\n.5,.2\n.5,.3\n.5,.4\n.5,.5\n.5,.6\n.5,.7\n.5,.8\n.5,2\n", within(1e-3, 1))
-                  .find("p.csv:10: the profile rises by 2, more than shape.length = 1"),
+                  .find("p.csv:10:1: the profile rises by 2, more than shape.length = 1"),
               std::string::npos);
     // One point so far away that squares are no numbers: this crashed.
     for (const double far : {1e97, 1e200}) {
@@ -141,12 +141,175 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
             if (t > 0.02 && t < 0.03) point[1] *= far;
             return point;
         });
-        EXPECT_NE(message_of<ProfileError>([&] { read_profile(path, {}); }).find("smooth curve"), std::string::npos) << far;
+        EXPECT_NE(message_of<ProfileError>([&] { read_profile(path, {}); }).find("smooth curve"), std::string::npos)
+            << far;
     }
     // A corner is no smooth curve.
     std::string cone;
     for (int i = 0; i <= 10; ++i) cone += fmt::format("{},{}\n", 0.1 * std::min(i, 10 - i), 0.1 * i);
     EXPECT_NE(refusal(cone, within(1e-6)).find("set shape.tolerance to that"), std::string::npos);
+}
+
+// ---- H0 of each point
+
+double domains(double area) {
+    return -2 - std::tanh((area - 0.6) / 0.1);
+}
+// Rows "r,z,H0" of n + 1 points of the unit sphere, where (1 + z)/2 is the part of the area below; H0 may be disturbed.
+std::string sphere_rows(
+    int n, const std::function<double(int)>& disturbed = [](int) { return 0.0; }) {
+    std::string out = "r,z,H0\n";
+    for (int i = 0; i <= n; ++i) {
+        const double t = pi * i / n, r = i == 0 || i == n ? 0 : std::sin(t), z = -std::cos(t);
+        out += fmt::format("{:.17g},{:.17g},{:.17g}\n", r, z, domains((1 + z) / 2) + disturbed(i));
+    }
+    return out;
+}
+
+TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
+    // Definition of the points, and derivatives by differences. A bound on the error between points is not stated: five
+    // times the tolerance is what this one keeps.
+    for (const double tolerance : {1e-4, 1e-7}) {
+        ProfileFile how = within(1e-9);
+        how.H0_tolerance = tolerance;
+        const SmoothProfile fit = read_profile(write(sphere_rows(200)), how);
+        ASSERT_TRUE(fit.H0);
+        EXPECT_LE(fit.H0_distance, tolerance);
+        using J = Jet<double, 1, 2>;
+        for (int i = 0; i <= 1000; ++i) {
+            const double area = i / 1000.0, h = 1e-4;
+            const J H0 = evaluate(*fit.H0, std::array{J::variable(area, 0)}.data());
+            EXPECT_NEAR(H0.v, domains(area), 5 * tolerance);
+            const auto at = [&](double a) { return evaluate(*fit.H0, &a); };
+            EXPECT_NEAR(H0.d[0], (at(area + h) - at(area - h)) / (2 * h), 1e-3);
+            EXPECT_NEAR(H0.dd[0], (at(area + h) - 2 * at(area) + at(area - h)) / (h * h), 1e-2);
+        }
+        // The same on the curve that tier surface3d makes of it: c = -cos(pi s) = z.
+        const ProfileCurve curve = profile_curve(fit);
+        const BlendedCurve area = area_below(fit, curve);
+        for (const double z : {-1.0, -0.99, -0.3, 0.2, 0.8, 1.0})
+            EXPECT_NEAR(value_at(area, z)[1], (1 + z) / 2, 1e-8) << z;
+    }
+    // From the north to the south, the same.
+    std::string rows;
+    for (int i = 80; i >= 0; --i) {
+        const double t = pi * i / 80;
+        rows += fmt::format("{:.17g} {:.17g} {:.17g}\n", -std::cos(t), i % 80 == 0 ? 0 : std::sin(t), -std::cos(t));
+    }
+    const SmoothProfile down = read_profile(write("z r H0\n" + rows), within(1e-9));
+    EXPECT_NEAR(evaluate(*down.H0, std::array{0.25}.data()), -0.5, 1e-4);
+}
+
+TEST_F(ProfileFiles, H0OfTubesAndRingsRepeatsItself) {
+    // A straight tube, whose area grows with z; a torus, whose area over the angle t from the outside is
+    // 2 t + sin(t)/2 of 4 pi, with radii 2 and 0.5.
+    const auto H0 = [](double area) { return -1 + 0.3 * std::cos(2 * pi * area) + 0.2 * std::sin(4 * pi * area); };
+    const auto check = [&](const SmoothProfile& fit) {
+        for (int i = 0; i <= 100; ++i) {
+            const double area = i / 100.0;
+            EXPECT_NEAR(evaluate(*fit.H0, &area), H0(area), 1e-6) << i;
+        }
+        // The whole way around once.
+        const ProfileCurve curve = profile_curve(fit);
+        const BlendedCurve below = area_below(fit, curve);
+        EXPECT_NEAR(value_at(below, 0.0)[1], value_at(below, 1.0)[1], 1e-12);
+    };
+    for (const int last : {39, 40}) {  // without and with the point that is the first one moved up
+        std::string rows = "r,z,H0\n";
+        for (int i = 0; i <= last; ++i) rows += fmt::format("1,{:.17g},{:.17g}\n", i / 20.0, H0(i / 40.0));
+        check(read_profile(write(rows), within(1e-6, 2)));
+    }
+    std::string rows = "r,z,H0\n";
+    for (int i = 0; i <= 80; ++i) {
+        const double t = 2 * pi * (i % 80) / 80;
+        rows += fmt::format("{:.17g},{:.17g},{:.17g}\n", 2 + 0.5 * std::cos(t), 0.5 * std::sin(t),
+                            H0((2 * t + 0.5 * std::sin(t)) / (4 * pi)));
+    }
+    check(read_profile(write(rows), within(1e-8)));
+}
+
+TEST_F(ProfileFiles, H0IsSmoothedToItsOwnTolerance) {
+    // Every other value is off by 0.02: beyond the default tolerance, within another one.
+    const std::string noisy = sphere_rows(200, [](int i) { return i % 2 == 0 ? 0.02 : -0.02; });
+    EXPECT_NE(refusal(noisy).find("no smooth H0 comes within 0.000302 of all 201 values: the best is 0.0"),
+              std::string::npos);
+    ProfileFile how;
+    how.H0_tolerance = 0.05;
+    const SmoothProfile fit = read_profile(write(noisy), how);
+    EXPECT_NE(fit.note().find("a smooth H0 at most 0.0"), std::string::npos) << fit.note();
+    for (int i = 0; i <= 100; ++i)
+        EXPECT_NEAR(evaluate(*fit.H0, std::array{i / 100.0}.data()), domains(i / 100.0), 0.05);
+    // A jump has no smooth function nearby; it is refused where it is.
+    const std::string jump = sphere_rows(100, [](int i) { return i > 50 ? 1 : 0; });
+    const std::string refused = refusal(jump);
+    EXPECT_TRUE(refused.starts_with("p.csv:52:") || refused.starts_with("p.csv:53:")) << refused;
+    EXPECT_NE(refused.find("set shape.H0_tolerance to that, or give transitions a width"), std::string::npos);
+    // So is a tube whose ends differ.
+    std::string rows = "r,z,H0\n";
+    for (int i = 0; i <= 40; ++i) rows += fmt::format("1,{:.17g},{:.17g}\n", i / 20.0, -1 - 0.01 * i);
+    EXPECT_NE(refusal(rows, within(1e-6, 2)).find("no smooth H0"), std::string::npos);
+}
+
+TEST_F(ProfileFiles, BadColumnsOfH0AreRefusedWithTheirPlace) {
+    const std::string rows = sphere_rows(20);
+    const auto with_line_5 = [&](const std::string& line) {
+        std::size_t from = 0;
+        for (int i = 1; i < 5; ++i) from = rows.find('\n', from) + 1;
+        return rows.substr(0, from) + line + rows.substr(rows.find('\n', from));
+    };
+    EXPECT_EQ(refusal(with_line_5(".5,-.8,")), "p.csv:5:8: H0 is missing");
+    EXPECT_EQ(refusal(with_line_5(".5,-.8, , ")), "p.csv:5:10: has 4 values where 3 are expected: r, z, H0");
+    EXPECT_EQ(refusal(with_line_5(".5 -.8")), "p.csv:5:4: has 2 values where 3 are expected: r, z, H0");
+    EXPECT_EQ(refusal(with_line_5(".5,-.8,nan")), "p.csv:5:8: 'nan' is not a finite number");
+    EXPECT_EQ(refusal(with_line_5(".5,-.8,  inf")), "p.csv:5:10: 'inf' is not a finite number");
+    EXPECT_EQ(refusal(with_line_5(".5,-.8,lots")), "p.csv:5:8: 'lots' is not a finite number");
+    EXPECT_EQ(refusal("r,z,H_0" + rows.substr(6)),
+              "p.csv:1:5: there is no column 'H_0': the spontaneous curvature is called H0");
+    EXPECT_EQ(refusal("r,z,r" + rows.substr(6)), "p.csv:1:5: a second column r");
+    // Others are ignored, but that of H0 without a name is one value too many.
+    EXPECT_FALSE(read_profile(write("r,z,weight" + rows.substr(6)), {}).H0);
+    EXPECT_EQ(refusal(rows.substr(7)).substr(0, 25), "p.csv:1:6: has 3 values w");
+}
+
+TEST_F(ProfileFiles, H0OfACaseIsThatOfItsFile) {
+    const std::string file = write(sphere_rows(100)).filename().string(),
+                      folder = write(sphere_rows(100)).parent_path();
+    const auto text = [&](const std::string& energy, const std::string& more = "[time]\nend = 1.0\n",
+                          const std::string& tier = "axisym") {
+        return fmt::format("tier = \"{}\"\n[energy]\nk20 = 0.5\n{}[shape]\nkind = \"profile\"\npath = \"{}\"\n{}", tier,
+                           energy, file, more);
+    };
+    const auto parsed = [&](const std::string& of, const std::vector<std::string>& sets = {}) {
+        return parse_case(of, sets, folder + "/case.toml");
+    };
+    const auto refused = [&](const std::string& of, const std::vector<std::string>& sets = {}) {
+        const std::string all = message_of<CaseError>([&] { parsed(of, sets); });
+        return all.starts_with(folder) ? all.substr(folder.size() + 1) : all;
+    };
+    const Case c = parsed(text(""));
+    ASSERT_TRUE(c.energy.H0_from_points());
+    EXPECT_NEAR(evaluate(*c.energy.H0_formula, std::array{0.3}.data()), domains(0.3), 1e-3);
+    // What stands in the case alone is written, and read again.
+    const std::string written = effective_toml(c);
+    EXPECT_EQ(written.find("H0 ="), std::string::npos);
+    EXPECT_EQ(effective_toml(parsed(written)), written);
+    EXPECT_TRUE(parsed(written).energy.H0_from_points());
+
+    EXPECT_EQ(refused(text("H0 = -1.0\n")),
+              "case.toml:4:6: energy.H0 must be absent: " + folder + "/p.csv:1:5 has H0 in a column; or take that out");
+    EXPECT_EQ(refused(text(""), {"energy.H0=-1"}).substr(0, 46), "--set energy.H0=-1: energy.H0 must be absent: ");
+    // What has no law for it.
+    const std::string still = "shape.path has a column H0, but H0 must be a number without a table [time]";
+    EXPECT_NE(refused(text("", "", "surface3d")).find(still), std::string::npos);
+    const std::string automatic = "case.toml:6:8: shape.path has a column H0, but H0 must be a number in tier \"auto\"";
+    EXPECT_TRUE(refused(text("", "[time]\nend = 1.0\n", "auto")).starts_with(automatic));
+    EXPECT_NE(refused(text("", "[equilibrium]\nmodes = 1\n")).find("with equilibrium.modes"), std::string::npos);
+    EXPECT_NE(refused(text("", "[time]\nend = 1.0\n[discretisation]\nparametrisation = \"even\"\n"))
+                  .find("must be \"material\" or absent where energy.H0 varies"),
+              std::string::npos);
+    // A file that is wrong says so with its place.
+    write(sphere_rows(20) + "1,2\n");
+    EXPECT_TRUE(refused(text("")).starts_with("p.csv:23:3: has 2 values"));
 }
 
 FormulaShape shape(const std::string& r, std::optional<double> length = {}) {

@@ -170,8 +170,8 @@ Record equilibrium_frame(Case c) {
 }
 
 std::string answer_for(const StabilityOptions& options, StabilitySubject subject) {
-    if (subject.c.energy.H0_varies())
-        throw complaint(subject.c, "energy.H0", "must be a number for growth rates; run the case instead");
+    if (subject.c.energy.H0_varies() || (subject.frame && find_array(*subject.frame, "H0")))
+        throw complaint_about_H0(subject.c, "must be a number for growth rates; run the case instead");
     if (!options.fit.empty()) return fit_report(options, subject);
     const std::vector<Model> models = models_of(options, subject.c.model);
     std::optional<TubeSubject> tube;

@@ -197,7 +197,7 @@ Results run(const Case& c, const py::object& progress, const py::object& output,
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
-    if (c.energy.H0_varies()) throw complaint(c, "energy.H0", "must be a number for the density of a case");
+    if (c.energy.H0_varies()) throw complaint_about_H0(c, "must be a number for the density of a case");
     const std::vector<const char*> names{"f", "f_H", "f_K", "f_HH", "f_HK", "f_KK"};
     py::dict out;
     const auto part = [&](std::size_t i) {

@@ -262,7 +262,7 @@ std::vector<std::string> Scan::sets_of(std::size_t point) const {
 Case Scan::case_of(std::size_t point) const {
     Case c = parse_case(case_text, sets_of(point), case_path);
     if (c.energy.H0_varies())
-        throw complaint(c, "energy.H0", "must be a number in a scan, which decides by growth rates; run the cases");
+        throw complaint_about_H0(c, "must be a number in a scan, which decides by growth rates; run the cases");
     return c;
 }
 
