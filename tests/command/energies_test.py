@@ -171,7 +171,11 @@ class EnergiesTest(ProgramTest):
     def test_ill_posed_at_once_and_later(self):
         # f_HH = 2 k20 + 6 k30 (H - H0) vanishes at H - H0 = -k20/(3 k30): H = -1/R.
         at_once = case(term(0.5, 3, 0), more=SHAPE.replace("0.8", "1.0") + REST)  # .4 + 3 (-.5) < 0
-        self.run_case(at_once, status=3)
+        said = self.refused("run", self.write("case.toml", at_once), "-o", self.result)
+        self.assertIn("energy.term.0.modulus makes the start ill-posed, and nothing is run: ", said)
+        self.assertFalse(self.result.exists())
+        # A case that expects it has it recorded.
+        self.run_case(at_once + '[expect]\nstop = "ill-posed"\n', status=3)
         self.assertEqual(about(self.result)["stop"], "ill-posed")
         self.assertEqual(series(self.result)["time"][-1], 0)
         # On a tube that shrinks towards R = 1/2 the symbol for waves along it is 2 k20 - 4 k41 u (2 - u), u = 1/R. It counts as
@@ -192,10 +196,40 @@ class EnergiesTest(ProgramTest):
             (case(tier="surface3d", listed="k20 = 1.0\nk42 = -1.05\n", more=sphere), "4:7: energy.k42"),
             (case(term(0.5, 3, 0), term(0.1, 1, 1), more=tube), "2:1: energy"),
         ):
-            words = self.tubule("check", self.write("case.toml", text))[1]
-            self.assertIn(f"case.toml:{blamed} makes the start ill-posed, and a run ends at once: ", words)
-        self.assertIn("ill-posed", json.loads(self.tubule("check", "--json", self.write("case.toml", text))[0])["cases"][0]["warning"])
+            path = self.write("case.toml", text)
+            for words in (self.refused("check", path), self.refused("check", "--quick", path), self.refused("run", path)):
+                self.assertIn(f"case.toml:{blamed} makes the start ill-posed, and nothing is run: ", words)
+        found = json.loads(self.tubule("check", "--json", path, status=2)[0])["cases"][0]
+        self.assertFalse(found["valid"])
+        self.assertIn("ill-posed", found["errors"][0]["message"])
         self.assertNotIn("ill-posed", self.tubule("check", self.write("case.toml", case(term(0.01, 3, 0), more=tube)))[1])
+
+    def test_only_a_certain_start_is_refused_as_ill_posed(self):
+        # 2 k20 + 2 k42 x^2 = -0.1 for x = 1: certain of a sphere, but neither of its triangles nor of an H0 that varies.
+        sphere = "[shape]\nkind = 'sphere'\nradius = 1.0\n"
+        few, moves = "[discretisation]\nelements = 80\n", "[time]\nend = 1e-3\n"
+        listed = "k20 = 1.0\nk42 = -1.05\n"
+        by_mesh = case(tier="surface3d", listed="k20 = 1.0\n", more=sphere + few + moves)
+        self.run_case(by_mesh)
+        self.result.rename(self.folder / "sphere.hdf")
+        frame = "[shape]\nkind = 'result'\npath = 'sphere.hdf'\nframe = 0\n"
+        varies = case(tier="surface3d", listed=listed, more=sphere + few + moves, spontaneous='"0*x"')
+        for text in (case(tier="surface3d", listed=listed, more=frame + moves), varies):
+            path = self.write("case.toml", text)
+            self.assertIn("makes the start ill-posed, and a run ends at once: ", self.tubule("check", path)[1])
+            self.tubule("run", path, "-o", self.result, "--overwrite", status=3)
+            self.assertEqual(about(self.result)["stop"], "ill-posed")
+            self.result.unlink()
+        # On the tube of radius 1 with f = -0.1 (H - H0)^2 - 0.5 (H - H0) K the symbol is -0.2 - x: 0.8 for waves along it
+        # (x = -1), -0.2 for those around it (x = 0), which only tier surface3d has.
+        tube = SHAPE.replace("0.8", "1.0")
+        for tier, more, status in (("axisym", REST, 0), ("surface3d", few + moves, 2)):
+            text = case(term(-0.5, 1, 1), tier=tier, listed="k20 = -0.1\n", more=tube + more)
+            self.tubule("check", "--quick", self.write("case.toml", text), status=status)
+        # The sphere near 2 k20 + 2 k42 = 0: only below -1e-3 of 2 k20 + 2 |k42| is it certain.
+        for k42, status in ((-0.9999, 0), (-1.0001, 0), (-1.01, 2)):
+            text = case(tier="surface3d", listed=f"k20 = 1.0\nk42 = {k42}\n", more=sphere + few + moves)
+            self.tubule("check", "--quick", self.write("case.toml", text), status=status)
 
     def test_sets_and_scans_reach_terms(self):
         path = self.write("case.toml", case(term(0.0, 2, 1)))

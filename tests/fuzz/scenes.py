@@ -142,7 +142,8 @@ class Run:
         result = box.folder / "case.hdf"
         result.unlink(missing_ok=True)
         used = processor_seconds()
-        bounds = (f"time.limit={limit}",) if "time" in case else ()
+        # A start that is ill-posed is an outcome, too.
+        bounds = (f"time.limit={limit}", "expect.stop=ill-posed") if "time" in case else ()
         words = box.run(command, "case.toml", "--quiet", "--overwrite", *(f"--set={x}" for x in (*bounds, *sets)), limit=20 * limit)
         self.seconds = processor_seconds() - used
         self.warned, self.stop, self.stated, self.energy = bool(words.err.strip()), "no result", math.inf, {}

@@ -12,7 +12,6 @@
 #include "common/case/complaints.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
-#include "common/run/energy_checks.hpp"
 #include "common/solve/message.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
@@ -23,6 +22,7 @@
 #include "tools/command/text.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
+#include "tools/run/ill_posed_start.hpp"
 
 namespace tubule {
 
@@ -66,15 +66,6 @@ struct Checked {
     bool valid() const { return complaints.empty(); }
 };
 
-// A run of it stops at once, which is a result, but hardly the one that is wanted.
-std::string ill_posed_at_the_start(const Case& c, const std::string& why) {
-    const std::string key = key_of_ill_posed(c.energy);
-    const auto what = fmt::format(
-        "makes the start ill-posed, and a run ends at once: {}; bring {} nearer to 0, or make energy.k20 larger", why,
-        key == "energy" ? "its moduli" : "it");
-    return valid_utf8(complaint(c, key, what).what());
-}
-
 // Files that the case names are read as well.
 Checked checked(const std::string& path, const CheckOptions& options) {
     Checked out;
@@ -86,9 +77,11 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         if (const std::string falls = unbounded_below(c.energy); !falls.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
         engine_for(c);
+        if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick) out.expected = forecast(c);
         if (out.expected && !out.expected->ill_posed.empty())
-            out.warnings.push_back(ill_posed_at_the_start(c, out.expected->ill_posed));
+            out.warnings.push_back(
+                valid_utf8(ill_posed_complaint(c, "and a run ends at once", out.expected->ill_posed).what()));
     } catch (const CaseErrors& error) {
         out.complaints = error.complaints;
     } catch (const CaseError& error) {

@@ -37,6 +37,7 @@ struct RunOptions {
     std::string output;
     std::optional<double> until = {};  // as time.end
     bool resume = false, overwrite = false, quiet = false, expect = false, check_derivatives = false;
+    bool refuse_ill_posed = false;  // instead of recording that stop
     bool silent = false;  // quiet, and no words on stdout even if the run ends early
     // Called with each result that was written, which is none where a run fails at its start and an earlier result
     // stays.

@@ -33,6 +33,7 @@
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
 #include "tools/run/forecast.hpp"
+#include "tools/run/ill_posed_start.hpp"
 
 namespace tubule {
 
@@ -381,6 +382,8 @@ int run_cases(const RunOptions& options) {
     std::set<std::filesystem::path> files;
     for (const std::string& path : options.cases) {
         jobs.push_back(job_of(path, options));
+        if (options.refuse_ill_posed && !options.resume)
+            if (const auto ill_posed = ill_posed_start(jobs.back().c)) throw *ill_posed;
         if (options.check_derivatives && !derivatives_can_be_checked(jobs.back().c))
             throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
         if (!files.insert(jobs.back().file).second)
@@ -410,6 +413,7 @@ int run_cases(const RunOptions& options) {
 void add_run(CLI::App& app, int& exit_status) {
     CLI::App* command = app.add_subcommand("run", "Run cases, each into a result file");
     const auto o = std::make_shared<RunOptions>();
+    o->refuse_ill_posed = true;
     finds_installed_cases(
         *command->add_option("CASE", o->cases, "case files; with --resume also results, which know their case")
              ->required());

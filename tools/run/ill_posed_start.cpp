@@ -1,0 +1,83 @@
+#include "tools/run/ill_posed_start.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <variant>
+
+#include "common/energy/principal_symbol.hpp"
+#include "common/run/energy_checks.hpp"
+#include "surface3d/run/start.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr int triangles = 500, order = 2;  // whose nodes are looked at
+// The symbol is negative for certain below this part of the sizes of its terms: far above rounding, and near enough
+// to 0 that every run that can be computed ends there.
+constexpr double certain = 1e-3;
+
+bool may_be_known(const Case& c) {
+    const bool by_points = std::holds_alternative<MeshFile>(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
+    return c.moves() && c.tier != Tier::automatic && !c.equilibrium && !c.handover && !by_points &&
+           !c.energy.H0_varies() && symbol_may_vanish(c.energy);
+}
+
+// Curvatures between which waves are looked for: of all directions or, in tier axisym, of those along the profile,
+// across which the curvature is that around the axis.
+std::array<double, 2> across(const Case& c, const surface3d::CurvatureField& exact, const Eigen::Vector3d& x, int i) {
+    const double mean = exact.H[i] / 2, apart = std::sqrt(std::max(mean * mean - exact.K[i], 0.0));
+    const double r = std::hypot(x.x(), x.y());
+    if (c.tier != Tier::axisym || apart < 1e-8 * std::abs(mean)) return {mean - apart, mean + apart};
+    const double around = -(exact.normal(0, i) * x.x() + exact.normal(1, i) * x.y()) / (r * r);
+    return {around, around};
+}
+
+struct Worst {
+    double symbol = 0, part = 0;  // of the sizes of its terms
+    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+};
+
+Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
+    Worst worst;
+    for (int i = 0; i < start.mesh.size(); ++i) {
+        const auto [low, high] = across(c, *start.exact, start.mesh.nodes[i], i);
+        const CurvatureJet<double> f = density(c.energy, start.exact->H[i], start.exact->K[i]);
+        const double symbol = least_principal_symbol(f, low, high), x = std::max(std::abs(low), std::abs(high));
+        const double part = symbol / (std::abs(f.HH) + x * (2 * std::abs(f.HK) + x * std::abs(f.KK)));
+        if (part < worst.part) worst = {symbol, part, start.mesh.nodes[i]};
+    }
+    return worst;
+}
+
+}  // namespace
+
+CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const std::string& why) {
+    const std::string key = key_of_ill_posed(c.energy);
+    return complaint(c, key,
+                     fmt::format("makes the start ill-posed, {}: {}; bring {} nearer to 0, or make energy.k20 larger",
+                                 outcome, why, key == "energy" ? "its moduli" : "it"));
+}
+
+std::optional<CaseError> ill_posed_start(const Case& c) {
+    if (!may_be_known(c) || c.expect.stop == Stop::ill_posed) return std::nullopt;
+    Case shape = c;
+    shape.tier = Tier::surface3d;
+    shape.surface = {};
+    shape.surface.recovery = Recovery::exact;
+    try {
+        const Worst worst = worst_of(c, surface3d::Start(shape).mesh(triangles, order));
+        if (!(worst.part < -certain)) return std::nullopt;
+        return ill_posed_complaint(
+            c, "and nothing is run",
+            fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 is {:.3g} at r = {:.4g}, z = {:.4g}",
+                        worst.symbol, std::hypot(worst.at.x(), worst.at.y()), worst.at.z()));
+    } catch (const std::exception&) {  // the start cannot be meshed: its run says so
+        return std::nullopt;
+    }
+}
+
+}  // namespace tubule
