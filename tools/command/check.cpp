@@ -20,6 +20,7 @@
 #include "tools/command/json.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/advice.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
@@ -61,6 +62,7 @@ struct Checked {
     std::string toml;                   // resolved
     std::vector<std::string> chosen;    // in words
     std::optional<Forecast> expected;   // with --quick nothing
+    std::optional<Advice> advice;       // likewise
     std::string unknown;                // why nothing is expected
     std::vector<std::string> warnings;  // of its energy, each with its place
     bool valid() const { return complaints.empty(); }
@@ -79,6 +81,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         engine_for(c);
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick) out.expected = forecast(c);
+        if (out.expected && out.expected->ill_posed.empty()) out.advice = advice(c, *out.expected);
         if (out.expected && !out.expected->ill_posed.empty())
             out.warnings.push_back(
                 valid_utf8(ill_posed_complaint(c, "and a run ends at once", out.expected->ill_posed).what()));
@@ -103,6 +106,7 @@ void tell(const Checked& c, bool quick) {
     print_answer(answer + "\n");
     for (const std::string& warning : c.warnings) say(stderr, "{}\n", warning);
     // For people: the answer itself is the case, the same at each call.
+    if (c.advice) say(stderr, "{}: advice: {}\n", shown_path(c.path), words(*c.advice));
     if (c.expected)
         say(stderr, "{}: expected: {}\n", shown_path(c.path), words(*c.expected));
     else if (!quick)
@@ -134,6 +138,12 @@ std::string json_of(const Complaint& c) {
                        place_json(c.place), or_null(c.key), json(valid_utf8(c.what)), or_null(c.suggestion));
 }
 
+std::string json_of(const std::optional<Advice>& a) {
+    if (!a) return "null";
+    return fmt::format("{{\"tier\": {}, \"model\": {}, \"accuracy\": {}, \"seconds\": {}, \"reason\": {}}}",
+                       json(a->tier), json(a->model), json(a->accuracy), or_null(a->seconds), json(a->reason));
+}
+
 std::string json_of(const Checked& c) {
     std::vector<std::string> errors;
     for (const Complaint& one : c.complaints) errors.push_back(json_of(one));
@@ -144,9 +154,10 @@ std::string json_of(const Checked& c) {
                                json(c.expected->bytes));
     return fmt::format(
         "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"chosen\": {}, \"expected\": {}, "
-        "\"unknown\": {}, \"warning\": {}}}",
+        "\"advice\": {}, \"unknown\": {}, \"warning\": {}}}",
         json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""),
-        json(c.chosen), expected, or_null(c.unknown), or_null(fmt::format("{}", fmt::join(c.warnings, "\n"))));
+        json(c.chosen), expected, json_of(c.advice), or_null(c.unknown),
+        or_null(fmt::format("{}", fmt::join(c.warnings, "\n"))));
 }
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).

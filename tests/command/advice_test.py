@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""What `tubule check` advises: tier, model, and why.
+
+advice_test.py TUBULE CASES
+"""
+import re
+import sys
+import unittest
+from pathlib import Path
+
+from program import QUICK, ProgramTest
+
+CASES = Path(sys.argv[2])
+
+# Its energy falls by 1.6 % of E_ref. docs/model_differences.csv, Re = 2, gamma = 300: overdamped, it differs by 5.2e-4 from
+# the fluid, which is expected to be 8e-4; Stokes likewise. At gamma = 30 they differ by 6e-3, expected to be 1.3e-2.
+OBLATE = """tier = "axisym"
+[energy]
+k20 = 1.0
+k42 = 0.05
+[model]
+kind = "fluid"
+Re = 2.0
+gamma = 300.0
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 1.0
+c = 0.6
+[accuracy]
+energy = 2e-3
+[time]
+end = 45.0
+"""
+
+
+class Advice(ProgramTest):
+    def advice(self, path, *sets):
+        words = self.tubule("check", path, *[word for one in sets for word in ("--set", one)])[1]
+        found = re.findall(r"advice: (.*)\n", words)
+        self.assertLessEqual(len(found), 1)
+        return found[0] if found else None
+
+    def test_an_axisymmetric_start_does_not_need_three_dimensions(self):
+        told = self.advice("case.toml", "tier=surface3d", "accuracy.energy=1e-2")
+        self.assertRegex(told, r"^tier axisym, model gradient-flow, accuracy 0.01: some 0\.\d+ s; start and model are axisymmetric")
+
+    def test_a_start_without_symmetry_does(self):
+        self.write("case.toml", QUICK.replace('"axisym"', '"surface3d"').replace("1e-6", "1e-2").replace("n = 1\n", "n = 1\nm = 1\n"))
+        self.assertRegex(self.advice("case.toml"), r"^tier surface3d, model gradient-flow, .* shape.mode.0.m breaks the symmetry$")
+
+    def test_a_wave_around_the_axis_that_grows(self):
+        # cases/auto_buckles.toml: by the dispersion relation m = 1 grows.
+        self.assertRegex(self.advice(CASES / "auto_buckles.toml"), r"^tier auto, model overdamped, .* a wave with m = 1 grows")
+
+    def test_a_simpler_model_that_is_accurate_enough(self):
+        self.write("case.toml", OBLATE)
+        self.assertRegex(self.advice("case.toml"), r"model overdamped, .* \"overdamped\" differs by about 0.000[78]\d* of E_ref")
+
+    def test_a_simpler_model_that_is_not(self):
+        self.write("case.toml", OBLATE)
+        told = self.advice("case.toml", "accuracy.energy=1e-4")
+        self.assertRegex(told, r"model fluid, .*; model \"stokes\" would differ by about 0.000[78]\d* of E_ref on the way, by ")
+        told = self.advice("case.toml", "model.gamma=30.0", "time.end=2.0", "accuracy.energy=1e-3")
+        self.assertRegex(told, r"model fluid, .* would differ by about 0.01\d* of E_ref on the way, by ")
+
+    def test_a_velocity_says_what_the_model_is(self):
+        self.write("case.toml", OBLATE + '[velocity]\ninitial = "rotation"\nomega = 0.1\n')
+        told = self.advice("case.toml", "time.end=1.0")
+        self.assertRegex(told, "model fluid")
+        self.assertNotIn("E_ref", told)
+
+    def test_nothing_moves(self):
+        self.write("case.toml", QUICK[: QUICK.index("[time]")].replace("axisym", "surface3d").replace("1e-6", "1e-2"))
+        self.assertIsNone(self.advice("case.toml"))
+        self.assertIsNone(self.advice(CASES / "vesicle.toml"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

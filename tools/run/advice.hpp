@@ -1,0 +1,26 @@
+// What is best chosen for a case in motion, and why: docs/choosing.md.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "common/case/case.hpp"
+#include "common/run/forecast.hpp"
+
+namespace tubule {
+
+struct Advice {
+    std::string tier, model;        // as in case files
+    double accuracy = 0;            // that the case requests
+    std::optional<double> seconds;  // at this accuracy; none: unknown
+    std::string reason;             // in words
+};
+
+// Takes a few seconds at most: the run itself, in tier axisym, and those of simpler models. `expected` is the forecast
+// of the case as it is. None where nothing moves. Throws as an engine and its run.
+std::optional<Advice> advice(const Case& c, const Forecast& expected);
+
+// "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ..."
+std::string words(const Advice& a);
+
+}  // namespace tubule
