@@ -126,7 +126,7 @@ class BareDebian(unittest.TestCase):
 
     def test_from_nothing_to_a_picture(self):
         self.inside("apt-get", "update")
-        self.inside("sh", "-c", "apt-get install --yes --no-install-recommends /packages/tubule_*.deb /packages/libtubule0*.deb /packages/python3-tubule_*.deb python3-h5py python3-matplotlib", timed=True)
+        self.inside("sh", "-c", "apt-get install --yes --no-install-recommends /packages/tubule_*.deb /packages/libtubule0*.deb /packages/python3-tubule_*.deb python3-h5py python3-matplotlib libjs-three", timed=True)
         # matplotlib of Debian brings scipy, which brings a compiler: nobody may need it.
         self.inside("sh", "-c", "rm -f /usr/bin/*gcc* /usr/bin/*g++* /usr/bin/cc /usr/bin/c++ /usr/bin/cpp*")
         self.user(f"tubule run {CASE}", timed=True)
