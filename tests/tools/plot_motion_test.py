@@ -260,6 +260,12 @@ class Balance(InFolder):
         np.testing.assert_allclose(lines["dissipation"].get_ydata(), np.exp(-time), rtol=1e-12)
         self.assertEqual(figure.axes[0].get_xlim(), (1e-3, 2.0))
 
+    def test_an_unknown_error_is_a_gap(self):
+        result = results.Result("a.hdf", {}, {"E_ref": 5.0}, {"time": np.array([0, 1.0, 2]), "energy_error": np.array([5, 5, 0.1])}, [], [])
+        np.testing.assert_array_equal(balance.line_of(result, "energy_error")[1], [np.nan, 0.1])
+        result.series["energy_error"][2] = 5
+        self.assertFalse(balance.BalancePanel._has(result, "energy_error"))
+
     def test_zeros_are_gaps(self):
         time, values = balance.line({"time": np.array([0, 1.0, 2, 3]), "x": np.array([1, -2.0, 0, 3])}, "x")
         np.testing.assert_array_equal(values, [2, np.nan, 3])

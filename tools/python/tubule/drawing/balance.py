@@ -23,6 +23,14 @@ def line(series, name):
     return series["time"][later], np.where(values > 0, values, np.nan)
 
 
+def line_of(result, name):
+    """The same of a result; an error that is not known, E_ref in the rows, is a gap."""
+    time, values = line(result.series, name)
+    if name == "energy_error" and "E_ref" in result.about:
+        values = np.where(values < result.about["E_ref"], values, np.nan)
+    return time, values
+
+
 class BalancePanel:
     """Lines of `results` (all have a balance); one label per result; `times` marked."""
 
@@ -34,7 +42,7 @@ class BalancePanel:
 
     @staticmethod
     def _has(result, name):
-        return name in result.series and bool(np.isfinite(line(result.series, name)[1]).any())
+        return name in result.series and bool(np.isfinite(line_of(result, name)[1]).any())
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
@@ -45,7 +53,7 @@ class BalancePanel:
         for result, colour in zip(self.results, line_colours(len(self.results))):
             for name, dashes in self.styles.items():
                 if self._has(result, name):
-                    time, values = line(result.series, name)
+                    time, values = line_of(result, name)
                     axes.plot(time, values, color=colour, linestyle=dashes, linewidth=1)
                     largest = max(largest, np.nanmax(values))
         for time in (time for time in self.times if time > 0):
@@ -62,7 +70,7 @@ class BalancePanel:
         lone = len(self.results) == 1
         shade = line_colours(1)[0] if lone else "0.3"
         names = {name: text for result in self.results for name, text in result.meanings.items()}
-        handles = [Line2D([], [], color=shade, linestyle=dashes, label=names[name]) for name, dashes in self.styles.items()]
+        handles = [Line2D([], [], color=shade, linestyle=dashes, label=names[name].split(", ")[0]) for name, dashes in self.styles.items()]
         if not lone:
             colours = line_colours(len(self.results))
             handles = [Line2D([], [], color=c, label=", ".join(l)) for c, l in zip(colours, self.labels)] + handles

@@ -1,11 +1,7 @@
 """Draws the paper's tubular cells as fluids in three dimensions, beside the axisymmetric shapes at rest: cuts, and what is
-left of the energy over time.
-
-cells_in_motion.py FOLDER -o PICTURE: results moving_lL_K.hdf and rest_lL_K.hdf for L = 2, 3, 4 and K = 0, 006, 012.
-"""
+left of the energy over time. The folder has results moving_lL_K.hdf and rest_lL_K.hdf for L = 2, 3, 4 and K = 0, 006, 012."""
 
 import os
-import sys
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -45,7 +41,7 @@ def draw(folder, outputs):
         shapes.set(aspect="equal", xlim=(-2.15, 2.15), ylim=(-2.6, 2.6))
         shapes.axis("off")
         shapes.set_title(f"l = {length}", pad=2)
-        left = figure.add_axes([0.075 + 0.32 * column, 0.09, 0.265, 0.25])
+        left = figure.add_axes([0.085 + 0.315 * column, 0.09, 0.26, 0.25])
         for place, (name, colour) in enumerate(colours.items()):
             moving, rest = (read_result(os.path.join(folder, f"{kind}_l{length}_{name}.hdf")) for kind in ("moving", "rest"))
             draw_cuts(shapes, moving, rest, 1.42 * (place - 1), colour)
@@ -53,14 +49,14 @@ def draw(folder, outputs):
             left.plot(time[1:], np.abs(more[1:]), color=colour)
         left.set(xscale="log", yscale="log", xlabel="time", xlim=(1e-3, None))
         if column == 0:
-            left.set_ylabel("E + kinetic energy - E at rest")
+            left.set_ylabel("energy above that at rest")
     handles = [Line2D([], [], color=c, linewidth=3, alpha=0.6, label=f"{formula('k_{42}')} = {number(K42[n])}") for n, c in colours.items()]
     handles.append(Line2D([], [], color="0.1", linewidth=0.6, label="axisymmetric, at rest"))
-    figure.legend(handles=handles, ncols=4, loc="center", bbox_to_anchor=(0.5, 0.395))
-    for letter, y in (("a", 0.985), ("b", 0.365)):
+    figure.legend(handles=handles, ncols=4, loc="center", bbox_to_anchor=(0.52, 0.395))
+    for letter, y in (("a", 0.985), ("b", 0.395)):
         figure.text(0.008, y, f"({letter})", va="top", fontsize=9)
     style.save(figure, outputs)
 
 
-if __name__ == "__main__":
-    sys.exit(command_line.main(__doc__, draw, "folder"))
+def main():
+    return command_line.main(__doc__, draw, "folder")
