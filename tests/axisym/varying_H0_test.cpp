@@ -265,7 +265,6 @@ TEST(VaryingH0, ofThePointsOfAProfileIsThatOfTheFormula) {
         EXPECT_NEAR(column.first("energy"), formula.first("energy"), 1e-6 * formula.summary.reference_energy);
         EXPECT_NEAR(column.last("energy"), formula.last("energy"), 2e-6 * formula.summary.reference_energy);
         EXPECT_LT(column.last("energy"), 0.98 * column.first("energy"));
-        EXPECT_NEAR(column.last("height"), formula.last("height"), 1e-5);
         for (const auto& row : column.log.rows)
             EXPECT_LT(std::abs(row[column.column("identity_defect")]), 3e-6 * column.summary.reference_energy);
         const auto [low, high] = std::ranges::minmax(column.array("H0"));

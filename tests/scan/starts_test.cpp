@@ -151,13 +151,13 @@ TEST(Starts, OtherRanksGetTheSameScan) {
     EXPECT_TRUE(copy.axes[1].logarithmic);
     for (std::size_t i = 0; i < scan.size(); ++i) EXPECT_EQ(copy.sets_of(i), scan.sets_of(i));
     scan = scan_over({"energy.H0=-1,0"});
-    scan.boundary = BoundaryChoice{.refine = 3};
+    scan.boundary = BoundaryChoice{.around = {}, .refine = 3};
     EXPECT_EQ(scan_from(to_packet(scan)).sets_of(3), scan.sets_of(3));  // between points of the grid
 }
 
 TEST(Starts, Refusals) {
     Scan scan = scan_over({families, volumes});
-    scan.boundary = BoundaryChoice{.refine = 3};
+    scan.boundary = BoundaryChoice{.around = {}, .refine = 3};
     EXPECT_NE(message_of([&] { check_scan(scan); }).find("refine must be absent"), std::string::npos);
     const std::string branch = "[equilibrium.branch]\nvary = \"energy.H0\"\nto = 1.0\nstep = 0.5\n";
     EXPECT_NE(message_of([&] { scan_over({volumes}, text + branch); }).find("a point of a scan is one shape"),

@@ -382,7 +382,8 @@ TEST(Remesh, SaysWhereItCannot) {
     EXPECT_TRUE(twisted.reason == Stop::mesh_lost || twisted.reason == Stop::resolution_lost);
 
     // Above and below are the same ring.
-    const StopReport flat = refusal(mapped_mesh(tube_rings(0.5, 1, 2, 8), 2, map_of(Tube{.radius = 0.5, .length = 1})));
+    const StopReport flat =
+        refusal(mapped_mesh(tube_rings(0.5, 1, 2, 8), 2, map_of(Tube{.radius = 0.5, .length = 1, .modes = {}})));
     EXPECT_EQ(flat.reason, Stop::mesh_lost);
     EXPECT_NE(flat.message.find("fewer than three rings"), std::string::npos) << flat.message;
 

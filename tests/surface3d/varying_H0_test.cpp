@@ -169,7 +169,7 @@ TEST(VaryingH0, ofThePointsOfAProfileIsThatOfTheFormula) {
         const std::string energy = "[energy]\nk20 = 0.5\n",
                           more = length +
                                  "[discretisation]\nelements = 80\n[accuracy]\nenergy = 1e-2\nestimate = "
-                                 "false\n[model]\nkind = \"overdamped\"\n[time]\nend = 0.005\n";
+                                 "false\n[model]\nkind = \"overdamped\"\nvolume = \"free\"\n[time]\nend = 0.005\n";
         const test::ProfilePoints points(n, at), ignored(n, at, "weight");
         const Outcome by_points = run_case(energy + points.shape(more)),
                       by_formula = run_case(energy + "H0 = \"" + formula + "\"\n" + ignored.shape(more));

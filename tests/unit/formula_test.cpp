@@ -91,9 +91,11 @@ TEST(Formula, RefusesWithPlaceAndRemedy) {
     expect_refusal("x + 1/0", 6, "no finite value");
     expect_refusal("x + #", 5, "'#'");
     expect_refusal("1e999", 1, "no number");
-    expect_refusal(std::string(300, '(') + "x" + std::string(300, ')'), 201, "too deeply");
+    std::string deep(300, '(');
+    deep.append("x").append(300, ')');
+    expect_refusal(deep, 201, "too deeply");
     std::string nested = "x";
-    for (int i = 0; i < 40; ++i) nested = "x - (" + nested + ")";
+    for (int i = 0; i < 40; ++i) nested.insert(0, "x - (").append(")");
     expect_refusal(nested, 1, "nests 41 values");
 }
 

@@ -1,5 +1,6 @@
 #include "tools/scan/rank_scan.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <span>
@@ -65,9 +66,9 @@ struct Fixed {
 
 Packet to_packet(const PointResult& p) {
     const Fixed fixed{p.point, p.outcome, p.stop, p.value, p.measures};
-    Packet out(sizeof(fixed));
+    Packet out(sizeof(fixed) + p.message.size());
     std::memcpy(out.data(), &fixed, sizeof(fixed));
-    out.insert(out.end(), p.message.begin(), p.message.end());
+    std::copy(p.message.begin(), p.message.end(), out.begin() + sizeof(fixed));
     return out;
 }
 
