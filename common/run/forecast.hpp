@@ -33,6 +33,9 @@ public:
     bool last_run() const { return last_; }    // as far as is known
     bool moved() const { return steps_ > 0; }  // or it has not come to its first step
 
+    // Its steps have become so short, by now, that it says nothing of a run that goes on.
+    bool has_collapsed() const { return steps_ * step_ < 0.1 * time_; }
+
     // Of a run that pauses here, until `end`: the factor from the steps done to all of them, if they stay as long as
     // the last one, or, where they still grow, go on to do so for the most part.
     double all_by_done(double end) const {

@@ -70,8 +70,9 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
         const Stop stop = run.summary.stop.reason;
         if (stop == Stop::ill_posed && !pilot.moved()) return {.ill_posed = run.summary.stop.message};
         const bool lost = stop == Stop::resolution_lost || stop == Stop::mesh_lost || stop == Stop::solver_failed;
-        if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
         const bool whole = stop != Stop::time_limit && !lost;
+        if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
+        if (!whole && pilot.has_collapsed()) return {};
         return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (quiet_seconds() - before) / pilot.steps(),
                 true};
     } catch (const SolveError&) {
