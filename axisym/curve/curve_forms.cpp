@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_local.hpp"
+#include "axisym/curve/varying_H0.hpp"
 #include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
@@ -21,6 +22,12 @@ using Local = CurveLocal;
 template <class S>
 S stretching(const S& r1, const S& r2, const S& z1, const S& z2) {
     return (r1 * r2 + z1 * z2) * inverse(S(r1 * r1 + z1 * z1));
+}
+
+const VaryingH0 varies_nowhere;
+
+Pack H0_of(const Bending& bending, const VaryingH0& H0, int group) {
+    return H0.empty() ? Pack(bending.H0) : H0.value[group];
 }
 
 // H0 at a group of points: where it varies, else the number.
@@ -197,8 +204,18 @@ template <int P>
     return by_energy(bending_, kernel);
 }
 
+const VaryingH0& CurveForms::fixed_H0() const {
+    return fixed_H0_ ? *fixed_H0_ : varies_nowhere;
+}
+
+template <class Use>
+auto CurveForms::with_H0(const double* x, const Use& use) const {
+    if (H0_by_area()) return use(H0ByArea(space_, bending_, x).at_points());
+    return use(fixed_H0());
+}
+
 void CurveForms::fix_H0(const Eigen::VectorXd& x) {
-    fixed_H0_ = tubule::axisym::fix_H0(space_, *bending_.H0_formula, x);
+    fixed_H0_ = std::make_shared<const VaryingH0>(tubule::axisym::fix_H0(space_, *bending_.H0_formula, x));
     fixed_on_ = x;
 }
 
@@ -242,7 +259,7 @@ void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
-            const PointH0 H0(fixed_H0_, e * splines.groups() + g, bending_.H0);
+            const PointH0 H0(fixed_H0(), e * splines.groups() + g, bending_.H0);
             const auto density = functional_density<2>(bending_, H0, weights, Local(space_, e, g, x));
             const Pack weight = images_ * load(basis.weight);
             const int z1 = first_variable[1];
@@ -266,7 +283,7 @@ double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& 
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
-            const PointH0 H0(fixed_H0_, e * splines.groups() + g, bending_.H0);
+            const PointH0 H0(fixed_H0(), e * splines.groups() + g, bending_.H0);
             const auto density = functional_density<1>(bending_, H0, weights, at);
             sum += load(splines.basis(e, g).weight) *
                    (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
@@ -298,7 +315,7 @@ void CurveForms::add_sliding(const double* x, double* out) const {
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
             const Pack weight = images_ * load(basis.weight);
-            const auto rows = sliding_rows<1>(bending_, fixed_H0_, e * splines.groups() + g, Local(space_, e, g, x));
+            const auto rows = sliding_rows<1>(bending_, fixed_H0(), e * splines.groups() + g, Local(space_, e, g, x));
             for (int field = 0; field < 2; ++field) {
                 const Field& f = field == 0 ? space_.r() : space_.z();
                 double* to = field == 0 ? out : out + space_.r().size();
@@ -316,7 +333,7 @@ void CurveForms::add_sliding_slopes(const double* x, double* values) const {
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
             const Pack weight = images_ * load(basis.weight);
-            const auto rows = sliding_rows<1>(bending_, fixed_H0_, e * splines.groups() + g, Local(space_, e, g, x));
+            const auto rows = sliding_rows<1>(bending_, fixed_H0(), e * splines.groups() + g, Local(space_, e, g, x));
             const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
             for (int b = 0; b < 2 * w; ++b) {
                 const int by = b / w;
@@ -408,7 +425,7 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
             for (int i = 0; i < lanes; ++i) domain.look(at_H0[i], p.H[i], p.K[i], splines.basis(e, g).z[i]);
         }
     return domain.margin();
@@ -433,7 +450,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
             volume += pi * weight * at.r * at.r * at.z1;
             gauge += 0.5 * weight * q * q;
             length += weight * speed;
-            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
             for_each_value_at(bending_, at_H0, p.H, p.K,
                               [&](std::size_t i, const Pack& value) { terms[i] += value * dA; });
             const auto f = density_at(bending_, at_H0, p.H, p.K);
@@ -501,7 +518,7 @@ double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
             const Local at(space_, e, g, x.data());
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
             const Pack dA = p.area * load(splines.basis(e, g).weight);
-            const Pack at_H0 = H0_of(H0, e * splines.groups() + g);
+            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
             for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
         }
     return std::max(std::abs(observe(x).energy), images_ * magnitude);

@@ -6,13 +6,15 @@
 #include <Eigen/SparseCore>
 #include <array>
 #include <limits>
+#include <memory>
 #include <vector>
 
-#include "axisym/curve/varying_H0.hpp"
 #include "axisym/splines/curve_space.hpp"
 #include "common/energy/bending.hpp"
 
 namespace tubule::axisym {
+
+struct VaryingH0;  // of packs, which depend on the machine's registers: not for those who include this
 
 // The functional energy E + area A + volume V + gauge J of the whole cell or period, by its weights.
 //   E = INT f(H, K) dS        V = INT pi r^2 z' ds
@@ -42,6 +44,7 @@ struct CurveObservation {
 
 class CurveForms {
 public:
+    // Keeps the space, which must outlive it.
     CurveForms(const CurveSpace& space, const Bending& bending);
 
     const CurveSpace& space() const { return space_; }
@@ -86,14 +89,11 @@ private:
     bool gradient_kernel(const Weights& weights, const VaryingH0& H0, const double* x, double* out) const;
     template <int P>
     void hessian_kernel(const Weights& weights, const VaryingH0& H0, const double* x, double* values) const;
-    bool H0_by_area() const { return bending_.H0_varies() && fixed_H0_.empty(); }
+    bool H0_by_area() const { return bending_.H0_varies() && !fixed_H0_; }
+    const VaryingH0& fixed_H0() const;
     // use(what H0 is at the points of the curve x, if it varies)
     template <class Use>
-    auto with_H0(const double* x, const Use& use) const {
-        if (H0_by_area()) return use(H0ByArea(space_, bending_, x).at_points());
-        return use(fixed_H0_);
-    }
-    Pack H0_of(const VaryingH0& H0, int group) const { return H0.empty() ? Pack(bending_.H0) : H0.value[group]; }
+    auto with_H0(const double* x, const Use& use) const;
     FormulaDomain::Margin domain(const Eigen::VectorXd& x) const;
     template <class Add>
     void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
@@ -101,7 +101,7 @@ private:
 
     const CurveSpace& space_;
     Bending bending_;
-    VaryingH0 fixed_H0_;  // empty before fix_H0()
+    std::shared_ptr<const VaryingH0> fixed_H0_;  // none before fix_H0()
     Eigen::VectorXd fixed_on_;
     double images_;
     Eigen::SparseMatrix<double> pattern_;

@@ -42,6 +42,7 @@ struct Variation {
 // energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
+    // Throws as set_problem().
     StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
 
     const CurveSpace& space() const { return *space_; }
@@ -56,6 +57,7 @@ public:
     int sigma() const { return space_->size(); }  // places in u
     int lambda() const { return space_->size() + 1; }
 
+    // F(u), of size() numbers.
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     // dF/du, with `damping` times the mass matrix added to the Hessian; compressed, of one pattern.
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;

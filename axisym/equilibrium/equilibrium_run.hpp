@@ -10,6 +10,7 @@
 
 namespace tubule::axisym {
 
+// What a row of an equilibrium or a branch holds, "time" first.
 std::vector<std::string> equilibrium_series_names(const Case& c);
 
 // Throws CaseError for a start that cannot be set up, and for constraints that cannot be met.

@@ -18,6 +18,7 @@ struct ModeRates {
     int m = 0;
     std::vector<double> rates;  // exp(rate t), descending; rigid motions are left out
     std::vector<double> shape;  // w of the first, at equally spaced s, the largest being 1
+    // No wave of this m grows.
     bool stable() const { return rates.empty() || rates[0] <= 0; }
 };
 
@@ -27,6 +28,7 @@ struct ModeRates {
 // it adds -INT b H w^2 dS to the form of displacements along straight normals.
 class ModeStability {
 public:
+    // Copies both.
     ModeStability(const StationaryProblem& problem, const Equilibrium& shape);
 
     // The largest `count` growth rates for this m, of displacements with the period (or closed surface) of the shape;

@@ -35,7 +35,8 @@ install(FILES ${PROJECT_BINARY_DIR}/TubuleConfig.cmake ${PROJECT_BINARY_DIR}/Tub
 # Without those that need headers of HDF5 and CHOLMOD or depend on the machine's registers, which no other one includes.
 install(DIRECTORY common axisym surface3d DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tubule
         FILES_MATCHING PATTERN "*.hpp" PATTERN "hdf5_objects.hpp" EXCLUDE PATTERN "vtk_grid.hpp" EXCLUDE
-        PATTERN "sparse_cholmod.hpp" EXCLUDE PATTERN "pack.hpp" EXCLUDE)
+        PATTERN "sparse_cholmod.hpp" EXCLUDE PATTERN "pack.hpp" EXCLUDE
+        REGEX "axisym/curve/(curve_local|varying_H0)\\.hpp$" EXCLUDE)
 install(DIRECTORY cases DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule
         FILES_MATCHING PATTERN "*.toml" PATTERN "meshes/*")
 install(PROGRAMS tools/slurm/tubule.sbatch DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule/slurm)
