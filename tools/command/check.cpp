@@ -140,8 +140,10 @@ std::string json_of(const Complaint& c) {
 
 std::string json_of(const std::optional<Advice>& a) {
     if (!a) return "null";
-    return fmt::format("{{\"tier\": {}, \"model\": {}, \"accuracy\": {}, \"seconds\": {}, \"reason\": {}}}",
-                       json(a->tier), json(a->model), json(a->accuracy), or_null(a->seconds), json(a->reason));
+    return fmt::format(
+        "{{\"tier\": {}, \"model\": {}, \"elements\": {}, \"accuracy\": {}, \"seconds\": {}, \"reason\": {}}}",
+        json(a->tier), json(a->model), a->elements ? fmt::format("{}", *a->elements) : "null", json(a->accuracy),
+        or_null(a->seconds), json(a->reason));
 }
 
 std::string json_of(const Checked& c) {

@@ -9,6 +9,8 @@
 
 #include "common/run/run.hpp"
 #include "common/solve/interrupt.hpp"
+#include "surface3d/run/motion_settings.hpp"
+#include "surface3d/run/motion_start.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/model_advice.hpp"
@@ -18,6 +20,11 @@ namespace {
 
 constexpr double watch_limit = 3;  // seconds of a processor: a busy machine must not change what is advised
 constexpr double watch_accuracy = 1e-3;
+// So few triangles are accurate to `few_reach` where they have the energy of the start to `few_start`: of the scenes of
+// docs/both_tiers and of tests/command/advice_study.py those with 3e-4 and less are, while a neck with 1.3e-3 states no
+// error and a rough fluid with 3e-3 is lost.
+constexpr int few = surface3d::least_triangles;
+constexpr double few_reach = 1e-2, few_start = 5e-4;
 
 // Ends a run of tier "auto" that takes long, or goes on in three dimensions.
 class Brief : public RunObserver {
@@ -59,6 +66,24 @@ std::string number(double value) {
     return fmt::format("{:.2g}", value);
 }
 
+bool few_triangles_do(const Case& c, const surface3d::Start& start) {
+    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order) return false;
+    const surface3d::StartMesh mesh = start.mesh(few, element_order(c));
+    const surface3d::Observables o = surface3d::observe_start(c, mesh);
+    const double energy = surface3d::free_energy(c, o, mesh.mesh.period);
+    return surface3d::error_of_start(c, start, few, energy) <=
+           few_start * surface3d::reference_energy(c, o, mesh.mesh.period);
+}
+
+void choose_mesh(const Case& c, const surface3d::Start& start, const Forecast& expected, Advice& out) {
+    out.seconds = expected.seconds;
+    if (!few_triangles_do(c, start)) return;
+    Case given = surface_case(c);
+    given.surface.elements = out.elements = few;
+    out.seconds = forecast(given).seconds;
+    out.reason += ", and is smooth";
+}
+
 void choose_model(const Case& c, Advice& out) {
     const auto simpler = simpler_models(c);
     if (simpler.empty()) return;
@@ -80,10 +105,12 @@ void choose_model(const Case& c, Advice& out) {
 
 std::optional<Advice> advice(const Case& c, const Forecast& expected) {
     if (!c.moves()) return {};
-    Advice out{.tier = "surface3d", .model = name(c.model), .accuracy = c.accuracy.energy, .seconds = {}, .reason = {}};
+    Advice out;
+    out.tier = "surface3d", out.model = name(c.model), out.accuracy = c.accuracy.energy;
     const Choice choice = choice_for(c);
     if (!choice.axisymmetric) {
-        out.seconds = expected.seconds, out.reason = choice.reason;
+        out.reason = choice.reason;
+        choose_mesh(c, *choice.start, expected, out);
         return out;
     }
     choose_tier(c, choice, expected, out);
@@ -93,7 +120,8 @@ std::optional<Advice> advice(const Case& c, const Forecast& expected) {
 
 std::string words(const Advice& a) {
     const std::string time = a.seconds ? fmt::format(": some {} s", number(std::max(*a.seconds, 0.1))) : "";
-    return fmt::format("tier {}, model {}, accuracy {:g}{}; {}", a.tier, a.model, a.accuracy, time, a.reason);
+    const std::string mesh = a.elements ? fmt::format("{} elements, ", *a.elements) : "";
+    return fmt::format("tier {}, model {}, {}accuracy {:g}{}; {}", a.tier, a.model, mesh, a.accuracy, time, a.reason);
 }
 
 }  // namespace tubule

@@ -11,6 +11,7 @@ namespace tubule {
 
 struct Advice {
     std::string tier, model;        // as in case files
+    std::optional<int> elements;    // discretisation.elements; none: none need to be given
     double accuracy = 0;            // that the case requests
     std::optional<double> seconds;  // at this accuracy; none: unknown
     std::string reason;             // in words
@@ -20,7 +21,7 @@ struct Advice {
 // of the case as it is. None where nothing moves. Throws as an engine and its run.
 std::optional<Advice> advice(const Case& c, const Forecast& expected);
 
-// "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ..."
+// "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ...", "tier surface3d, model stokes, 80 elements, ..."
 std::string words(const Advice& a);
 
 }  // namespace tubule
