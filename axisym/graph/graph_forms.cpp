@@ -192,19 +192,25 @@ double Forms::free_energy(const Eigen::VectorXd& x) const {
     return observe(x.data(), rest.data()).free_energy;
 }
 
-double Forms::axial_force(const Eigen::VectorXd& x) const {
-    return for_degree(space_.degree(), [&](auto P) {
+template <int P>
+[[gnu::flatten]] double Forms::axial_force_kernel(const double* x) const {
+    const auto kernel = [&]<Added added>() -> double {
         Pack sum{0.0};
         for (int e = 0; e < space_.elements(); ++e)
             for (int g = 0; g < space_.groups(); ++g) {
                 const auto& basis = space_.basis(e, g);
-                const Local<P()> at(basis, space_.dofs(e), x.data());
+                const Local<P> at(basis, space_.dofs(e), x);
                 ProfilePoint<Jet<Pack, 3, 1>> p;
-                const auto f = energy_density<1, Added::any>(bending_, loads_, at.r, at.r1, at.r2, p);
+                const auto f = energy_density<1, added>(bending_, loads_, at.r, at.r1, at.r2, p);
                 sum += load(basis.weight) * (f.v - at.r1 * f.d[1] - 2 * at.r2 * f.d[2]);
             }
         return images_ * stdx::reduce(sum) / space_.cell().period();
-    });
+    };
+    return by_added(bending_, kernel);
+}
+
+double Forms::axial_force(const Eigen::VectorXd& x) const {
+    return for_degree(space_.degree(), [&](auto P) { return axial_force_kernel<P()>(x.data()); });
 }
 
 Eigen::VectorXd Forms::gradient(const Eigen::VectorXd& x) const {

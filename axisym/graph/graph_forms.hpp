@@ -76,6 +76,8 @@ private:
     FormulaDomain::Margin domain(const double* x) const;
     template <int P>
     Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
+    template <int P>
+    double axial_force_kernel(const double* x) const;
     void jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
                      double* values) const;
 
