@@ -2,8 +2,6 @@
 //
 // run_a_tube [CASE RESULT]      a case of tier axisym from a file, or the one below
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -53,21 +51,15 @@ end = 0.4
 output = [0.1, 0.2, 0.3]
 )";
 
-std::string text_of(const char* path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
     const bool given = argc > 2;
-    const CaseText source =
-        given ? CaseText{text_of(argv[1]), {}} : CaseText{example, {"energy.k42=0.12"}};  // overrides as in --set
     try {
-        const Case c = parse_case(source.text, source.sets, given ? argv[1] : "in memory");
+        const Case c = given ? read_case(argv[1])
+                             : parse_case(example, {"energy.k42=0.12"}, "in memory");  // overrides as in --set
         const auto series = axisym::series_names(c);
-        ResultWriter writer = ResultWriter::create(given ? argv[2] : "run_a_tube.hdf", source, {}, series);
+        ResultWriter writer = ResultWriter::create(given ? argv[2] : "run_a_tube.hdf", {c.text, c.sets}, {}, series);
         Watch watch(writer, series);
         const RunSummary run = axisym::run(c, watch);
         writer.finish({{"stop", std::string(name(run.stop.reason))}});

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <regex>
@@ -68,6 +69,15 @@ struct Checked {
     bool valid() const { return complaints.empty(); }
 };
 
+// None where a trial run fails: the case is valid all the same.
+std::optional<Advice> advice_for(const Case& c, const Forecast& expected) {
+    try {
+        return advice(c, expected);
+    } catch (const std::exception&) {
+        return std::nullopt;
+    }
+}
+
 // Files that the case names are read as well.
 Checked checked(const std::string& path, const CheckOptions& options) {
     Checked out;
@@ -81,7 +91,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         engine_for(c);
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick) out.expected = forecast(c);
-        if (out.expected && out.expected->ill_posed.empty()) out.advice = advice(c, *out.expected);
+        if (out.expected && out.expected->ill_posed.empty()) out.advice = advice_for(c, *out.expected);
         if (out.expected && !out.expected->ill_posed.empty())
             out.warnings.push_back(
                 valid_utf8(ill_posed_complaint(c, "and a run ends at once", out.expected->ill_posed).what()));

@@ -173,7 +173,7 @@ def draw_movie(options):
     paths = options.results
     if len(paths) > 1 or scan.is_scan(paths[0]):
         raise BadInput(f"{paths[0]}: --movie shows one result, and no scan")
-    if options.series or options.kind != "all" or options.output or len(options.colour) > 1:
+    if options.series or options.kind != "all" or options.output or len(options.colour) > 1 or options.dpi != style.DPI:
         raise BadInput("--movie goes with --times, --label, --fps and one --colour only")
     result = read_result(paths[0])
     frames = result.surfaces or result.frames
