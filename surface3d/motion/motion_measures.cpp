@@ -94,8 +94,8 @@ void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 
 }  // namespace
 
-double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
-    if (mesh.order != 4) return 0;
+Smoothness smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
+    if (mesh.order != 4) return {};
     // Nodes halfway between two others, in VTK's order: of the triangle, and of its quarters.
     constexpr std::array<std::array<int, 3>, 3> whole{{{4, 0, 1}, {7, 1, 2}, {10, 2, 0}}};
     constexpr std::array<std::array<int, 3>, 9> quarters{
@@ -110,7 +110,9 @@ double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
         for (const auto& at : whole) coarse += misses(at) / whole.size();
         for (const auto& at : quarters) fine += misses(at) / quarters.size();
     }
-    return fine > 0 ? std::max(std::log2(coarse / fine) / 2, 0.0) : 2;
+    if (fine == 0) return {.order = 2};
+    return {std::max(std::log2(coarse / fine) / 2, 0.0),
+            std::sqrt(fine / mesh.triangles() * values.size()) / values.norm()};
 }
 
 MotionMeasures measure(MovingSurface& surface, const MotionState& s, const MotionState* before) {

@@ -7,6 +7,13 @@
 
 namespace tubule::surface3d {
 
+// How linear interpolation represents nodal values on elements of order 4, from its errors on the triangles and on
+// their quarters. Not known (0) for elements of another order.
+struct Smoothness {
+    double order = 0;   // 2 where the mesh resolves the values, below 1 where they are rough on the scale of an element
+    double missed = 0;  // root mean square of the errors on the quarters, relative to that of the values
+};
+
 // Many fields: a list of measurements that share no rule.
 struct MotionMeasures {
     Observables bending;  // with H and K of `fields`, to which the force belongs
@@ -27,7 +34,7 @@ struct MotionMeasures {
     MeshTurn turn;
     double neck_radius = 0;        // of the narrowest place where the surface is a saddle; infinity if there is none
     Eigen::Vector3d narrowest;     // where that is
-    double smoothness = 0;         // order with which H is interpolated on this mesh, see smoothness_of()
+    Smoothness smoothness;         // of H on this mesh
     double symbol = 0;             // smallest principal symbol, theory.md (2.14), x between the principal curvatures
     Eigen::Vector3d least_symbol;  // where it is
     FormulaDomain::Margin domain;  // of the energy's formula, with the node as its place
@@ -38,10 +45,7 @@ struct MotionMeasures {
 // began; the acceleration is 0 without.
 MotionMeasures measure(MovingSurface& surface, const MotionState& state, const MotionState* before = nullptr);
 
-// The order of linear interpolation of nodal values on elements of order 4, from its errors on the triangles and on
-// their quarters: 2 where the mesh resolves them, below 1 where they are rough on the scale of an element. 0, which is
-// not known, for elements of another order.
-double smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values);
+Smoothness smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values);
 
 // INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.
 double noise_of_H(const SurfaceSpace& space, const CurvedMesh& mesh, const MotionFields& fields);

@@ -27,8 +27,10 @@ constexpr double shortest_step = 1e-9;         // of the relaxation time: shorte
 // Nodes of the coarser run of a pair are so much farther apart, and turn so much more.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
-// A coarser run gets over some steps of the run in so many trials at most: the trials of one whose mesh is no longer good
-// enough would otherwise have no end.
+// Errors of a coarser run may be so many times larger: with 2.25 times fewer triangles they are at order 4.
+constexpr double larger_errors = 5;
+// A coarser run gets over some steps of the run in so many trials at most: the trials of one whose mesh is no longer
+// good enough would otherwise have no end.
 constexpr int most_at_once = 40;
 constexpr double one_condition = 1e-6;  // lack of volume, relative: below, meshes cannot keep both area and volume
 constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
@@ -86,7 +88,7 @@ void MotionAttempt::begin(const Start& from) {
     look();
     out_.note(doubt_before(case_, now_.free_energy, memory_.scale.reference_energy));
     memory_.balance.total_start = memory_.balance.lowest_total = total();
-    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_.free_energy));
+    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_));
     compare();
     error_now_ = std::max(error_now_, memory_.error);
     write_row();
@@ -132,20 +134,20 @@ void MotionAttempt::look() {
     now_ = measure(surface(), state_);
 }
 
-// A coarser run is there to tell how large errors are: with 2.25 times fewer triangles five times as large at order 4.
 std::optional<StopReport> MotionAttempt::impossible(const Observables& o, const MotionState& s) const {
-    return find_impossible_motion(o, surface().mesh(s), out_.reported() ? 0.01 : 0.05, state_.time);
+    return find_impossible_motion(o, surface().mesh(s), out_.reported() ? 0.01 : 0.01 * larger_errors, state_.time);
 }
 
 std::optional<MotionAttempt::Refusal> MotionAttempt::judge(const MotionStep& next, const MotionMeasures& m) const {
     const double t = state_.time, E_ref = memory_.scale.reference_energy;
+    const double asked = case_.accuracy.energy * (out_.reported() ? 1 : larger_errors);
     const double then = m.free_energy + m.kinetic - memory_.balance.work - work_of(next, m);
     if (const auto spurious = impossible(m.bending, next.state))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
-    if (const auto rises = find_rise_in_step((then - total()) / E_ref, case_.accuracy.energy, t, next.state.step))
+    if (const auto rises = find_rise_in_step((then - total()) / E_ref, asked, t, next.state.step))
         return Refusal{0.25, *rises};
     const double since = then - memory_.balance.lowest_total;
-    if (const auto rises = find_slow_rise(since / E_ref, case_.accuracy.energy, t))
+    if (const auto rises = find_slow_rise(since / E_ref, asked, t))
         return Refusal{0, *rises};  // shorter steps would creep on
     return std::nullopt;
 }
@@ -307,9 +309,9 @@ void MotionAttempt::advance() {
     }
 }
 
-void MotionAttempt::advance_to(double time) {
+void MotionAttempt::advance_to(double time, double growth) {
     until_ = time;
-    memory_.next_step = time - state_.time;
+    memory_.next_step = std::min(time - state_.time, state_.step > 0 ? growth * state_.step : HUGE_VAL);
     const auto tried = [this] { return memory_.count.steps + memory_.count.rejected; };
     const auto before = tried();
     while (!stop_ && is_before(state_.time, time)) {
@@ -375,7 +377,7 @@ double MotionAttempt::what_may_change() const {
 void MotionAttempt::compare() {
     if (!out_.reported()) return;
     std::optional<double> error;
-    if (error_) error = error_->at(state_.time, comparable(), memory_.order, now_.smoothness);
+    if (error_) error = error_->at(state_.time, comparable(), memory_.order, now_.smoothness.order);
     const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
     error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
     if (error) memory_.error = std::max({memory_.error, *error, rise});

@@ -40,7 +40,9 @@ public:
     void resume(const Restart& restart);
     void go();
     void advance();
-    void advance_to(double time);  // of a coarser run: in one step, or in several where that is refused
+    // Of a coarser run: in one step, or in several where that is refused or more than `growth` times as long as the
+    // last.
+    void advance_to(double time, double growth = HUGE_VAL);
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more
 
     RunSummary summary;

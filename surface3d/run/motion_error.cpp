@@ -33,7 +33,8 @@ template <class Fields, class R>
 void compared_fields(Fields&& f, R& r) {
     f.number("restart_compared", r.compared), f.number("restart_compared_error", r.error);
     f.number("restart_compared_between", r.between), f.number("restart_compared_sum_in_time", r.sum_in_time);
-    f.number("restart_compared_in_time", r.in_time), f.array("restart_compared_times", r.times);
+    f.number("restart_compared_in_time", r.in_time), f.number("restart_compared_growth", r.growth);
+    f.array("restart_compared_times", r.times);
     f.array("restart_compared_energies", r.energies, r.times.size());
     f.array("restart_compared_orders", r.orders, r.times.size());
 }
@@ -127,9 +128,10 @@ void MotionError::attempt(const Work& work, double time) {
     }
 }
 
-double MotionError::begin(int triangles, double energy) {
+double MotionError::begin(int triangles, const MotionMeasures& start) {
+    of_run_.growth = growth_of_coarser(case_, start.smoothness);
     attempt([&] { begin(triangles); }, begin_time(case_));
-    return error_of_start(case_, start_, of_.elements, energy);
+    return error_of_start(case_, start_, of_.elements, start.free_energy);
 }
 
 void MotionError::begin(int triangles) {
@@ -152,7 +154,8 @@ void MotionError::begin(Role role, double coarser_by) {
     };
     coarser_ = begun();
     if (tells_apart()) same_steps_ = begun();
-    of_run_ = {.times = of_run_.times, .energies = of_run_.energies, .orders = of_run_.orders};
+    of_run_ = {
+        .times = of_run_.times, .energies = of_run_.energies, .orders = of_run_.orders, .growth = of_run_.growth};
 }
 
 bool MotionError::is_compared(std::size_t i) const {
@@ -161,8 +164,8 @@ bool MotionError::is_compared(std::size_t i) const {
 
 // At all times that are to be compared. False if a coarser run does not get there.
 bool MotionError::catch_up(double smoothness) {
-    const auto gets_to = [](MotionAttempt& run, double time) {
-        run.advance_to(time);
+    const auto gets_to = [this](MotionAttempt& run, double time) {
+        run.advance_to(time, of_run_.growth);
         return run.state().X.size() > 0 && !is_before(run.state().time, time);
     };
     ComparedEnergies& r = of_run_;

@@ -22,6 +22,7 @@ struct ComparedEnergies {
     double between = 0;                           // then, of the two coarser runs
     double sum_in_time = 0;                       // then, of the parts that steps have added to the error in time
     double in_time = 0;                           // largest error in time
+    double growth = 1e9;                          // of steps of the coarser run, from one to the next, at most
 };
 
 class MotionError {
@@ -30,8 +31,8 @@ public:
     MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const MotionSettings& of);
 
     // With the run, which has so many triangles, or where that goes on. resume() throws as RecordReader. begin()
-    // tells the error of the start.
-    double begin(int triangles, double energy);
+    // tells the error of the start, which has these measures.
+    double begin(int triangles, const MotionMeasures& start);
     void resume(const Record& record, int triangles);
     void save(Record& record) const;
 

@@ -20,9 +20,9 @@ namespace {
 constexpr double pilot_limit = 6;         // seconds of each pilot run
 constexpr double limit = 15;              // of all of them, and their starts
 constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number
-constexpr double cost_power = 1.1;        // of the number of triangles: the cost of a step
+constexpr double cost_power = 1.2;        // of the number of triangles: the cost of a step
 // Runs, the coarser ones that tell the error included: one, or two where orders are high.
-constexpr double with_coarser_run = 1.2, with_coarser_runs = 1.6;
+constexpr double with_coarser_run = 1.35, with_coarser_runs = 1.6;
 constexpr double threads_power = 0.6;                         // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
 constexpr double usual_steps = 100, usual_step = 0.5e-3;      // at the loosest tolerance; seconds for a triangle

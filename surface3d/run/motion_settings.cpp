@@ -24,9 +24,11 @@ constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * ask
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
 constexpr double loosest_of_coarser = 2e-3;            // beyond it they leave waves that no mesh resolves
 constexpr double least_fewer = 1.1;
-constexpr double spare_in_time = 1.25;  // at most 1.1 of the error was seen to be missing
-constexpr double high_accuracy = 1e-4;  // from here on, without inertia, steps of higher order pay
-constexpr double surest_growth = 4.5;   // of errors: they have maxima between the steps that are compared
+constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of H, linear between nodes, at kinks
+constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
+constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
+constexpr double high_accuracy = 1e-4;                    // from here on, without inertia, steps of higher order pay
+constexpr double surest_growth = 4.5;  // of errors: they have maxima between the steps that are compared
 
 double tolerance_for(const Case& c) {
     const double accuracy = c.accuracy.energy;
@@ -96,6 +98,11 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by) {
 
 bool is_of_high_order(const Case& c) {
     return entry(time_scheme(c)).most_order > 2;
+}
+
+double growth_of_coarser(const Case& c, const Smoothness& start) {
+    const bool rough = element_order(c) < 4 || (start.order < rough_below && start.missed > rough_missed);
+    return rough || is_of_high_order(c) ? any_growth : stable_growth;
 }
 
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {

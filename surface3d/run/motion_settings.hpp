@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/case/case.hpp"
+#include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {
@@ -35,6 +36,10 @@ int fewer_triangles(int triangles);
 constexpr int steps_at_once = 3;  // of the run, that the coarser one goes over
 // The coarser run, which has so many times fewer triangles (elements of another order: 1).
 MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
+
+// How much longer than its last step the next one of the coarser run may be, by the H of the start on the mesh of the
+// run. Where H is rough, errors of the first moments are large, and only several steps at once tell them.
+double growth_of_coarser(const Case& c, const Smoothness& start);
 
 // The error of a run over its difference from the coarser one, by the least orders that errors can be relied on to
 // have where H is so smooth (MotionMeasures).
