@@ -88,9 +88,11 @@ GrowthFit fit_growth(const std::vector<double>& times, const std::vector<double>
     double smallest = std::numeric_limits<double>::infinity();
     for (int from = 0; from + fewest <= n; ++from)
         for (int to = from + fewest; to <= n; ++to) {
-            const double change = std::abs(points[to - 1].log_a - points[from].log_a);
+            // Along the line: two points of a floor of noise may differ as much.
+            const GrowthFit fit = fitted(points, from, to);
+            const double change = std::abs(fit.rate) * (fit.to - fit.from);
             if (change < least_change) continue;
-            stretches.push_back({fitted(points, from, to), change});
+            stretches.push_back({fit, change});
             smallest = std::min(smallest, stretches.back().fit.error);
         }
     if (stretches.empty()) return fitted(points, 0, n);  // log a oscillates: no stretch changes that much

@@ -5,9 +5,9 @@
 
 namespace tubule::theory {
 
-// The stretch of the run where log a is straightest. Of all stretches of at least 6 points over which log a changes by
-// at least 1, or by a third of its whole range if that is less, those with an error bar up to twice the smallest one
-// are candidates; of these, the one over which log a changes most is chosen. At most 200 points are used, evenly
+// The stretch of the run where log a is straightest. Of all stretches of at least 6 points over which their line changes
+// by at least 1, or by a third of the whole range of log a if that is less, those with an error bar up to twice the
+// smallest one are candidates; of these, the one whose line changes most is chosen. At most 200 points are used, evenly
 // spaced by index.
 struct GrowthFit {
     double rate = 0;

@@ -82,7 +82,7 @@ class Judging(unittest.TestCase):
             (run(stop="resolution-lost"), goes_on, True, "false alarm"),
             (run(stop="resolution-lost"), goes_on, False, "told"),
             (run(stop="resolution-lost"), ends, True, "told"),
-            (run(stop="time-limit"), goes_on, True, "told"),
+            (run(stop="time-limit"), goes_on, True, "undecided"),
         ):
             self.assertEqual(judge(outcome, truth, 1e-2, chosen).kind, kind, (outcome, truth.stop))
 

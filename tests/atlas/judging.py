@@ -8,7 +8,7 @@
                  discretisation and a finer run finishes
     silent       finished without a warning, and the error is above twice the stated one or above what was asked for; or
                  went on where the truth ends
-    undecided    the truth is not known well enough
+    undecided    the truth is not known well enough, or the run did not end within the limit of this judging
 """
 
 import math
@@ -102,10 +102,12 @@ def ended_by_physics(run, ending):
 
 def judge(run, truth, asked, chosen):
     """`chosen`: the discretisation is the program's own choice."""
+    if run.stop == "time-limit":
+        return Judgement("undecided", run.stop)
     if run.stop in PHYSICS:
         return Judgement(ended_by_physics(run, truth.ending(run)), run.stop)
     if not run.finished:
-        alarm = chosen and run.stop not in ("no result", "time-limit") and truth.ending(run) is None
+        alarm = chosen and run.stop != "no result" and truth.ending(run) is None
         return Judgement("false alarm" if alarm else "told", run.stop)
     if run.stated >= 1:
         return Judgement("told", "unknown")

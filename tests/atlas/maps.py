@@ -3,5 +3,6 @@
 import profile_maps
 import straight_maps
 import surface_maps
+import tool_maps
 
-MAPS = profile_maps.MAPS | straight_maps.MAPS | surface_maps.MAPS
+MAPS = profile_maps.MAPS | straight_maps.MAPS | surface_maps.MAPS | tool_maps.MAPS

@@ -6,7 +6,7 @@ from judging import ExactTruth, judged_run
 from lattice import Axis, Map
 from scipy.integrate import solve_ivp
 
-SECONDS = 300  # of a run; mostly a second or two, in tier axisym a twentieth of one
+SECONDS = 120  # of a processor, for a run; mostly a second or two, in tier axisym a twentieth of one
 KNOWN = 1e-10  # how well the equation is solved
 LENGTH = 2.0
 VISIBLE = 18.0  # a wave that grows by exp of this comes from rounding to where it is seen

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <random>
 #include <stdexcept>
 
 namespace tubule::theory {
@@ -51,6 +52,15 @@ TEST(GrowthFit, aFloorOfNoise) {
         EXPECT_NEAR(fit.rate, -2, std::max(fit.error, 1e-5)) << noise;
         EXPECT_LT(fit.error, 1e-3);
     }
+}
+
+TEST(GrowthFit, aFloorOfRandomNoise) {
+    // As long as the floor is, where log a varies by e-folds from point to point, the decay before it is found.
+    std::mt19937 random(1);
+    std::normal_distribution<double> drawn;
+    const auto fit = Samples(20, 400, [&](double t) { return std::abs(std::exp(-2 * t) + 0.01 * drawn(random)); }).fit();
+    EXPECT_NEAR(fit.rate, -2, fit.error);
+    EXPECT_LT(fit.error, 0.5);
 }
 
 TEST(GrowthFit, tellsThatThereIsNone) {

@@ -161,7 +161,7 @@ void report(const Case& c, const RunSummary& s, const std::string& file, double 
     say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
     const int status = exit_code(s.stop.reason);
     const std::string about =
-        status == 3 || status == 4 ? fmt::format(" (docs/stopped_runs.md#{})", name(s.stop.reason)) : "";
+        status == 3 || status == 4 ? fmt::format(" (docs/failures.md#{})", name(s.stop.reason)) : "";
     if (!s.stop.advice.empty() || !about.empty())
         say(stdout, "    {}{}\n", s.stop.advice.empty() ? "what to do" : s.stop.advice, about);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <filesystem>
@@ -103,6 +104,17 @@ ScanWriter new_result(const ScanOptions& options) {
     return open_result(scan, file, options.resume);
 }
 
+// What the lattice of a scan along boundaries may miss; empty if it has every point of the grid.
+std::string between_seeds(const Scan& scan) {
+    if (!scan.boundary) return "";
+    std::size_t longest = 0;
+    for (const Axis& axis : scan.axes) longest = std::max(longest, axis.values.size() - 1);
+    const auto seeds = static_cast<std::size_t>(scan.boundary->seeds);
+    if (seeds >= longest) return "";
+    return fmt::format("regions smaller than {} values of an axis may be missed: --seeds {} sees all\n",
+                       (longest + seeds - 1) / seeds, longest);
+}
+
 void report(const ScanResult& result, const std::filesystem::path& file, bool interrupted, const ScanEffort& effort,
             double seconds) {
     std::array<std::size_t, n_outcomes> counts{};
@@ -116,6 +128,7 @@ void report(const ScanResult& result, const std::filesystem::path& file, bool in
     say(stdout, "    {} run now, {:.3g} s of CPU time, {:.3g} s; {}\n", effort.points, effort.cpu_seconds, seconds,
         file.string());
     if (interrupted) say(stdout, "    go on with --resume\n");
+    if (const std::string words = between_seeds(result.scan); !words.empty()) say(stdout, "    {}", words);
 }
 
 int scan_by(const ScanOptions& options, Ranks* ranks) {
