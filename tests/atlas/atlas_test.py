@@ -15,7 +15,10 @@ from types import SimpleNamespace
 HERE = Path(__file__).resolve().parent
 TUBULE = Path(sys.argv[1]).resolve()
 sys.path.insert(0, str(HERE.parent / "fuzz"))
+import numpy as np  # noqa: E402
 from judging import ExactTruth, judge, kind_of_error  # noqa: E402
+from sandbox import Sandbox  # noqa: E402
+from tool_maps import VALUES, alignment, fits, judged_lines, lines  # noqa: E402
 
 
 class Corners(unittest.TestCase):
@@ -42,6 +45,16 @@ class Corners(unittest.TestCase):
         before = (self.folder / "k40.csv").read_text()
         self.assertEqual(self.make(), self.said)
         self.assertEqual((self.folder / "k40.csv").read_text(), before)
+
+    def test_points_are_judged_again(self):
+        """A row that says otherwise is listed."""
+        rows = (self.folder / "k40.csv").read_text().splitlines()
+        other = self.folder / "other"
+        other.mkdir()
+        (other / "k40.csv").write_text("\n".join(rows).replace(",right,ill-posed", ",told,ill-posed") + "\n")
+        done = subprocess.run([HERE / "again.py", TUBULE, other, "--count", "4", "--seed", "3"], capture_output=True, text=True)
+        self.assertEqual(done.stdout.count("told, ill-posed -> right, ill-posed"), 2, done)
+        self.assertIn("4 judged again, seed 3: 2 verdicts changed, 0 of them silent now", done.stdout)
 
     def test_picture_and_page(self):
         picture, page = self.folder / "k40.png", self.folder / "page.md"
@@ -85,6 +98,45 @@ class Judging(unittest.TestCase):
             (run(stop="time-limit"), goes_on, True, "undecided"),
         ):
             self.assertEqual(judge(outcome, truth, 1e-2, chosen).kind, kind, (outcome, truth.stop))
+
+
+class Lines(unittest.TestCase):
+    """Of a scan with 4 intervals of its lattice, every 6 values: a square of outcome 2."""
+
+    def judged(self, low, high, seen, warned):
+        every = np.ones((VALUES, VALUES), int)
+        every[low:high, low:high] = 2
+        return judged_lines(every, every if seen else np.where(every == 1, 1, 0), 4, warned).kind
+
+    def test_a_region_between_points_of_the_lattice(self):
+        self.assertEqual([self.judged(7, 11, *found) for found in ((True, False), (False, True), (False, False))], ["right", "told", "silent"])
+
+    def test_a_region_on_the_lattice_is_not_to_be_missed(self):
+        self.assertEqual(self.judged(5, 11, False, True), "silent")
+
+    def test_wrong_outcomes(self):
+        every = np.ones((VALUES, VALUES), int)
+        self.assertEqual(judged_lines(every, 2 * every, 4, True).kind, "silent")
+
+
+class Tools(unittest.TestCase):
+    """What is certain: a scan over all points, a clean exponential, noise alone, a surface that was rotated."""
+
+    def judged(self, judge, *place):
+        with tempfile.TemporaryDirectory() as top:
+            found = judge(Sandbox(TUBULE, Path(top) / "point"), *place)
+        return found.kind, found.stop
+
+    def test_lines(self):
+        self.assertEqual(self.judged(lines, "disc", 0.2, VALUES - 1), ("right", "found"))
+        self.assertEqual(self.judged(lines, "disc", 0.05, 2), ("told", "missed"))
+
+    def test_fits(self):
+        self.assertEqual(self.judged(fits, "grows, 10 points", 1e-9, 3.0), ("right", "finished"))
+        self.assertEqual(self.judged(fits, "decays, 200 points", 10.0, 3.0), ("told", "nowhere exponential"))
+
+    def test_alignment(self):
+        self.assertEqual(self.judged(alignment, "all m", 4, 0.01), ("right", "finished"))
 
 
 if __name__ == "__main__":

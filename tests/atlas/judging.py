@@ -19,6 +19,7 @@ from scenes import LIMIT, Reference, Run
 
 KINDS = ("right", "told", "false alarm", "silent", "undecided")
 PHYSICS = ("pinch-off", "self-intersection", "ill-posed")  # a graph that overhangs goes on as a curve: told
+NUMERICS = ("resolution-lost", "mesh-lost", "solver-failed")
 NONE = 1e-9  # errors below are not looked at
 LATE = 0.05  # how far the time of a stop may be off, relative to it, or to what the truth ran on
 

@@ -126,9 +126,9 @@ MESHES = ("uniform", "graded", "irregular", "hardly relaxed", "follow_curvature"
 SCHEMES = ("euler", "bdf2", "bdf", "alpha")
 MAPS = {
     "steps": Map("Fixed steps, gradient flow", STEP, K42, steps, SCHEMES, across=4, levels=0, tier="surface3d"),
-    "fluid_steps": Map("Fixed steps, fluid", LONGER, K42, fluid_steps, ("euler", "bdf2", "alpha", "paper"), across=5, levels=1, tier="surface3d"),
+    "fluid_steps": Map("Fixed steps, fluid", LONGER, K42, fluid_steps, ("euler", "bdf2", "alpha", "paper"), across=4, levels=0, tier="surface3d"),
     "triangles": Map("Triangles", FEW, AMPLITUDE, triangles, ("order 2", "order 3", "order 4"), across=6, levels=1, tier="surface3d"),
-    "flows": Map("Viscosity and friction", GAMMA, RE, flows, ("stokes, bdf2", "fluid, bdf2", "fluid, alpha"), across=5, levels=1, tier="surface3d"),
+    "flows": Map("Viscosity and friction", GAMMA, RE, flows, ("stokes, bdf2", "fluid, bdf2", "fluid, alpha"), across=4, levels=0, tier="surface3d"),
     "roughness": Map("Waves on a sphere", DEGREE, WAVE, roughness, ("gradient-flow", "overdamped", "fluid"), across=4, levels=0, tier="surface3d"),
     "necks": Map("Necks, 3D", NECK, ASKED, necks, ("uniform", "graded", "follow_curvature"), across=4, levels=0, tier="surface3d"),
     "meshes": Map("Spheroids in motion", END, SPHEROID, meshes, MESHES, across=4, levels=0, tier="surface3d"),

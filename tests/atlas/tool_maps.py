@@ -164,7 +164,7 @@ NOISE, FOLDS = Axis("noise", 1e-6, 10, log=True), Axis("powers of e", 0.03, 30, 
 DEGREE, AMPLITUDE = Axis("degree", 2, 8, whole=True), Axis("amplitude", 1e-5, 0.1, log=True)
 ENDS = ("grows, 10 points", "decays, 10 points", "grows, 200 points", "decays, 200 points")
 MAPS = {
-    "lines": Map("Lines of a scan", WIDTH, SEEDS, lines, tuple(REGIONS), across=6, levels=0, tier="tools"),
+    "lines": Map("Lines of a scan", WIDTH, SEEDS, lines, tuple(REGIONS), across=5, levels=0, tier="tools"),
     "fits": Map("Fitted growth rates", NOISE, FOLDS, fits, ENDS, across=8, levels=1, tier="tools"),
     "alignment": Map("Aligned surfaces", DEGREE, AMPLITUDE, alignment, ("m = 0", "m = l", "all m"), across=6, levels=0, tier="tools"),
 }

@@ -55,7 +55,7 @@ class OneCase(unittest.TestCase):
             self.assertIn(about["stop_message"], done.stdout)
             self.assertIn(about["advice"], done.stdout)
             if stop not in ("stationary", "time-limit"):
-                self.assertIn(f"docs/stopped_runs.md#{about['stop']}", done.stdout)
+                self.assertIn(f"docs/failures.md#{about['stop']}", done.stdout)
             # The end is in the series, and in a state that can be looked at or gone on with.
             if stop != "mesh-lost" or about["stop_time"] > 0:  # else nothing was computed
                 self.assertEqual(file["series/time"][-1], about["stop_time"])

@@ -195,6 +195,13 @@ class Boundary(ScanTest):
         self.scan("case.toml", *fine, "--boundary", "pinched", "--seeds", "4")
         self.assertEqual(self.edges(), around)
 
+    def test_says_what_it_may_miss(self):
+        asked = ("case.toml", "--over", f"{AMPLITUDE}=0:0.01:6", "--boundary", "outcome")
+        out, _ = self.scan(*asked, "--seeds", "2")
+        self.assertIn("regions smaller than 3 values of an axis may be missed: --seeds 5 sees all", out)
+        out, _ = self.scan(*asked, "--seeds", "5")
+        self.assertNotIn("missed", out)
+
     def test_refined(self):
         """Between 0.38103 and 0.38104 (an independent spectral code, cases/nearly_pinched.toml) the neck opens again."""
         asked = (CASES / "nearly_pinched.toml", "--over", f"{AMPLITUDE}=0.3:0.5:3", "--over", f"{K42}=0:1e-2:2")

@@ -39,11 +39,11 @@ TEST(Docs, TellEveryStopItsExitStatusAndWhenItIsGiven) {
 }
 
 TEST(Docs, TellWhatToDoAboutEveryStop) {
-    const std::string stopped = page("docs/stopped_runs.md");
+    const std::string stops = page("docs/failures.md");
     for (const StopKind& stop : stop_kinds) {
         if (stop.exit_code != 3 && stop.exit_code != 4) continue;  // `run` names the place for these
-        EXPECT_TRUE(has(stopped, fmt::format("\n| <a id=\"{0}\"></a>`{0}` | ", stop.name)))
-            << "docs/stopped_runs.md lacks the row of " << stop.name;
+        EXPECT_TRUE(has(stops, fmt::format("\n| <a id=\"{0}\"></a>`{0}` | ", stop.name)))
+            << "docs/failures.md lacks the row of " << stop.name;
     }
 }
 
