@@ -28,6 +28,8 @@ COLOURS = {
     "false alarm": "#d95f0e",
     "silent": "#000000",
 }
+PLAIN = ("finished", "stationary", "found", "aligned")  # how runs end that need no name
+BRANCHES = ("prolate", "oblate", "stomatocyte", "pear", "no region")
 PIXELS = 300
 NAMED = 0.04  # part of a panel above which a region gets its name
 GAP, HEAD, FOOT = 0.42, 0.3, 0.36  # inches: between panels, above and below a row of them
@@ -36,7 +38,7 @@ GAP, HEAD, FOOT = 0.42, 0.3, 0.36  # inches: between panels, above and below a r
 def label(row):
     if row["kind"] != "right":
         return row["kind"]
-    return "right: finished" if row["stop"] in ("finished", "stationary") else "right: ended by the physics"
+    return "right: finished" if row["stop"] in (*PLAIN, *BRANCHES) else "right: ended by the physics"
 
 
 def panel(axes, chart, rows):
@@ -55,7 +57,7 @@ def panel(axes, chart, rows):
         axes.plot(*place[[row["kind"] == kind for row in rows]].T, "D", color=COLOURS[kind], markersize=3, clip_on=False)
     for kind in np.unique(image[judged]):
         for k, word in enumerate(stops):
-            if names[int(kind)] != "right: finished":
+            if word not in PLAIN:
                 name_regions(axes, (image == kind) & (stop == k), word, dark=names[int(kind)] == "silent")
     for axis, shown in ((axes.xaxis, chart.x), (axes.yaxis, chart.y)):
         fractions = (0, 0.5, 1) if shown.log else (0, 0.25, 0.5, 0.75, 1)

@@ -17,7 +17,7 @@ from maps import MAPS  # noqa: E402
 def counts(tables):
     yield "| map | tier | judged | " + " | ".join(KINDS) + " |"
     yield "|---" * (3 + len(KINDS)) + "|"
-    for tier in ("axisym", "surface3d"):
+    for tier in sorted({MAPS[name].tier for name in tables}):
         total = collections.Counter()
         for name, rows in tables.items():
             if MAPS[name].tier == tier:
@@ -32,7 +32,7 @@ def line(name, tier, found):
 
 
 def silent(tables):
-    yield "| map | variant | point | error of E_ref | stated |"
+    yield "| map | variant | point | error | stated |"
     yield "|---|---|---|---|---|"
     for name, rows in tables.items():
         chart = MAPS[name]

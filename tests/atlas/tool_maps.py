@@ -129,42 +129,50 @@ def judged_fit(box, times, amplitudes, rate):
 # ---------------------------------------------------------------------------------------------- alignment
 
 TRIANGLES = 3  # parts of an edge of an icosahedron: 180 triangles
-ALIGNED = 0.01  # of the amplitude: how far the surfaces may be apart afterwards
+AMPLITUDE = 0.02  # of the waves
+ALIGNED = 1.2  # how much farther apart than by the known rotation: the best fit is not farther
 
 
-def alignment(box, waves, degree, amplitude):
-    """A sphere with harmonics of one degree, and the same surface rotated at random."""
+def alignment(box, waves, degree, noise):
+    """A sphere with harmonics of one degree, and the same with noise, relative to the waves, and rotated at random."""
     from scipy.spatial.transform import Rotation
     from scipy.special import sph_harm
 
-    draw = generator("alignment", waves, degree, amplitude)
+    draw = generator("alignment", waves, degree, noise)
     points, faces = icosphere(TRIANGLES)
     around, down = np.arctan2(points[:, 1], points[:, 0]), np.arccos(points[:, 2])
     orders = {"m = 0": {0: 1.0}, "m = l": {degree: 1.0}}.get(waves) or dict(enumerate(draw.standard_normal(degree + 1)))
     wave = sum(size * np.real(sph_harm(m, degree, around, down)) for m, size in orders.items())
-    surface = points * (1 + amplitude * wave / np.abs(wave).max())[:, None]
+    wave *= AMPLITUDE / np.abs(wave).max()
+    noisy = points * (1 + wave + noise * AMPLITUDE * draw.standard_normal(len(points)))[:, None]
     turn = Rotation.random(random_state=int(draw.integers(1 << 30)))
-    for name, corners in (("a", surface), ("b", turn.apply(surface))):
-        words = [f"OFF\n{len(corners)} {len(faces)} 0"] + ["{:.12g} {:.12g} {:.12g}".format(*p) for p in corners]
-        box.write(f"{name}.off", "\n".join(words + ["3 {} {} {}".format(*f) for f in faces]) + "\n")
-        case = {"tier": "surface3d", "energy": {"k20": 1.0}, "shape": {"kind": "file", "path": f"{name}.off"}, "accuracy": {"energy": 0.1}}
-        box.write(f"{name}.toml", toml.dump(case))
-        if box.run("run", f"{name}.toml", "--quiet", "--overwrite", "-o", f"{name}.hdf", limit=SECONDS).status:
-            return Judgement("undecided", "no surface")
-    done = box.run("compare", "a.hdf", "b.hdf", "--align", "--json", limit=SECONDS)
+    for name, corners in (("a", points * (1 + wave)[:, None]), ("b", noisy), ("c", turn.apply(noisy))):
+        if not surface(box, name, corners, faces):
+            return Judgement("told", "no surface")
+    known = json.loads(box.run("compare", "a.hdf", "b.hdf", "--json", limit=SECONDS).out)["frames"][0]["l2"]
+    done = box.run("compare", "a.hdf", "c.hdf", "--align", "--json", limit=SECONDS)
     if done.status:
         return Judgement("told", "refused")
-    apart = json.loads(done.out)["frames"][0]["hausdorff"] / amplitude
-    right = apart <= ALIGNED
-    return Judgement("right" if right else "told" if done.err.strip() else "silent", "finished" if right else "not aligned", apart)
+    apart = json.loads(done.out)["frames"][0]["l2"] / AMPLITUDE
+    right = apart <= ALIGNED * known / AMPLITUDE + 1e-6
+    return Judgement("right" if right else "told" if done.err.strip() else "silent", "aligned" if right else "not aligned", apart, known / AMPLITUDE)
+
+
+def surface(box, name, corners, faces):
+    """A result with a smooth surface through the corners; whether there is one."""
+    words = [f"OFF\n{len(corners)} {len(faces)} 0"] + ["{:.12g} {:.12g} {:.12g}".format(*p) for p in corners]
+    box.write(f"{name}.off", "\n".join(words + ["3 {} {} {}".format(*f) for f in faces]) + "\n")
+    case = {"tier": "surface3d", "energy": {"k20": 1.0}, "shape": {"kind": "file", "path": f"{name}.off"}, "accuracy": {"energy": 0.1}}
+    box.write(f"{name}.toml", toml.dump(case))
+    return not box.run("run", f"{name}.toml", "--quiet", "--overwrite", "-o", f"{name}.hdf", limit=SECONDS).status
 
 
 WIDTH, SEEDS = Axis("half width", 0.005, 0.3, log=True), Axis("seeds", 2, 24, log=True, whole=True)
 NOISE, FOLDS = Axis("noise", 1e-6, 10, log=True), Axis("powers of e", 0.03, 30, log=True)
-DEGREE, AMPLITUDE = Axis("degree", 2, 8, whole=True), Axis("amplitude", 1e-5, 0.1, log=True)
+DEGREE, HIDING = Axis("degree", 2, 8, whole=True), Axis("noise", 1e-3, 1, log=True)
 ENDS = ("grows, 10 points", "decays, 10 points", "grows, 200 points", "decays, 200 points")
 MAPS = {
-    "lines": Map("Lines of a scan", WIDTH, SEEDS, lines, tuple(REGIONS), across=5, levels=0, tier="tools"),
+    "lines": Map("Lines of a scan", WIDTH, SEEDS, lines, tuple(REGIONS), across=4, levels=0, tier="tools"),
     "fits": Map("Fitted growth rates", NOISE, FOLDS, fits, ENDS, across=8, levels=1, tier="tools"),
-    "alignment": Map("Aligned surfaces", DEGREE, AMPLITUDE, alignment, ("m = 0", "m = l", "all m"), across=6, levels=0, tier="tools"),
+    "alignment": Map("Aligned surfaces", DEGREE, HIDING, alignment, ("m = 0", "m = l", "all m"), across=4, levels=0, tier="tools"),
 }

@@ -2,6 +2,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
@@ -17,7 +18,7 @@ using Eigen::Vector3d;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t coarse_samples = 150, fine_samples = 3000;
-constexpr std::size_t tried_closely = 4;  // initial guesses that are refined, besides those without a rotation
+constexpr std::size_t tried_closely = 12;  // initial guesses that are refined, besides those without a rotation
 constexpr double as_good = 1.01;          // mean squares within this factor count as equal: the smallest rotation wins
 constexpr int most_steps = 30, last_steps = 12;
 // Relative decrease of the mean square in a step below which the iteration ends, in three rounds. The position of the
@@ -25,7 +26,9 @@ constexpr int most_steps = 30, last_steps = 12;
 constexpr double coarse_gain = 1e-4, fine_gain = 1e-8, last_gain = 1e-13;
 constexpr int shifts_tried = 12;      // along a tube, and turns about its axis
 constexpr double same_moment = 0.05;  // relative difference below which two moments of inertia count as equal
-constexpr int turns_tried = 8;        // about a single known axis
+constexpr int turns_tried = 32;       // about a single known axis
+// Where no axis is known: neighbours are about 20 degrees apart, half the length of a wave of degree 9.
+constexpr int rotations_tried = 2000;
 
 // The free components of a motion (1, else 0): translations, then rotations about x, y, z.
 Vector6 freedom(const Surface& a, const Surface& b) {
@@ -142,6 +145,20 @@ Matrix3d turn(double angle, const Vector3d& axis) {
     return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
 }
 
+// All over the rotations: Alexa's super-Fibonacci spirals (2022).
+std::vector<Matrix3d> even_rotations() {
+    constexpr double first = 1.414213562373095, second = 1.533751168755204;
+    std::vector<Matrix3d> out;
+    for (int i = 0; i < rotations_tried; ++i) {
+        const double s = i + 0.5, t = s / rotations_tried, a = 2 * pi * s / first, b = 2 * pi * s / second;
+        const Eigen::Vector2d sizes(std::sqrt(t), std::sqrt(1 - t));
+        out.push_back(Eigen::Quaterniond(sizes[1] * std::cos(b), sizes[0] * std::sin(a), sizes[0] * std::cos(a),
+                                         sizes[1] * std::sin(b))
+                          .toRotationMatrix());
+    }
+    return out;
+}
+
 // Candidate rotations in the frame of the axes of inertia: those that preserve the axes, or samples where axes are
 // not unique.
 std::vector<Matrix3d> turns(const Vector3d& moments) {
@@ -160,17 +177,7 @@ std::vector<Matrix3d> turns(const Vector3d& moments) {
         low ? about(Vector3d::UnitZ(), Vector3d::UnitX()) : about(Vector3d::UnitX(), Vector3d::UnitZ());
         return out;
     }
-    // No axis is known: eight turns about each of the directions to the corners and faces of a cube.
-    for (int x = -1; x <= 1; ++x)
-        for (int y = -1; y <= 1; ++y)
-            for (int z = -1; z <= 1; ++z) {
-                if ((x != 0) + (y != 0) + (z != 0) == 0 || (x != 0) + (y != 0) + (z != 0) == 2) continue;
-                const Matrix3d to =
-                    Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d(x, y, z)).toRotationMatrix();
-                for (int i = 0; i < turns_tried; ++i)
-                    out.push_back(to * turn(2 * pi * i / turns_tried, Vector3d::UnitZ()));
-            }
-    return out;
+    return even_rotations();
 }
 
 // Initial guesses: motions of `a` towards `b`.
