@@ -141,18 +141,37 @@ void ensemble_keys(Keys& k, Model& model) {
     });
 }
 
+// Which model stands for "auto": a result has it in its case.
+template <class Keys>
+void chosen_key(Keys& k, Model& model) {
+    if (model.kind != ModelKind::automatic)
+        return k.absent("chosen", "must be absent: only valid with kind = \"auto\", to say what is chosen");
+    Choices<std::optional<ModelKind>> candidates;
+    for (const ModelEntry& m : models)
+        if (m.inextensible && m.kind != ModelKind::automatic) candidates.emplace_back(m.name, m.kind);
+    k.choice("chosen", model.chosen, candidates);
+    k.check("chosen", [&] {
+        return model.chosen == ModelKind::overdamped && !(model.gamma.value_or(0) > 0)
+                   ? "must not be \"overdamped\" without model.gamma: nothing would resist the motion"
+                   : "";
+    });
+}
+
 template <class Keys>
 void keys(Keys& k, Model& model) {
     Choices<ModelKind> kinds;
     for (const ModelEntry& m : models) kinds.emplace_back(m.name, m.kind);
     k.choice("kind", model.kind, kinds);
-    if (model_entry(model.kind).viscous) {
+    const ModelEntry& has = model_entry(model.kind);
+    if (has.viscous)
         k.number("Re", model.Re, {.above = 0});
-        k.number("gamma", model.gamma, {.from = 0});
-    } else {
-        for (const char* key : {"Re", "gamma"})
-            k.absent(key, "must be absent: only valid with kind = " + quoted_names(&ModelEntry::viscous));
-    }
+    else
+        k.absent("Re", "must be absent: only valid with kind = " + quoted_names(&ModelEntry::viscous));
+    if (has.inextensible)
+        k.number("gamma", model.gamma, has.viscous ? Range{.from = 0} : Range{.above = 0});
+    else
+        k.absent("gamma", "must be absent: only valid with kind = " + quoted_names(&ModelEntry::inextensible));
+    chosen_key(k, model);
     ensemble_keys(k, model);
 }
 
@@ -476,6 +495,26 @@ void check_surface_scheme(Keys& k, const Case& c, const MotionLaw& law, const Sc
     });
 }
 
+// Of model.kind = "auto": what only a certain model has.
+template <class Keys>
+void check_chosen_model(Keys& k, const Case& c) {
+    if (c.model.kind != ModelKind::automatic) return;
+    k.check("model.chosen", [&] {
+        return c.model.chosen && !model_entry(*c.model.chosen).inertia && c.velocity.initial != InitialVelocity::rest
+                   ? fmt::format("must not be \"{}\" with a velocity.initial: only \"fluid\" has one",
+                                 model_entry(*c.model.chosen).name)
+                   : "";
+    });
+    k.check("model.kind", [&]() -> std::string {
+        if (c.equilibrium)
+            return "must not be \"auto\" with [equilibrium]: nothing moves; \"fluid\" and \"overdamped\" have the same "
+                   "shapes at rest";
+        if (!c.surface.scheme || entry(*c.surface.scheme).general) return {};
+        return fmt::format("must not be \"auto\" with discretisation.scheme = \"{}\", which has not all models; name one",
+                           entry(*c.surface.scheme).name);
+    });
+}
+
 // Conditions across tables. Long: a line for each.
 template <class Keys>
 void check_together(Keys& k, const Case& c) {
@@ -486,6 +525,7 @@ void check_together(Keys& k, const Case& c) {
                    ? "must not be \"result\": only shape.kind = \"result\" has a velocity"
                    : "";
     });
+    check_chosen_model(k, c);
     k.check("model.period", [&] {
         return law.free_period && !may_have_period(c.shape) ? "must not be \"free\": only a tube has a period" : "";
     });

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "common/case/complaints.hpp"
 #include "common/case/input_file.hpp"
 #include "common/case/overrides.hpp"
@@ -81,6 +83,9 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
             if constexpr (requires { make_noise(shape); }) make_noise(shape);
         },
         c.shape);
+    if (c.model.chosen) c.model.kind = *std::exchange(c.model.chosen, {});
+    if (const ModelEntry& has = model_entry(c.model.kind); has.inextensible && !c.model.gamma)
+        c.model.gamma = default_friction(has);
     if (!c.model.keeps_volume && !c.equilibrium) c.model.keeps_volume = motion_law(c.model).keeps_volume;
     if (!c.model.area && !c.equilibrium) c.model.area = area_rule(c.model);
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;

@@ -12,7 +12,7 @@
 
 namespace tubule {
 
-enum class ModelKind { gradient_flow, overdamped, stokes, fluid };
+enum class ModelKind { gradient_flow, overdamped, stokes, fluid, automatic };
 
 // What holds the area: nothing; the area itself, by one number in gradient flow and locally in inextensible models; or
 // a reservoir, which feeds an inextensible membrane uniformly.
@@ -21,8 +21,9 @@ enum class AreaRule { free, fixed, reservoir };
 // What a case says about its law of motion.
 struct Model {
     ModelKind kind = ModelKind::gradient_flow;
+    std::optional<ModelKind> chosen{}; // of "auto": the model that stands for it, once chosen
     double Re = 1;                     // of viscous models: 1/Re is the viscosity
-    double gamma = 0;                  // of viscous models: friction
+    std::optional<double> gamma{};     // of inextensible models: friction; by default 0 of viscous ones, else 1
     std::optional<bool> keeps_volume;  // by default as the model has it
     std::optional<AreaRule> area{};    // by default free in gradient flow, else fixed
     bool free_period = false;          // of tubes
@@ -36,13 +37,15 @@ struct ModelEntry {
     const char* name;   // as in case files
     bool inextensible;  // locally, div u = 0; such models keep the volume unless the case frees it
     bool inertia;       // the velocity has a start of its own
-    bool viscous;       // takes Re and gamma; other models have friction 1 and no viscosity
+    bool viscous;       // takes Re; other models have no viscosity
 };
 inline constexpr std::array models{
     ModelEntry{ModelKind::gradient_flow, "gradient-flow", false, false, false},
     ModelEntry{ModelKind::overdamped, "overdamped", true, false, false},
     ModelEntry{ModelKind::stokes, "stokes", true, false, true},
     ModelEntry{ModelKind::fluid, "fluid", true, true, true},
+    // A fluid, or a simpler model that does instead of it, which is chosen before anything runs.
+    ModelEntry{ModelKind::automatic, "auto", true, true, true},
 };
 
 constexpr const ModelEntry& model_entry(ModelKind kind) {
@@ -115,12 +118,17 @@ inline AreaRule area_rule(const Model& model) {
     return model.area.value_or(model_entry(model.kind).inextensible ? AreaRule::fixed : AreaRule::free);
 }
 
+// The friction of a model that is given none. That of a gradient flow is always 1.
+constexpr double default_friction(const ModelEntry& model) {
+    return model.viscous ? 0 : 1;
+}
+
 inline MotionLaw motion_law(const Model& model) {
     const ModelEntry& has = model_entry(model.kind);
     const AreaRule area = area_rule(model);
     return {.inertia = has.inertia ? 1.0 : 0.0,
             .viscosity = has.viscous ? 1 / model.Re : 0,
-            .friction = has.viscous ? model.gamma : 1,
+            .friction = has.inextensible ? model.gamma.value_or(default_friction(has)) : 1,
             .inextensible = has.inextensible,
             .keeps_volume = model.keeps_volume.value_or(has.inextensible),
             .keeps_area = !has.inextensible && area == AreaRule::fixed,

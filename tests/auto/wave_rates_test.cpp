@@ -67,7 +67,7 @@ TEST(WaveRates, UnderTensionPressureAndForce) {
         expect_closed_forms({.keeps_volume = true, .area = AreaRule::fixed, .free_period = true, .force = twice(force)},
                             tension);
         for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes}) {
-            Model model{.kind = kind, .Re = 2, .gamma = kind == ModelKind::stokes ? 0.3 : 0, .keeps_volume = true};
+            Model model{.kind = kind, .Re = 2, .gamma = kind == ModelKind::stokes ? 0.3 : 1, .keeps_volume = true};
             model.area = AreaRule::reservoir, model.tension = twice(tension);
             expect_closed_forms(model, tension);
             model.area = AreaRule::fixed, model.tension = {};

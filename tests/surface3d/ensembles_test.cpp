@@ -110,7 +110,7 @@ TEST(Ensembles, AReservoirFeedsUniformlyAndBringsHalfTheMomentum) {
     const MotionMeasures start = motion.measures();
     motion.until(end, 10);
     const MotionMeasures now = motion.measures();
-    const double factor = std::exp(-model.gamma * end) * std::sqrt(now.bending.area / start.bending.area);
+    const double factor = std::exp(-*model.gamma * end) * std::sqrt(now.bending.area / start.bending.area);
     EXPECT_GT(now.bending.area, 1.01 * start.bending.area);
     EXPECT_LT((now.momentum - factor * start.momentum).norm(), 1e-8 * start.momentum.norm());
     const CurvedMesh mesh = motion.mesh();

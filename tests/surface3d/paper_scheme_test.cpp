@@ -12,7 +12,7 @@
 namespace tubule::surface3d {
 namespace {
 
-MotionLaw law_of(ModelKind kind, double Re = 1, double gamma = 0) {
+MotionLaw law_of(ModelKind kind, double Re = 1, std::optional<double> gamma = {}) {
     return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
 }
 

@@ -110,7 +110,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0, term"},
         Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
         Edit{"kind = \"gr", "Re = 1\nkind = \"gr",
-             "8:6: model.Re must be absent: only valid with kind = \"stokes\" or \"fluid\""},
+             "8:6: model.Re must be absent: only valid with kind = \"stokes\" or \"fluid\" or \"auto\""},
         // Reported as misspelt, not as the missing radius:
         Edit{"radius", "  raduis",
              "11:3: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, "
@@ -206,7 +206,7 @@ TEST(CaseRefusal, UnknownChoices) {
         Edit{"\"axisym\"", "\"Axisim\"",
              "1:8: tier must be one of \"axisym\", \"surface3d\", \"auto\", not \"Axisim\"; did you mean 'axisym'?"},
         Edit{"\"gradient-flow\"", "\"water\"",
-             "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"water\""},
+             "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not \"water\""},
         Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"kept\"",
              "9:10: model.volume must be one of \"free\", \"fixed\", not \"kept\""},
         Edit{"\"tube\"", "\"cube\"",
@@ -452,7 +452,7 @@ TEST(CaseRefusal, Overrides) {
                  "velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
-                 "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", not \"honey\""},
+                 "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not \"honey\""},
         Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},

@@ -1,5 +1,6 @@
 #include "common/model/model.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "common/case/read.hpp"
@@ -14,10 +15,11 @@ MotionLaw documented(ModelKind kind) {
         case ModelKind::gradient_flow:
             return {.friction = 1, .inextensible = false, .keeps_volume = false};
         case ModelKind::overdamped:
-            return {.friction = 1};
+            return {.friction = 0.3};
         case ModelKind::stokes:
             return {.viscosity = 0.25, .friction = 0.3};
         case ModelKind::fluid:
+        case ModelKind::automatic:
             return {.inertia = 1, .viscosity = 0.25, .friction = 0.3};
     }
     return {};
@@ -32,6 +34,8 @@ TEST(Model, hasTheDocumentedLaw) {
         EXPECT_EQ(found.friction, expected.friction) << m.name;
         EXPECT_EQ(found.inextensible, expected.inextensible) << m.name;
         EXPECT_EQ(found.keeps_volume, expected.keeps_volume) << m.name;
+        model.gamma.reset();
+        EXPECT_EQ(motion_law(model).friction, m.viscous ? 0 : 1) << m.name;
         model.keeps_volume = !expected.keeps_volume;  // a case may say otherwise
         EXPECT_EQ(motion_law(model).keeps_volume, !expected.keeps_volume) << m.name;
     }
@@ -91,16 +95,35 @@ TEST(Model, isNamedInCaseFilesAndTakesItsKeys) {
             "time.end = 1\nmodel.kind = \"" +
             std::string(m.name) + "\"\n";
         EXPECT_EQ(parse_case(text, {}, "case.toml").model.kind, m.kind);
-        const std::string viscous = text + "model.Re = 2\nmodel.gamma = 3\n",
+        const std::string viscous = text + "model.Re = 2\n", rubbing = text + "model.gamma = 3\n",
                           spinning = text + "velocity = {initial = \"rotation\", omega = 1}\n";
         if (m.viscous)
             EXPECT_EQ(motion_law(parse_case(viscous, {}, "case.toml").model).viscosity, 0.5);
         else
             EXPECT_THROW(parse_case(viscous, {}, "case.toml"), CaseError) << m.name;
+        if (m.inextensible)
+            EXPECT_EQ(motion_law(parse_case(rubbing, {}, "case.toml").model).friction, 3);
+        else
+            EXPECT_THROW(parse_case(rubbing, {}, "case.toml"), CaseError) << m.name;
         if (m.inertia)
             EXPECT_EQ(parse_case(spinning, {}, "case.toml").velocity.initial, InitialVelocity::rotation);
         else
             EXPECT_THROW(parse_case(spinning, {}, "case.toml"), CaseError) << m.name;
+    }
+}
+
+TEST(Model, ThatIsChosenIsTheOneWithThatName) {
+    // docs/case_files.md: the run is that of the model with the Re and gamma of the case.
+    const std::string text =
+        "tier = \"axisym\"\nenergy.k20 = 1\nshape.kind = \"sphere\"\nshape.radius = 1\ntime.end = 1\n"
+        "model = {kind = \"auto\", Re = 2, gamma = 3, volume = \"free\"}\n";
+    for (const ModelEntry& m : models) {
+        if (!m.inextensible || m.kind == ModelKind::automatic) continue;
+        const Case chosen = parse_case(text, {fmt::format("model.chosen={}", m.name)}, "case.toml");
+        std::vector<std::string> sets{fmt::format("model.kind={}", m.name)};
+        std::string named_text = text;
+        if (!m.viscous) named_text.erase(named_text.find("Re = 2, "), 8);
+        EXPECT_EQ(effective_toml(chosen), effective_toml(parse_case(named_text, sets, "case.toml")));
     }
 }
 

@@ -136,11 +136,25 @@ TEST(ModelKeys, WhatGoesTogether) {
     EXPECT_EQ(tube("kind = \"fluid\"\nRe = 2\ngamma = 0.5\n[velocity]\ninitial = \"rotation\"\nomega = 1\n"),
               "accepted");
     EXPECT_EQ(tube("kind = \"fluid\"\nRe = 0\n"), "case.toml:12:6: model.Re must be a number > 0, not 0");
-    EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 1\n"),
-              "case.toml:12:9: model.gamma must be absent: only valid with kind = \"stokes\" or \"fluid\"");
+    EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 1\n"), "accepted");
+    EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 0\n"), "case.toml:12:9: model.gamma must be a number > 0, not 0");
+    EXPECT_EQ(tube("kind = \"gradient-flow\"\ngamma = 1\n"),
+              "case.toml:12:9: model.gamma must be absent: only valid with kind = \"overdamped\" or \"stokes\" or "
+              "\"fluid\" or \"auto\"");
+    EXPECT_EQ(tube("kind = \"auto\"\ngamma = 1\nchosen = \"overdamped\"\n"), "accepted");
+    EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"gradient-flow\"\n"),
+              "case.toml:12:10: model.chosen must be one of \"overdamped\", \"stokes\", \"fluid\", not "
+              "\"gradient-flow\"");
+    EXPECT_EQ(tube("kind = \"fluid\"\nchosen = \"stokes\"\n"),
+              "case.toml:12:10: model.chosen must be absent: only valid with kind = \"auto\", to say what is chosen");
+    EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"overdamped\"\n"),
+              "case.toml:12:10: model.chosen must not be \"overdamped\" without model.gamma: nothing would resist the "
+              "motion");
+    EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"stokes\"\n", "[velocity]\ninitial = \"rotation\"\nomega = 1\n"),
+              "case.toml:12:10: model.chosen must not be \"stokes\" with a velocity.initial: only \"fluid\" has one");
     EXPECT_EQ(
         tube("kind = \"stokes\"\n", "[velocity]\ninitial = \"rest\"\n"),
-        "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
+        "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" or \"auto\" has a velocity at the start");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[velocity]\ninitial = \"rotation\"\n"),
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),

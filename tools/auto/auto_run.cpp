@@ -10,6 +10,7 @@
 
 #include "axisym/run.hpp"
 #include "common/run/run_clock.hpp"
+#include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/joined_file.hpp"
 #include "tools/auto/profile_watch.hpp"
 #include "tools/auto/waves.hpp"
@@ -101,6 +102,21 @@ void set_choice(RunSummary& s, const std::string& choice, const std::string& rea
     s.details.insert(s.details.begin(), {{"choice", choice}, {"reason", reason}});
 }
 
+// On few triangles where these do, as docs/choosing.md has it; again as tier surface3d would choose them where the
+// error is larger than requested. A resumed run has the triangles that it had.
+RunSummary on_triangles(const Case& c, const surface3d::Start& start, SurfacePart& part, const Restart* restart) {
+    if (restart || !c.accuracy.estimate || !few_triangles_do(c, start)) return surface3d::run(c, start, part, restart);
+    Case few = c;
+    few.surface.elements = surface3d::least_triangles;
+    RunSummary s = surface3d::run(few, start, part, nullptr);
+    if (!s.as_accurate_as_asked && !can_go_on(s.stop.reason)) {
+        part.discard();
+        return surface3d::run(c, start, part, nullptr);
+    }
+    s.details.emplace_back("triangles", fmt::format("{}, since the start is smooth", surface3d::least_triangles));
+    return s;
+}
+
 // Why a run stayed axisymmetric.
 std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
     const NoiseGrowth::Peak peak = growth.largest();
@@ -186,7 +202,7 @@ RunSummary AutoRun::in_three_dimensions(const Restart* restart) {
     const Case c = surface_case(case_);
     const Before nothing;
     SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, nothing);
-    RunSummary s = surface3d::run(c, *choice_.start, part, restart);
+    RunSummary s = on_triangles(c, *choice_.start, part, restart);
     set_choice(s, "surface3d", choice_.reason);
     return s;
 }
@@ -260,7 +276,7 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
         c.handover =
             Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
         SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, before);
-        return surface3d::run(c, part, restart);
+        return on_triangles(c, surface3d::Start(c), part, restart);
     });
     s.stop.time = std::max(s.stop.time, at.time);  // where it pauses before the first state in three dimensions
     s.estimated_error = std::max(s.estimated_error, known.error);

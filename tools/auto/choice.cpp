@@ -3,8 +3,28 @@
 #include <fmt/format.h>
 
 #include "common/case/keys.hpp"
+#include "surface3d/run/motion_settings.hpp"
+#include "surface3d/run/motion_start.hpp"
 
 namespace tubule {
+namespace {
+
+// So few triangles are accurate to `few_reach` where they have the energy of the start to `few_start`: of the scenes of
+// docs/both_tiers and of tests/command/advice_study.py those with 3e-4 and less are, while a neck with 1.3e-3 states no
+// error and a rough fluid with 3e-3 is lost.
+constexpr double few_reach = 1e-2, few_start = 5e-4;
+
+}  // namespace
+
+bool few_triangles_do(const Case& c, const surface3d::Start& start) {
+    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || surface3d::settings_given(c))
+        return false;
+    const surface3d::StartMesh mesh = start.mesh(surface3d::least_triangles, element_order(c));
+    const surface3d::Observables o = surface3d::observe_start(c, mesh);
+    const double energy = surface3d::free_energy(c, o, mesh.mesh.period);
+    return surface3d::error_of_start(c, start, surface3d::least_triangles, energy) <=
+           few_start * surface3d::reference_energy(c, o, mesh.mesh.period);
+}
 
 Choice choice_for(const Case& c) {
     if (const auto [key, complaint] = not_axisymmetric(c.shape); !key.empty())

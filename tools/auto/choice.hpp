@@ -20,6 +20,10 @@ struct Choice {
 // result that the case starts from cannot be read, or a start in three dimensions cannot be meshed.
 Choice choice_for(const Case& c);
 
+// Whether 80 triangles are enough, fewer than runs begin with: a smooth start, little accuracy, and no mesh of its own or
+// by the case.
+bool few_triangles_do(const Case& c, const surface3d::Start& start);
+
 // The case in tier axisym until `end`, with these output times.
 Case axisym_case(const Case& c, double end, std::vector<double> output);
 // The case in tier surface3d.

@@ -25,6 +25,7 @@
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
+#include "tools/run/model_advice.hpp"
 
 namespace tubule {
 
@@ -62,6 +63,7 @@ struct Checked {
     std::vector<Complaint> complaints;
     std::string toml;                   // resolved
     std::vector<std::string> chosen;    // in words
+    std::string model, model_reason;    // of model.kind = "auto"
     std::optional<Forecast> expected;   // with --quick nothing
     std::optional<Advice> advice;       // likewise
     std::string unknown;                // why nothing is expected
@@ -78,16 +80,27 @@ std::optional<Advice> advice_for(const Case& c, const Forecast& expected) {
     }
 }
 
+// Of model.kind = "auto": with --quick, without trial runs, a fluid.
+Case chosen_case(const Case& c, const CheckOptions& options, Checked& out) {
+    if (c.model.kind != ModelKind::automatic) return c;
+    if (options.quick) return with_model(c, {ModelKind::fluid, ""}).c;
+    if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
+    ChosenCase chosen = with_chosen_model(c);
+    out.model = name(chosen.c.model), out.model_reason = chosen.reason;
+    return std::move(chosen.c);
+}
+
 // Files that the case names are read as well.
 Checked checked(const std::string& path, const CheckOptions& options) {
     Checked out;
     out.path = path;
     try {
-        const Case c = read_case(path, options.sets);
-        out.toml = effective_toml(c);
-        out.chosen = chosen(c);
-        if (const std::string falls = unbounded_below(c.energy); !falls.empty())
+        const Case given = read_case(path, options.sets);
+        out.toml = effective_toml(given);
+        if (const std::string falls = unbounded_below(given.energy); !falls.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
+        const Case c = chosen_case(given, options, out);
+        out.chosen = chosen(c);
         engine_for(c);
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick) out.expected = forecast(c);
@@ -112,6 +125,7 @@ void tell(const Checked& c, bool quick) {
         return;
     }
     std::string answer = fmt::format("# OK {}\n{}", shown_path(c.path), c.toml);
+    if (!c.model.empty()) add(answer, "\n# chosen: model.kind = \"{}\": {}", c.model, c.model_reason);
     for (const std::string& words : c.chosen) add(answer, "\n# by default: {}", words);
     print_answer(answer + "\n");
     for (const std::string& warning : c.warnings) say(stderr, "{}\n", warning);
@@ -164,10 +178,13 @@ std::string json_of(const Checked& c) {
         expected = fmt::format("{{\"resolution\": {}, \"steps\": {}, \"seconds\": {}, \"bytes\": {}}}",
                                json(c.expected->resolution), or_null(c.expected->steps), or_null(c.expected->seconds),
                                json(c.expected->bytes));
+    const std::string model = c.model.empty() ? "null"
+                                              : fmt::format("{{\"kind\": {}, \"reason\": {}}}", json(c.model),
+                                                            json(valid_utf8(c.model_reason)));
     return fmt::format(
-        "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"chosen\": {}, \"expected\": {}, "
-        "\"advice\": {}, \"unknown\": {}, \"warning\": {}}}",
-        json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""),
+        "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"model\": {}, \"chosen\": {}, "
+        "\"expected\": {}, \"advice\": {}, \"unknown\": {}, \"warning\": {}}}",
+        json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""), model,
         json(c.chosen), expected, json_of(c.advice), or_null(c.unknown),
         or_null(fmt::format("{}", fmt::join(c.warnings, "\n"))));
 }

@@ -11,6 +11,7 @@
 #include "common/case/case.hpp"
 #include "common/result/result.hpp"
 #include "common/run/run.hpp"
+#include "tools/run/model_advice.hpp"
 
 namespace CLI {
 class App;
@@ -29,6 +30,7 @@ TUBULE_COMMANDS(TUBULE_COMMAND)
 
 // What a result records when its run begins: the build, the machine, the time; and when it has ended.
 About about_start();
+void add_choice(About& about, const ChosenCase& chosen);  // of its model, if that was chosen
 About about_end(const Case& c, const RunSummary& summary, double wall_seconds);
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.

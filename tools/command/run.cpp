@@ -34,6 +34,7 @@
 #include "tools/run/failure.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
+#include "tools/run/model_advice.hpp"
 
 namespace tubule {
 
@@ -61,6 +62,11 @@ About about_start() {
     std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
     about.emplace_back("started", std::string(text));
     return about;
+}
+
+void add_choice(About& about, const ChosenCase& chosen) {
+    if (chosen.reason.empty()) return;
+    about.insert(about.end(), {{"model", name(chosen.c.model)}, {"model_reason", chosen.reason}});
 }
 
 About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
@@ -156,7 +162,8 @@ int compare(const Case& c, const std::filesystem::path& file) {
     return lines.empty() ? 0 : 1;
 }
 
-void report(const Case& c, const RunSummary& s, const std::string& file, double seconds) {
+void report(const ChosenCase& chosen, const RunSummary& s, const std::string& file, double seconds) {
+    const Case& c = chosen.c;
     const std::string when = c.moves() ? fmt::format(" at t = {:.6g}", s.stop.time) : "";
     say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
     const int status = exit_code(s.stop.reason);
@@ -170,8 +177,10 @@ void report(const Case& c, const RunSummary& s, const std::string& file, double 
             s.estimated_error, s.reference_energy, c.accuracy.energy);
     else if (s.reference_energy > 0)
         say(stdout, "    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
+    if (!chosen.reason.empty()) say(stdout, "    {}\n", words_of_choice(chosen));
     for (const auto& [key, value] : s.details)
-        if (key == "choice" || key == "reason") say(stdout, "    {}: {}\n", key, std::get<std::string>(value));
+        if (key == "choice" || key == "reason" || key == "triangles")
+            say(stdout, "    {}: {}\n", key, std::get<std::string>(value));
     say(stdout, "    {}{}{:.3g} s; {}\n", s.effort, s.effort.empty() ? "" : ", ", seconds, file);
 }
 
@@ -195,19 +204,22 @@ struct Opened {
     std::optional<Result> unfinished;  // the file that it belongs to, as it was found
 };
 
-Opened create(const Case& c, const Engine& engine, const std::filesystem::path& file) {
+Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
+    const Case& c = chosen.c;
     About about = about_start();
+    add_choice(about, chosen);
     about.emplace_back("case_path", valid_utf8(std::filesystem::absolute(c.path).string()));
     return {ResultWriter::create(file, {c.text, c.sets}, about, engine.series_names()), std::nullopt, std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
-std::optional<Opened> resume(const Case& c, const Engine& engine, const std::filesystem::path& file) {
+std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
+    const Case& c = chosen.c;
     Result old = read_result(file);
     if (!goes_on(c, old, file)) return std::nullopt;
     if (c.equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
-    if (old.frames.empty() && !old.checkpoint) return create(c, engine, file);
+    if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
     ResultWriter writer = ResultWriter::resume(
         file, [&](const Record& record) { engine.check_restart(record); }, CaseText{c.text, c.sets});
     const Record& record = writer.restart_record();
@@ -217,7 +229,7 @@ std::optional<Opened> resume(const Case& c, const Engine& engine, const std::fil
 }
 
 // A result that cannot be written or resumed is found before anything is computed: bad input.
-std::optional<Opened> open_result(const Case& c, const Engine& engine, const std::filesystem::path& file,
+std::optional<Opened> open_result(const ChosenCase& c, const Engine& engine, const std::filesystem::path& file,
                                   bool resuming) {
     try {
         if (resuming && std::filesystem::exists(file)) return resume(c, engine, file);
@@ -264,7 +276,8 @@ void tell_missed_outputs(const Case& c, const Result& result, double from) {
             fmt::join(missed, ", "), from);
 }
 
-int run_case(Case c, const std::filesystem::path& file, const RunOptions& options) {
+int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOptions& options) {
+    Case& c = chosen.c;
     if (options.check_derivatives && !derivatives_pass(c)) {
         say(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
         return exit_code(Stop::solver_failed);
@@ -276,7 +289,7 @@ int run_case(Case c, const std::filesystem::path& file, const RunOptions& option
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
     const auto engine = engine_for(c);
     const double before = watch.seconds();
-    std::optional<Opened> result = open_result(c, *engine, file, options.resume);
+    std::optional<Opened> result = open_result(chosen, *engine, file, options.resume);
     if (!result) {
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
@@ -303,7 +316,7 @@ int run_case(Case c, const std::filesystem::path& file, const RunOptions& option
     const bool compared = options.expect && !stays && summary.stop.reason != Stop::interrupted;
     const int status = compared ? compare(c, file) : exit_code(summary.stop.reason);
     const std::string words = file.string() + (stays ? " is left as it was: this run has no row" : "");
-    if (!options.silent && (!options.quiet || status != 0)) report(c, summary, words, seconds);
+    if (!options.silent && (!options.quiet || status != 0)) report(chosen, summary, words, seconds);
     return status;
 }
 
@@ -344,9 +357,24 @@ void check_replaced(const Case& c, const std::filesystem::path& file, bool overw
 namespace {
 
 struct Job {
-    Case c;
+    ChosenCase chosen;
     std::filesystem::path file;
 };
+
+// What is bad input is found before trial runs; a result that goes on keeps its model.
+ChosenCase with_model_of_run(const Case& c, const std::filesystem::path& file, const RunOptions& options) {
+    if (c.model.kind != ModelKind::automatic) return {c, ""};
+    check_output(file);
+    if (options.refuse_ill_posed)
+        if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
+    ChosenCase chosen;
+    if (const auto before = options.resume && is_hdf5(file) ? chosen_before(file) : std::nullopt)
+        chosen = with_model(c, {*before, "that of the result"});
+    else
+        chosen = with_chosen_model(c);
+    if (!options.quiet) say(stderr, "{}: {}\n", c.path, words_of_choice(chosen));
+    return chosen;
+}
 
 // To go on with a result: its case and itself.
 Job job_of_result(const std::string& path, const std::vector<std::string>& sets, const RunOptions& options) {
@@ -355,7 +383,7 @@ Job job_of_result(const std::string& path, const std::vector<std::string>& sets,
     if (!options.output.empty())
         throw CaseError(fmt::format("-o must be absent: {} itself goes on; copy it to keep it as it is", path));
     try {
-        return {case_of_result(read_result(path), path, sets), path};
+        return {{case_of_result(read_result(path), path, sets), ""}, path};
     } catch (const CaseError&) {
         throw;
     } catch (const std::runtime_error& error) {
@@ -367,10 +395,11 @@ Job job_of(const std::string& path, const RunOptions& options) {
     std::vector<std::string> sets = options.sets;
     if (options.until) sets.push_back(fmt::format("time.end={}", *options.until));
     if (is_hdf5(path)) return job_of_result(path, sets, options);
-    Case c = read_case(path, sets);
+    const Case c = read_case(path, sets);
     const auto file = result_path(options, c);
-    check_replaced(c, file, options.resume || options.overwrite);
-    return {std::move(c), file};
+    ChosenCase chosen = with_model_of_run(c, file, options);
+    check_replaced(chosen.c, file, options.resume || options.overwrite);
+    return {std::move(chosen), file};
 }
 
 }  // namespace
@@ -383,18 +412,19 @@ int run_cases(const RunOptions& options) {
     for (const std::string& path : options.cases) {
         jobs.push_back(job_of(path, options));
         if (options.refuse_ill_posed && !options.resume)
-            if (const auto ill_posed = ill_posed_start(jobs.back().c)) throw *ill_posed;
-        if (options.check_derivatives && !derivatives_can_be_checked(jobs.back().c))
+            if (const auto ill_posed = ill_posed_start(jobs.back().chosen.c)) throw *ill_posed;
+        if (options.check_derivatives && !derivatives_can_be_checked(jobs.back().chosen.c))
             throw CaseError(path + ": --check-derivatives must be absent: it checks tubes of tier \"axisym\" only");
         if (!files.insert(jobs.back().file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, jobs.back().file.string()));
     }
     catch_interrupts();
     int status = 0;
-    for (const auto& [c, file] : jobs) {
+    for (const auto& [chosen, file] : jobs) {
+        const Case& c = chosen.c;
         int one = 0;
         try {
-            one = run_case(c, file, options);
+            one = run_case(chosen, file, options);
         } catch (const CaseError&) {
             throw;
         } catch (const Paused& pause) {  // before there was a result to write to

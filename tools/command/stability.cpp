@@ -33,7 +33,10 @@ namespace tubule {
 
 std::string words(const Model& model) {
     std::string text = name(model);
-    if (model_entry(model.kind).viscous) text += fmt::format(", Re = {:g}, gamma = {:g}", model.Re, model.gamma);
+    const ModelEntry& has = model_entry(model.kind);
+    const double friction = motion_law(model).friction;
+    if (has.viscous) text += fmt::format(", Re = {:g}", model.Re);
+    if (has.viscous || friction != 1) text += fmt::format(", gamma = {:g}", friction);
     if (model.keeps_volume) text += *model.keeps_volume ? ", volume fixed" : ", volume free";
     if (model.area && model.area != area_rule({.kind = model.kind, .keeps_volume = {}}))
         text += model.area == AreaRule::fixed ? ", area fixed" : ", membrane from a reservoir";
@@ -85,6 +88,7 @@ Model with_kind(const Model& own, ModelKind kind) {
     if (model_entry(kind).inextensible && model_entry(own.kind).inextensible) {
         Model model = own;
         model.kind = kind;
+        if (model_entry(kind).viscous != model_entry(own.kind).viscous) model.gamma.reset();
         return model;
     }
     return {.kind = kind, .Re = own.Re, .gamma = own.gamma, .keeps_volume = {}};
@@ -95,12 +99,13 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
     std::vector<Model> models;
     bool viscous = false;
     for (const ModelEntry& other : tubule::models) {
+        if (other.kind == ModelKind::automatic) continue;
         if (!all && (options.model.empty() ? other.kind != own.kind : options.model != other.name)) continue;
         Model model = own;
         model.kind = other.kind;
         if (other.kind != own.kind) model = with_kind(own, other.kind);
         if (options.Re) model.Re = *options.Re;
-        if (options.gamma) model.gamma = *options.gamma;
+        if (options.gamma && other.viscous) model.gamma = *options.gamma;
         viscous = viscous || other.viscous;
         models.push_back(model);
     }
@@ -173,6 +178,8 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     if (subject.c.energy.H0_varies() || (subject.frame && find_array(*subject.frame, "H0")))
         throw complaint_about_H0(subject.c, "must be a number for growth rates; run the case instead");
     if (!options.fit.empty()) return fit_report(options, subject);
+    if (subject.c.model.kind == ModelKind::automatic && options.model.empty())
+        throw complaint(subject.c, "model.kind", "must not be \"auto\" for growth rates: name a model with --model");
     const std::vector<Model> models = models_of(options, subject.c.model);
     std::optional<TubeSubject> tube;
     if (subject.frame && subject.frame->mesh)
@@ -261,7 +268,8 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
     std::vector<std::string> names{"all"};
-    for (const ModelEntry& m : models) names.insert(names.end() - 1, m.name);
+    for (const ModelEntry& m : models)
+        if (m.kind != ModelKind::automatic) names.insert(names.end() - 1, m.name);
     command->add_option("--model", o->model, "another model than the case's, or all")->check(CLI::IsMember(names));
     command->add_option("--Re", o->Re, "of viscous models, where the case has none")
         ->check(refuse_infinite)

@@ -88,12 +88,15 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 
 }  // namespace
 
-Result run_in_memory(const Case& c, const MemoryRunOptions& options) {
-    PauseWatch watch(c.time.limit, options.interrupted);
+Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
+    PauseWatch watch(given.time.limit, options.interrupted);
+    const ChosenCase chosen = with_chosen_model(given);
+    const Case& c = chosen.c;
     const auto engine = engine_for(c);
     Result result;
     result.case_text = {c.text, c.sets};
     result.about = about_start();
+    add_choice(result.about, chosen);
     result.series_names = engine->series_names();
     for (const std::string& name : result.series_names) result.series[name];
     std::optional<ResultWriter> writer;

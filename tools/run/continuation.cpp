@@ -127,6 +127,15 @@ Case case_of_result(const Result& result, const std::filesystem::path& file, con
     return parse_case(result.case_text.text, all, path_of_case(result, file));
 }
 
+std::optional<ModelKind> chosen_before(const std::filesystem::path& file) {
+    const std::string key = "model.chosen=";
+    std::optional<ModelKind> out;
+    for (const std::string& set : read_case_text(file).sets)
+        for (const ModelEntry& m : models)
+            if (set == key + m.name) out = m.kind;
+    return out;
+}
+
 std::optional<Stop> stop_of(const Result& result) {
     for (const auto& [name, value] : result.about)
         if (name == "stop") return stop_from_name(std::get<std::string>(value));

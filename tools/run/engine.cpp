@@ -84,6 +84,7 @@ private:
 
 std::unique_ptr<const Engine> engine_for(const Case& c) {
     if (c.equilibrium) return std::make_unique<Equilibria>(c);
+    if (c.model.kind == ModelKind::automatic) throw std::logic_error("a case whose model is not chosen yet");
     switch (c.tier) {
         case Tier::axisym:
             return std::make_unique<Axisymmetric>(c);

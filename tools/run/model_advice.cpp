@@ -1,5 +1,7 @@
 #include "tools/run/model_advice.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -9,14 +11,25 @@
 #include <span>
 #include <string>
 
-#include "axisym/run.hpp"
+#include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/sparse.hpp"
+#include "surface3d/run/motion_settings.hpp"
+#include "tools/auto/choice.hpp"
+#include "tools/run/engine.hpp"
 
 namespace tubule {
 namespace {
 
-constexpr double simpler_limit = 1;  // seconds of a processor: a busy machine must not change what is advised
-constexpr double accuracy = 1e-4;    // of the pilots, or better if the case is
+// What a pilot may take, in rows (of all its runs) and, should these be slow, in seconds of a processor. A choice of
+// the model must be the same each time: rows are counted first.
+constexpr int most_rows = 20000, most_rows_of_surface = 600;
+constexpr double most_seconds = 20;
+// Of the fall of the energy, to see whether it speeds up: what grows from little is late by far more than the criterion
+// says, since its delays add up.
+constexpr double least_parts = 20, most_parts = 1000;
+constexpr double accuracy = 1e-4;  // of the pilots in tier axisym, or better if the case is
+constexpr double accuracy_of_surface = 1e-2;
 // Measured (docs/decisions/tiers.md, tests/benchmark/model_differences.py): on a length L the viscosity damps like a
 // friction of `viscous`/(Re L^2), and slows what friction alone would drive down by the factor 1 + `slower`/(gamma Re
 // L^2).
@@ -28,14 +41,22 @@ struct Point {
 
 class Path : public RunObserver {
 public:
-    explicit Path(const std::vector<std::string>& names)
-        : energy_(index(names, "energy")), area_(index(names, "area")), r_max_(index(names, "r_max")) {}
+    Path(const std::vector<std::string>& names, int most_rows)
+        : energy_(index(names, "energy")),
+          area_(index(names, "area")),
+          r_max_(index(names, "r_max")),
+          most_rows_(most_rows) {}
     void row(std::span<const double> values) override {
+        ++rows_;
         if (points.empty()) area = values[area_], r_max = values[r_max_];
         points.push_back({values[0], values[energy_]});
     }
     void discard() override { points.clear(); }
-    bool interrupted() override { return tubule::interrupted() || seconds() > simpler_limit; }
+    bool interrupted() override {
+        return tubule::interrupted() || switched || rows_ > most_rows_ || seconds() > most_seconds;
+    }
+    // Tier "auto" tells that it goes on in three dimensions.
+    void note(const std::string&) override { switched = switched || !points.empty(); }
     double seconds() const { return static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC; }
 
     double at(double time) const;
@@ -44,14 +65,19 @@ public:
     // The largest difference from the path that is slower by this factor.
     double lead(double factor) const;
 
+    // Whether the energy, falling by steps of `part`, needs less than half the time of an earlier step for one of them.
+    bool speeds_up(double part) const;
+
     std::vector<Point> points;
     double area = 0, r_max = 0;  // at the start
+    bool switched = false;
 
 private:
     static std::size_t index(const std::vector<std::string>& names, const char* name) {
         return std::find(names.begin(), names.end(), name) - names.begin();
     }
     std::size_t energy_, area_, r_max_;
+    int rows_ = 0, most_rows_;
     std::clock_t begin_ = std::clock();
 };
 
@@ -76,46 +102,127 @@ double Path::lead(double factor) const {
     return largest;
 }
 
-// The case in tier axisym with this model, whose time is `scale` of that of the case.
-Case with_model(const Case& c, ModelKind kind, double scale) {
+bool Path::speeds_up(double part) const {
+    double level = points.front().energy - part, since = points.front().time, longest = 0;
+    const Point* before = &points.front();
+    for (const Point& p : points) {
+        for (; p.energy <= level; level -= part) {
+            const double along = (before->energy - level) / (before->energy - p.energy);
+            const double time = std::lerp(before->time, p.time, along);
+            if (time - since < longest / 2) return true;
+            longest = std::max(longest, time - since), since = time;
+        }
+        before = &p;
+    }
+    return false;
+}
+
+// The case with this model in the tier that shows its path: tier axisym; of starts that may leave it, tier "auto"; of
+// others, few triangles.
+Case pilot_of(const Case& c, ModelKind kind, bool axisymmetric) {
     Case out = c;
-    out.tier = Tier::axisym;
     out.model.kind = kind;
-    out.accuracy.energy = std::min(c.accuracy.energy, accuracy);
-    out.discretisation = {};
-    out.time = {.end = c.time.end * scale, .output = {}, .stationary = {}, .limit = {}};
+    out.time = {.end = c.time.end, .output = {}, .stationary = {}, .limit = {}};
+    out.discretisation = {}, out.surface = {};
+    if (axisymmetric) {
+        out.accuracy.energy = std::min(c.accuracy.energy, accuracy);
+        if (c.tier != Tier::axisym) out.tier = Tier::automatic;
+        return out;
+    }
+    out.tier = Tier::surface3d;
+    out.surface.elements = surface3d::least_triangles;
+    out.accuracy.energy = std::max(c.accuracy.energy, accuracy_of_surface), out.accuracy.estimate = false;
     return out;
 }
 
-std::optional<SimplerModel> compared(const Case& c, ModelKind kind) {
-    // Time of the simpler model, of that of the case.
-    const double scale = kind == ModelKind::overdamped ? 1 / c.model.gamma : 1;
-    const Case simple = with_model(c, kind, scale);
-    Path path(axisym::series_names(simple));
-    const RunSummary s = axisym::run(simple, path);
+std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymmetric) {
+    const Case simple = pilot_of(c, kind, axisymmetric);
+    const auto engine = engine_for(simple);
+    Path path(engine->series_names(), axisymmetric ? most_rows : most_rows_of_surface);
+    RunSummary s;
+    try {
+        s = engine->run(path);
+    } catch (const SolveError&) {
+        return {};
+    }
     if ((s.stop.reason != Stop::finished && s.stop.reason != Stop::stationary) || path.points.empty()) return {};
+    const double fall = path.points.front().energy - path.points.back().energy;
+    if (path.speeds_up(std::clamp(c.accuracy.energy * s.reference_energy / 2, fall / most_parts, fall / least_parts)))
+        return SimplerModel{kind, HUGE_VAL, HUGE_VAL, path.seconds()};
     const double length2 = may_have_period(c.shape) ? path.r_max * path.r_max : path.area / (4 * std::numbers::pi);
-    const double viscosity = 1 / (c.model.Re * length2);
-    const bool inertia = model_entry(c.model.kind).inertia;
-    const double tau = inertia ? scale / (c.model.gamma + viscous * viscosity) : 0;
-    const double factor = kind == ModelKind::overdamped ? 1 + slower * viscosity / c.model.gamma : 1;
+    const double viscosity = 1 / (c.model.Re * length2), gamma = motion_law(c.model).friction;
+    const double tau = model_entry(c.model.kind).inertia ? 1 / (gamma + viscous * viscosity) : 0;
+    const double factor = kind == ModelKind::overdamped ? 1 + slower * viscosity / gamma : 1;
     const double end = path.points.back().time, rest = path.points.back().energy;
     return SimplerModel{kind, (path.lag(tau) + path.lead(factor)) / s.reference_energy,
                         (path.at((end - tau) / factor) - rest) / s.reference_energy, path.seconds()};
 }
 
+// Why a path does not tell; empty if it does.
+std::string untold(const Case& c, const Choice& choice) {
+    const MotionLaw law = motion_law(c.model);
+    if (c.velocity.initial != InitialVelocity::rest) return "the case gives a velocity";
+    if (law.reservoir || law.free_period || !law.without_loads())
+        return "loads, a reservoir or a free period act on the membrane";
+    if (c.energy.H0_varies() && c.tier != Tier::axisym) return "energy.H0 varies";
+    if (!choice.axisymmetric && !choice.start->resizable()) return "the start brings its own triangles";
+    return {};
+}
+
+std::string two_digits(double value) {
+    return fmt::format("{:.2g}", value);
+}
+
 }  // namespace
 
-std::vector<SimplerModel> simpler_models(const Case& c) {
-    const MotionLaw law = motion_law(c.model);
-    const bool plain = law.without_loads() && !law.reservoir && !law.free_period;
-    if (!model_entry(c.model.kind).viscous || !plain || c.velocity.initial != InitialVelocity::rest) return {};
-    std::vector<SimplerModel> out;
+SimplerModels simpler_models(const Case& c) {
+    if (!model_entry(c.model.kind).viscous) return {{}, "no model is simpler"};
+    const Choice choice = c.tier == Tier::axisym ? Choice{} : choice_for(c);
+    if (std::string why = untold(c, choice); !why.empty()) return {{}, std::move(why)};
+    SimplerModels out;
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes}) {
-        if (kind == c.model.kind || (kind == ModelKind::overdamped && !(c.model.gamma > 0))) continue;
-        if (const auto one = compared(c, kind)) out.push_back(*one);
+        if (kind == c.model.kind || (kind == ModelKind::overdamped && !(motion_law(c.model).friction > 0))) continue;
+        const auto one = compared(c, kind, choice.axisymmetric);
+        if (one && std::isinf(one->on_the_way)) return {{}, "the fall of the energy speeds up, as where waves grow"};
+        if (one) out.models.push_back(*one);
     }
+    if (out.models.empty())
+        out.unknown = choice.axisymmetric && c.tier != Tier::axisym
+                          ? "trial runs of simpler models do not come to the end as axisymmetric ones"
+                          : "trial runs of simpler models do not come to the end";
     return out;
+}
+
+ModelChoice choose_model(const Case& c) {
+    Case full = c;
+    if (c.model.kind == ModelKind::automatic) full.model.kind = ModelKind::fluid;
+    const auto simpler = simpler_models(full);
+    if (!simpler.unknown.empty())
+        return {full.model.kind, "whether a simpler model does is unknown: " + simpler.unknown, true};
+    for (const SimplerModel& m : simpler.models)
+        if (m.on_the_way <= c.accuracy.energy)
+            return {m.kind,
+                    fmt::format("the path of \"{}\" differs by about {} of E_ref from that of \"{}\"",
+                                model_entry(m.kind).name, two_digits(m.on_the_way), name(full.model)),
+                    false, m.seconds};
+    const SimplerModel& best = *std::ranges::min_element(simpler.models, {}, &SimplerModel::on_the_way);
+    return {full.model.kind,
+            fmt::format("model \"{}\" would differ by about {} of E_ref on the way, by {} at the end",
+                        model_entry(best.kind).name, two_digits(best.on_the_way), two_digits(best.at_end))};
+}
+
+ChosenCase with_model(const Case& c, const ModelChoice& choice) {
+    std::vector<std::string> sets = c.sets;
+    sets.push_back(fmt::format("model.chosen={}", model_entry(choice.kind).name));
+    return {parse_case(c.text, sets, c.path), choice.reason};
+}
+
+ChosenCase with_chosen_model(const Case& c) {
+    return c.model.kind == ModelKind::automatic ? with_model(c, choose_model(c)) : ChosenCase{c, ""};
+}
+
+std::string words_of_choice(const ChosenCase& chosen) {
+    return fmt::format("model {}: {}", name(chosen.c.model), chosen.reason);
 }
 
 }  // namespace tubule

@@ -261,6 +261,10 @@ std::vector<std::string> Scan::sets_of(std::size_t point) const {
 
 Case Scan::case_of(std::size_t point) const {
     Case c = parse_case(case_text, sets_of(point), case_path);
+    if (c.model.kind == ModelKind::automatic)
+        throw complaint(c, "model.kind",
+                        "must not be \"auto\" in a scan, whose points would have different models; `tubule check` says "
+                        "which one does for a case");
     if (c.energy.H0_varies())
         throw complaint_about_H0(c, "must be a number in a scan, which decides by growth rates; run the cases");
     return c;

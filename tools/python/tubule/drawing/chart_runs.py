@@ -86,7 +86,11 @@ class Program:
     def check(self, job):
         """The case with all overrides as TOML text, or its error."""
         done = self.printed("check", "--quick", job.case, *set_options(job))
-        return (done.stdout, None) if done.returncode == 0 else (None, done.stderr.strip())
+        if done.returncode:
+            return None, done.stderr.strip()
+        if '\nkind = "auto"\n' in done.stdout:
+            return None, f"{job.case}: model.kind must not be \"auto\" in a chart, whose runs could have different models; name one"
+        return done.stdout, None
 
     def check_quantity(self, job):
         """What is wrong with the name of the quantity, if anything: the program knows what a case can expect."""
