@@ -96,6 +96,7 @@ struct SurfaceDiscretisation {
     std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
     std::optional<double> relaxation;      // time in which the mesh becomes even
     bool follow_curvature = false;         // or finer where the surface is more curved
+    bool coarsen = false;                  // fewer triangles when the motion has become smooth
 };
 
 struct TimeSpan {

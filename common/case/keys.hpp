@@ -239,8 +239,9 @@ void keys_of_scheme(Keys& k, SurfaceDiscretisation& d, const SchemeEntry& scheme
     if (scheme.controls_mesh) {
         k.number("relaxation", d.relaxation, {.above = 0});
         k.flag("follow_curvature", d.follow_curvature);
+        k.flag("coarsen", d.coarsen);
     } else {
-        for (const char* key : {"relaxation", "follow_curvature"}) absent(key, "does not control its mesh");
+        for (const char* key : {"relaxation", "follow_curvature", "coarsen"}) absent(key, "does not control its mesh");
     }
 }
 
@@ -268,7 +269,7 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
               {"patch", Recovery::patch},
               {"exact", Recovery::exact}});
     k.number("smoothing", d.smoothing, {.from = 0});
-    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation", "follow_curvature"})
+    for (const char* key : {"scheme", "step", "time_tolerance", "relaxation", "follow_curvature", "coarsen"})
         k.absent(key, "must be absent: only valid with a table [time]");
 }
 

@@ -10,6 +10,7 @@
 #include "common/run/error_scale.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/meshing/remesh.hpp"
+#include "surface3d/meshing/transfer.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/motion_error.hpp"
 #include "surface3d/run/motion_series.hpp"
@@ -29,6 +30,10 @@ constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart =
 constexpr int steps_between_meshes = 20;
 // Errors of a coarser run may be so many times larger: with 2.25 times fewer triangles they are at order 4.
 constexpr double larger_errors = 5;
+// Coarser meshes for what has become smooth: looked for after so many steps, at most so often, where the energy jumps
+// by at most this part of what is asked, and triangles are good; the first step there, of the one before.
+constexpr int steps_between_looks = 6, most_coarser = 2;
+constexpr double part_of_jump = 0.25, quality_of_coarser = 0.5, shorter_first_step = 0.1;
 // A coarser run gets over some steps of the run in so many trials at most: the trials of one whose mesh is no longer
 // good enough would otherwise have no end.
 constexpr int most_at_once = 40;
@@ -70,6 +75,8 @@ void MotionAttempt::use_mesh(const CurvedMesh& mesh) {
 }
 
 void MotionAttempt::begin(const Start& from) {
+    start_ = &from;
+    if (from.resizable()) memory_.grid = memory_.settings.elements;
     const StartMesh start = from.mesh(memory_.settings.elements, element_order(case_));
     summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
@@ -108,7 +115,8 @@ void MotionAttempt::set_moving() {
     }
 }
 
-void MotionAttempt::resume(const Restart& restart) {
+void MotionAttempt::resume(const Restart& restart, const Start& start) {
+    start_ = &start;
     auto [state, memory] = motion_restart(restart.record, time_scheme(case_));
     memory_ = memory;
     use_mesh(frame_surface(restart.record, restart.cells.value()));
@@ -229,41 +237,108 @@ bool MotionAttempt::wants_new_mesh() const {
 }
 
 // The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.
-// The jump of the energy counts as an error. Where no better mesh can be made, the old one is kept: check_state() stops
-// the run when it is no longer good enough.
+// Where no better mesh can be made, the old one is kept: check_state() stops the run when it is no longer good enough.
 void MotionAttempt::make_new_mesh() {
     memory_.count.mesh_since = memory_.count.steps;
-    const int n = static_cast<int>(state_.X.cols()), d = surface().law().components();
-    Eigen::MatrixXd carried = state_.u.reshaped(n, d).transpose();
-    if (memory_.H0.size() > 0) {
-        carried.conservativeResize(d + 1, n);
-        carried.row(d) = memory_.H0.transpose();
-    }
-    const auto found = remesh(surface().mesh(state_), carried, {});
+    const auto found = remesh(surface().mesh(state_), carried(), {});
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || better->quality.worst < now_.quality.worst) return;
-    const double time = state_.time, stretch = state_.stretch, energy = comparable(), before = total();
+    if (!change_mesh(better->mesh, better->fields, HUGE_VAL)) return;
+    memory_.grid = 0;
+    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
+}
+
+// Where the coarser run can follow, which is where it has got to the same time.
+bool MotionAttempt::may_be_coarser() const {
+    if (!case_.surface.coarsen || !out_.reported() || memory_.count.coarser == most_coarser) return false;
+    const int since = memory_.count.steps - memory_.count.mesh_since, next = fewer_triangles(memory_.grid);
+    if (since < steps_between_meshes || memory_.count.steps % steps_between_looks != 0) return false;
+    return error_ ? fewer_triangles(next) >= least_triangles && error_->is_at(state_.time) : next >= least_triangles;
+}
+
+// The start's mesh of about so many triangles, with its nodes where the same points of the start are now. False where
+// that is not a good mesh, or the energy would jump by more, absolutely.
+bool MotionAttempt::make_coarser(int triangles, double most_jump) {
+    if (memory_.grid == 0) return false;
+    const int order = element_order(case_);
+    try {
+        const CurvedMesh from = start_->mesh(memory_.grid, order).mesh, to = start_->mesh(triangles, order).mesh;
+        if (to.triangles() >= from.triangles()) return false;
+        const std::vector<MeshPoint> places = places_of_nodes(to, from);
+        const CurvedMesh now = surface().mesh(state_), next = moved_to(places, now, to);
+        if (!(mesh_quality(next).worst > quality_of_coarser)) return false;
+        if (!change_mesh(next, values_at(places, now, carried()), most_jump)) return false;
+    } catch (const SolveError&) {
+        return false;
+    }
+    memory_.grid = triangles;
+    memory_.count.mesh_since = memory_.count.steps;
+    ++memory_.count.coarser;
+    if (!case_.surface.step) memory_.next_step = shorter_first_step * memory_.next_step;
+    return true;
+}
+
+void MotionAttempt::look_for_coarser() {
+    const double most = part_of_jump * case_.accuracy.energy * memory_.scale.reference_energy;
+    if (!make_coarser(fewer_triangles(memory_.grid), most)) return;
+    out_.note(fmt::format("t = {:.4g}: goes on with {} triangles", state_.time, summary.elements));
+    if (error_) error_->coarsen(memory_.grid, summary.elements);
+}
+
+void MotionAttempt::follow_to(int triangles, int of_run) {
+    if (!make_coarser(triangles, HUGE_VAL))
+        return end(
+            {Stop::resolution_lost, state_.time, fmt::format("there is no mesh of {} triangles", triangles), ""});
+    memory_.settings.coarser_by = 1.0 * of_run / summary.elements;
+}
+
+// At the nodes, what goes along to another mesh: velocities, and H0 where it varies.
+Eigen::MatrixXd MotionAttempt::carried() const {
+    const Eigen::Index n = state_.X.cols(), d = state_.u.size() / n;
+    Eigen::MatrixXd out = state_.u.reshaped(n, d).transpose();
+    if (memory_.H0.size() == 0) return out;
+    out.conservativeResize(d + 1, n);
+    out.row(d) = memory_.H0.transpose();
+    return out;
+}
+
+// To another mesh of the same surface, with what is carried there. The jump of the energy counts as an error. Where it
+// would be larger, or area and volume cannot be kept, the old mesh is.
+bool MotionAttempt::change_mesh(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, double most_jump) {
+    const int d = surface().law().components();
+    const double energy = comparable(), before = total();
     const Eigen::VectorXd momenta = surface().momenta(state_);
+    const MotionState old_state = state_;
+    const MotionMeasures old_measures = now_;
     const int old_elements = summary.elements;
     const Eigen::VectorXd old_H0 = memory_.H0;
     std::unique_ptr<TimeScheme> old = std::move(scheme_);
-    const auto keep_old = [&] { scheme_ = std::move(old), summary.elements = old_elements, memory_.H0 = old_H0; };
+    const auto keep_old = [&] {
+        scheme_ = std::move(old), state_ = old_state, now_ = old_measures;
+        summary.elements = old_elements, memory_.H0 = old_H0;
+    };
     try {
-        if (old_H0.size() > 0) memory_.H0 = better->fields.row(d).transpose();
-        use_mesh(better->mesh);
-        state_ = surface().start(better->mesh, better->fields.topRows(d).transpose().reshaped(), momenta);
+        if (old_H0.size() > 0) memory_.H0 = fields.row(d).transpose();
+        use_mesh(mesh);
+        state_ = surface().start(mesh, fields.topRows(d).transpose().reshaped(), momenta);
+        state_.time = old_state.time, state_.stretch = old_state.stretch;
+        look();
     } catch (const SolveError&) {
-        return keep_old();
+        keep_old();
+        return false;
     } catch (const Paused&) {
         keep_old();
         throw;
     }
+    const double jump = std::max(std::abs(comparable() - energy), std::abs(total() - before));
+    if (!(jump <= most_jump)) {
+        keep_old();
+        return false;
+    }
     ++memory_.count.meshes;
-    state_.time = time, state_.stretch = stretch;
-    look();
     memory_.error += std::abs(comparable() - energy);
     memory_.balance.lowest_total += std::max(total() - before, 0.0);
-    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
+    return true;
 }
 
 std::optional<StopReport> MotionAttempt::step() {
@@ -293,6 +368,7 @@ std::optional<StopReport> MotionAttempt::step() {
     if (stop) return stop;
     if (out_.reported()) out_.safeguard([this] { return record(); });
     if (wants_new_mesh()) make_new_mesh();
+    if (may_be_coarser()) look_for_coarser();
     return std::nullopt;
 }
 

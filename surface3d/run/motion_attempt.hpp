@@ -35,15 +35,17 @@ public:
     MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
                   MotionError* error);
 
-    // One of the first two; then go(), or steps as they are wanted.
+    // One of the first two, with a start that outlives the attempt; then go(), or steps as they are wanted.
     void begin(const Start& start);
-    void resume(const Restart& restart);
+    void resume(const Restart& restart, const Start& start);
     void go();
     void advance();
     // Of a coarser run: in one step, or in several where that is refused or more than `growth` times as long as the
     // last.
     void advance_to(double time, double growth = HUGE_VAL);
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more
+    // Of a coarser run: goes on with about so many triangles, beside a run that has so many of them now.
+    void follow_to(int triangles, int of_run);
 
     RunSummary summary;
     const std::optional<StopReport>& stop() const { return stop_; }
@@ -80,6 +82,11 @@ private:
     void set_next_step(double tau, double asked, double error, int order);
     bool wants_new_mesh() const;
     void make_new_mesh();
+    bool may_be_coarser() const;
+    void look_for_coarser();
+    bool make_coarser(int triangles, double most_jump);
+    Eigen::MatrixXd carried() const;
+    bool change_mesh(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, double most_jump);
 
     // Reasons to stop.
     std::optional<StopReport> check_state() const;
@@ -109,6 +116,7 @@ private:
     const Case& case_;
     const RunClock& clock_;
     MotionError* error_;
+    const Start* start_ = nullptr;
     RunOutput out_;
     OutputTimes outputs_;
     std::unique_ptr<TimeScheme> scheme_;

@@ -37,6 +37,9 @@ void compared_fields(Fields&& f, R& r) {
     f.array("restart_compared_times", r.times);
     f.array("restart_compared_energies", r.energies, r.times.size());
     f.array("restart_compared_orders", r.orders, r.times.size());
+    f.optional_array("restart_compared_coarser_at", r.coarser_at);
+    f.optional_array("restart_compared_asked", r.asked, r.coarser_at.size());
+    f.optional_array("restart_compared_had", r.had, r.coarser_at.size());
 }
 
 // Coarser runs, by the prefix of their names in the record of the run.
@@ -154,8 +157,13 @@ void MotionError::begin(Role role, double coarser_by) {
     };
     coarser_ = begun();
     if (tells_apart()) same_steps_ = begun();
-    of_run_ = {
-        .times = of_run_.times, .energies = of_run_.energies, .orders = of_run_.orders, .growth = of_run_.growth};
+    of_run_ = {.times = of_run_.times,
+               .energies = of_run_.energies,
+               .orders = of_run_.orders,
+               .growth = of_run_.growth,
+               .coarser_at = of_run_.coarser_at,
+               .asked = of_run_.asked,
+               .had = of_run_.had};
 }
 
 bool MotionError::is_compared(std::size_t i) const {
@@ -176,8 +184,37 @@ bool MotionError::catch_up(double smoothness) {
         if (!gets_to(*coarser_->run, r.times[r.compared])) return false;
         largest = std::max(largest, error_at(r.compared, smoothness));
         r.error = largest;
+        follow_mesh(r.compared);
     }
     return true;
+}
+
+// Where the run has got fewer triangles after this step, so do the coarser ones.
+void MotionError::follow_mesh(std::size_t i) {
+    const ComparedEnergies& r = of_run_;
+    for (std::size_t k = 0; k < r.coarser_at.size(); ++k)
+        if (r.coarser_at[k] == static_cast<double>(i))
+            for (const auto* coarser : {&coarser_, &same_steps_}) {
+                if (!*coarser) continue;
+                MotionAttempt& run = *(*coarser)->run;
+                const int triangles = static_cast<int>(r.asked[k]);
+                run.follow_to(run.settings().role == Role::other_order ? triangles : fewer_triangles(triangles),
+                              static_cast<int>(r.had[k]));
+            }
+}
+
+bool MotionError::is_at(double time) const {
+    const auto there = [&](const std::unique_ptr<Coarser>& coarser) {
+        return !coarser || (!coarser->run->stop() && !is_before(coarser->run->state().time, time));
+    };
+    return failure_ || (there(coarser_) && there(same_steps_));
+}
+
+void MotionError::coarsen(int asked, int triangles) {
+    ComparedEnergies& r = of_run_;
+    const std::size_t last = r.times.size() - 1;
+    r.coarser_at.push_back(static_cast<double>(last)), r.asked.push_back(asked), r.had.push_back(triangles);
+    if (!failure_) attempt([&] { follow_mesh(last); }, r.times[last]);
 }
 
 // Which all coarser runs have got to.
@@ -253,7 +290,7 @@ void MotionError::resume(const Record& record, int triangles) {
         Record own = record_of(record, prefix);
         const Saved saved = saved_of(own);
         auto out = make(motion_restart(own, time_scheme(case_)).memory.settings);
-        out->run->resume({std::move(own), saved.cells});
+        out->run->resume({std::move(own), saved.cells}, start_);
         const auto stop = static_cast<Stop>(saved.stop);
         const bool goes_on =
             saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));

@@ -23,6 +23,8 @@ struct ComparedEnergies {
     double sum_in_time = 0;                       // then, of the parts that steps have added to the error in time
     double in_time = 0;                           // largest error in time
     double growth = 1e9;                          // of steps of the coarser run, from one to the next, at most
+    // The run has gone on with fewer triangles: the number of that time, the triangles asked for and had.
+    std::vector<double> coarser_at, asked, had;
 };
 
 class MotionError {
@@ -40,6 +42,10 @@ public:
     // smoothness is that of MotionMeasures. Nothing where a coarser run has no energy: it has ended before, whatever
     // made it fail, or it was told to pause, as the run will be.
     std::optional<double> at(double time, double energy, int order, double smoothness);
+    // Whether coarser runs are at this time, which is that of the last energy; then they can get fewer triangles, as
+    // the run has: so many that it asked for, and so many that it has.
+    bool is_at(double time) const;
+    void coarsen(int asked, int triangles);
     // The part of it that is due to time, largest; nothing where that is not known apart.
     std::optional<double> in_time() const;
     // Why and when a coarser run ended, if it has.
@@ -62,6 +68,7 @@ private:
     void follow(double smoothness);
     bool catch_up(double smoothness);
     double error_at(std::size_t i, double smoothness);
+    void follow_mesh(std::size_t i);
     bool is_compared(std::size_t i) const;
     bool tells_apart() const;
 

@@ -58,6 +58,7 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
     Case c = asked;
     c.time.limit = until;
     c.time.output.clear();
+    c.surface.coarsen = false;
     c.surface.scheme = time_scheme(asked);
     c.accuracy.energy = std::max(c.accuracy.energy, 0.05);
     Pilot pilot;

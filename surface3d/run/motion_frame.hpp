@@ -35,6 +35,7 @@ struct MotionBalance {
 
 struct MotionCounters {
     int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
+    int coarser = 0;  // meshes of fewer triangles, on the way
 };
 
 // Beside the state of the surface, what a run has to remember.
@@ -45,6 +46,7 @@ struct MotionMemory {
     MotionCounters count;
     double next_step = 0;
     int order = 1;       // of the last step, in time
+    int grid = 0;        // the mesh is that of the start for this number of triangles; 0: another one
     double error = 0;    // largest so far, of the energy, absolute
     double moved = 0;    // the nodes, at most, since the last look for self-intersection
     Eigen::VectorXd H0;  // at the nodes, where it varies

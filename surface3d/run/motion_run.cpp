@@ -37,7 +37,7 @@ public:
         MotionAttempt run(case_, watch_, clock_, settings_, case_.accuracy.estimate ? &error : nullptr);
         if (restart_) {
             run.summary.warnings = start_.notes();
-            run.resume(*std::exchange(restart_, nullptr));
+            run.resume(*std::exchange(restart_, nullptr), start_);
         } else {
             run.begin(start_);
         }

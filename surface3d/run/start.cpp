@@ -220,6 +220,7 @@ struct Prepare {
         const std::string absent = "must be absent: the triangles come from shape.path";
         if (c.surface.mesh != MeshKind::uniform) throw complaint(c, "discretisation.mesh", absent);
         if (c.surface.elements) throw complaint(c, "discretisation.elements", absent);
+        if (c.surface.coarsen) throw complaint(c, "discretisation.coarsen", absent);
         if (c.surface.recovery == Recovery::exact)
             throw complaint(c, "discretisation.recovery",
                             "must not be \"exact\": a surface made of triangles is known only at points");

@@ -249,6 +249,94 @@ end = 1000.0
     EXPECT_LT(o.summary.estimated_error, 3e-2);
 }
 
+// A rotating fluid whose start is rough for its steps, and soon smooth.
+std::vector<std::string> calming(const std::vector<std::string>& more) {
+    std::vector<std::string> out{"model.kind=fluid", "velocity.initial=rotation", "velocity.omega=0.5",
+                                 "discretisation.time_tolerance=1e-5", "discretisation.coarsen=true"};
+    out.insert(out.end(), more.begin(), more.end());
+    return out;
+}
+
+TEST(MotionRun, FewerTrianglesWhereTheMotionHasBecomeSmooth) {
+    const std::vector<std::string> sets = calming({"discretisation.elements=180", "accuracy.estimate=false"});
+    const Outcome o = run_case(wavy, sets);
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const std::vector<double> elements = o.series("elements");
+    EXPECT_EQ(elements.front(), 180);
+    EXPECT_EQ(elements.back(), 80);
+    EXPECT_TRUE(std::is_sorted(elements.rbegin(), elements.rend()));
+    EXPECT_EQ(o.watch.meshes.size(), 2u);
+    EXPECT_EQ(detail(o.summary, "meshes"), 2);
+    EXPECT_EQ(o.watch.frames.back().arrays.front().shape.front(), o.watch.meshes.back().nodes);
+    // What is kept is kept across the change: theory.md (3.15), (10.15).
+    for (const char* kept : {"area", "volume", "angular_momentum_z"})
+        for (const double value : o.series(kept)) EXPECT_NEAR(value / o.series(kept).front(), 1, 1e-8) << kept;
+    for (const char* none : {"momentum_x", "momentum_y", "momentum_z"})
+        for (const double value : o.series(none)) EXPECT_NEAR(value, o.series(none).front(), 1e-9) << none;
+    // The energy jumps by at most a quarter of what is asked, and goes on as if there had been no change.
+    const double asked = o.c.accuracy.energy * o.summary.reference_energy;
+    const std::vector<double> energy = o.series("energy");
+    const auto change = std::find(elements.begin(), elements.end(), 80) - elements.begin();
+    EXPECT_GE(change, 20);
+    EXPECT_LT(std::abs(energy[change] - energy[change - 1]), asked / 2);
+    const Outcome stays = run_case(
+        wavy, calming({"discretisation.elements=180", "accuracy.estimate=false", "discretisation.coarsen=false"}));
+    EXPECT_EQ(stays.series("elements").back(), 180);
+    EXPECT_NEAR(o.last("energy"), stays.last("energy"), asked / 4);
+    EXPECT_NEAR(o.last("kinetic_energy"), stays.last("kinetic_energy"), asked / 4);
+}
+
+TEST(MotionRun, NoFewerTrianglesWhereTheEnergyWouldJump) {
+    const Outcome o =
+        run_case(wavy, calming({"discretisation.elements=180", "accuracy.estimate=false", "accuracy.energy=1e-4"}));
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_EQ(o.series("elements").back(), 180);
+    EXPECT_EQ(o.watch.meshes.size(), 1u);
+}
+
+TEST(MotionRun, GivenTrianglesDoNotBecomeFewer) {
+    try {
+        run_case("[energy]\nk20 = 1\n[shape]\nkind = \"file\"\npath = \"none.obj\"\n[time]\nend = 1\n",
+                 {"discretisation.coarsen=true"});
+        FAIL();
+    } catch (const CaseError& error) {
+        EXPECT_STREQ(error.what(),
+                     "--set discretisation.coarsen=true: discretisation.coarsen must be absent: the triangles come "
+                     "from shape.path");
+    }
+    EXPECT_THROW(begin(wavy, {"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=1e-3",
+                              "discretisation.coarsen=true"}),
+                 std::exception);
+}
+
+TEST(MotionRun, TheCoarserRunGetsFewerTrianglesToo) {
+    // 500 and 180 triangles, then 180 and 80.
+    const std::vector<std::string> sets = calming({"discretisation.elements=500", "discretisation.order=2"});
+    const Outcome whole = run_case(wavy, sets);
+    ASSERT_EQ(whole.summary.stop.reason, Stop::finished) << whole.summary.stop.message;
+    EXPECT_EQ(whole.series("elements").front(), 500);
+    EXPECT_EQ(whole.series("elements").back(), 180);
+    std::vector<std::string> fixed = sets;
+    fixed.push_back("discretisation.coarsen=false");
+    const Outcome stays = run_case(wavy, fixed);
+    const double error = std::abs(whole.last("energy") - stays.last("energy"));
+    EXPECT_LT(error, whole.summary.estimated_error * whole.summary.reference_energy);
+    EXPECT_LT(whole.summary.estimated_error, 2 * stays.summary.estimated_error + 0.25 * whole.c.accuracy.energy);
+    // The same from a state on the second mesh on.
+    Outcome first = begin(wavy, sets);
+    first.watch.most_rows = whole.watch.rows.size() - 3;
+    first.summary = run(first.c, first.watch);
+    ASSERT_EQ(first.summary.stop.reason, Stop::interrupted);
+    ASSERT_EQ(first.series("elements").back(), 180);
+    const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
+    Outcome second = begin(wavy, sets);
+    second.summary = run(second.c, second.watch, &restart);
+    ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+    EXPECT_EQ(first.watch.rows.size() + second.watch.rows.size(), whole.watch.rows.size());
+    EXPECT_NEAR(second.last("energy"), whole.last("energy"), 1e-9 * whole.summary.reference_energy);
+    EXPECT_NEAR(second.summary.estimated_error, whole.summary.estimated_error, 1e-6 * whole.summary.estimated_error);
+}
+
 TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
     const std::string shape = wavy.substr(0, wavy.find("[time]"));
     const Outcome rest = run_case(shape), moving = run_case(shape + "[time]\nend = 1e-6\n");
