@@ -75,7 +75,8 @@ def name_regions(axes, where, word, dark):
             continue
         inside = ndimage.distance_transform_edt(region)
         y, x = (np.array(np.unravel_index(inside.argmax(), inside.shape)) - 0.5) / PIXELS
-        axes.text(min(max(x, 0.22), 0.78), y, word, ha="center", va="center", fontsize=6, color="white" if dark else "0.1")
+        edge = max(0.22, 0.022 * len(word))
+        axes.text(min(max(x, edge), 1 - edge), y, word, ha="center", va="center", fontsize=6, color="white" if dark else "0.1")
 
 
 def draw(paths, outputs):

@@ -62,7 +62,7 @@ def necks(box, mesh, radius, asked):
 
 def meshes(box, mesh, end, ratio):
     """A spheroid on its way to rest, by mesh; with a long time of relaxation, remeshing alone keeps triangles good."""
-    keys = {"relaxation": 100.0} if mesh == "hardly relaxed" else {"mesh": mesh}
+    keys = {"follow_curvature": {"follow_curvature": True}, "hardly relaxed": {"relaxation": 100.0}}.get(mesh, {"mesh": mesh})
     return judged_motion(box, BENDING, spheroid(ratio), end, 5e-2, ("overdamped",), elements=120, order=3, **keys)
 
 
@@ -122,7 +122,7 @@ NECK, ASKED = Axis("neck radius", 0.02, 0.8, log=True), Axis("requested accuracy
 RATIO, AT_REST = Axis("half axis c", 0.15, 8.0, log=True), Axis("requested accuracy", 4e-3, 1e-1, log=True)
 NOISE, PARTS = Axis("noise", 1e-4, 0.3, log=True), Axis("parts of an edge", 3, 11, whole=True)
 END, SPHEROID = Axis("end", 0.003, 3.0, log=True), Axis("half axis c", 0.3, 4.0, log=True)
-MESHES = ("uniform", "graded", "irregular", "hardly relaxed")
+MESHES = ("uniform", "graded", "irregular", "hardly relaxed", "follow_curvature")
 SCHEMES = ("euler", "bdf2", "bdf", "alpha")
 MAPS = {
     "steps": Map("Fixed steps, gradient flow", STEP, K42, steps, SCHEMES, across=4, levels=0, tier="surface3d"),

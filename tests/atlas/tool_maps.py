@@ -121,7 +121,7 @@ def judged_fit(box, times, amplitudes, rate):
     fit = json.loads(done.out)
     apart, stated = abs(fit["rate"] / rate - 1), fit["error"] / abs(rate)
     if fit["error"] >= CERTAIN * abs(fit["rate"]):
-        return Judgement("told", "nowhere exponential", apart, stated)
+        return Judgement("told", "large error bar", apart, stated)
     wrong = apart > max(2 * stated, 1e-6)
     return Judgement("silent" if wrong else "right", "wrong rate" if wrong else "finished", apart, stated)
 
