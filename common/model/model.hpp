@@ -21,12 +21,12 @@ enum class AreaRule { free, fixed, reservoir };
 // What a case says about its law of motion.
 struct Model {
     ModelKind kind = ModelKind::gradient_flow;
-    std::optional<ModelKind> chosen{}; // of "auto": the model that stands for it, once chosen
-    double Re = 1;                     // of viscous models: 1/Re is the viscosity
-    std::optional<double> gamma{};     // of inextensible models: friction; by default 0 of viscous ones, else 1
-    std::optional<bool> keeps_volume;  // by default as the model has it
-    std::optional<AreaRule> area{};    // by default free in gradient flow, else fixed
-    bool free_period = false;          // of tubes
+    std::optional<ModelKind> chosen{};  // of "auto": the model that stands for it, once chosen
+    double Re = 1;                      // of viscous models: 1/Re is the viscosity
+    std::optional<double> gamma{};      // of inextensible models: friction; by default 0 of viscous ones, else 1
+    std::optional<bool> keeps_volume;   // by default as the model has it
+    std::optional<AreaRule> area{};     // by default free in gradient flow, else fixed
+    bool free_period = false;           // of tubes
     // Given where area, volume and period are free: theory.md (3.16).
     Ramp tension{}, pressure{}, force{};
 };

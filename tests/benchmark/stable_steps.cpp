@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     const ModelKind kind = model == "fluid"    ? ModelKind::fluid
                            : model == "stokes" ? ModelKind::stokes
                                                : ModelKind::overdamped;
-    const MotionLaw law = motion_law({.kind = kind, .Re = 1, .gamma = 0, .keeps_volume = {}});
+    const MotionLaw law = motion_law({.kind = kind, .Re = 1, .gamma = {}, .keeps_volume = {}});
     const Bending bending{.k = {0.125, 0, k42}};
     fmt::print("scheme,model,k42,triangles,h,smoothing,step,steps,largest,last,stable\n");
     for (int i = 6; i < argc; ++i) {

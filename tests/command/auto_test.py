@@ -138,5 +138,36 @@ class Buckling(ProgramTest):
         self.assertEqual(list(after["energy"][:first]), list(before["energy"][:first]))
 
 
+class FewTriangles(ProgramTest):
+    """Where little accuracy is requested, as few triangles as `tubule check` advises; more where the start is wavy."""
+
+    def run_case(self, shape):
+        case = f"""tier = "auto"
+[energy]
+k20 = 1.0
+[model]
+kind = "overdamped"
+[shape]
+{shape}
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.01
+"""
+        self.tubule("run", self.write("case.toml", case), "--quiet", "-o", self.result)
+        return about(self.result)
+
+    def test_a_smooth_start_has_80(self):
+        end = self.run_case('kind = "ellipsoid"\na = 1.0\nb = 0.9\nc = 0.8')
+        self.assertEqual((end["choice"], end["elements"]), ("surface3d", 80))
+        self.assertEqual(end["triangles"], "80, since the start is smooth")
+        self.assertLess(end["estimated_error"], 1e-2)
+
+    def test_a_wavy_start_has_more(self):
+        end = self.run_case('kind = "sphere"\nradius = 1.0\nmode = [{amplitude = 0.3, l = 4, m = 3}]')
+        self.assertGreater(end["elements"], 80)
+        self.assertNotIn("triangles", end)
+
+
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

@@ -12,8 +12,12 @@ const Sphere wavy{.radius = 1, .modes = {{0.2, 2, 1}, {0.1, 3, 2}}};
 const Bending energy{.k = {0.125, 0, 0.05}, .H0 = 0};
 
 Motion moving(ModelKind kind, int order) {
-    return {
-        mesh_of(wavy, icosphere(2), order), {.kind = kind, .Re = 1, .gamma = 0.3, .keeps_volume = {}}, energy, {}, bdf};
+    const double gamma = kind == ModelKind::overdamped ? 1 : 0.3;
+    return {mesh_of(wavy, icosphere(2), order),
+            {.kind = kind, .Re = 1, .gamma = gamma, .keeps_volume = {}},
+            energy,
+            {},
+            bdf};
 }
 
 // Energy, a moment of the shape, which depends on positions alone, lambda.
