@@ -511,7 +511,7 @@ void check_chosen_model(Keys& k, const Case& c) {
             return "must not be \"auto\" with [equilibrium]: nothing moves; \"fluid\" and \"overdamped\" have the same "
                    "shapes at rest";
         if (!c.surface.scheme || entry(*c.surface.scheme).general) return {};
-        return fmt::format("must not be \"auto\" with discretisation.scheme = \"{}\", which has not all models; name one",
+        return fmt::format("must not be \"auto\" with discretisation.scheme = \"{}\", which does not support all models; name one",
                            entry(*c.surface.scheme).name);
     });
 }

@@ -46,6 +46,7 @@ public:
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more
     // Of a coarser run: goes on with about so many triangles, beside a run that has so many of them now.
     void follow_to(int triangles, int of_run);
+    bool is_on_grid() const { return memory_.grid > 0; }  // its mesh is that of the start, or a coarser one of it
 
     RunSummary summary;
     const std::optional<StopReport>& stop() const { return stop_; }

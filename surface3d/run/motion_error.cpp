@@ -189,8 +189,9 @@ bool MotionError::catch_up(double smoothness) {
     return true;
 }
 
-// Where the run has got fewer triangles after this step, so do the coarser ones.
-void MotionError::follow_mesh(std::size_t i) {
+// Where the run has got fewer triangles after this step, so do the coarser ones. If that is interrupted they begin
+// again when the run goes on, since which of them has followed is not known.
+void MotionError::follow_mesh(std::size_t i) try {
     const ComparedEnergies& r = of_run_;
     for (std::size_t k = 0; k < r.coarser_at.size(); ++k)
         if (r.coarser_at[k] == static_cast<double>(i))
@@ -201,11 +202,17 @@ void MotionError::follow_mesh(std::size_t i) {
                 run.follow_to(run.settings().role == Role::other_order ? triangles : fewer_triangles(triangles),
                               static_cast<int>(r.had[k]));
             }
+} catch (const Paused&) {
+    coarser_.reset(), same_steps_.reset();
+    failure_ = StopReport{Stop::interrupted, of_run_.times[i], "", ""};
+    throw;
 }
 
 bool MotionError::is_at(double time) const {
     const auto there = [&](const std::unique_ptr<Coarser>& coarser) {
-        return !coarser || (!coarser->run->stop() && !is_before(coarser->run->state().time, time));
+        if (!coarser) return true;
+        const MotionAttempt& run = *coarser->run;
+        return !run.stop() && !is_before(run.state().time, time) && run.is_on_grid();
     };
     return failure_ || (there(coarser_) && there(same_steps_));
 }

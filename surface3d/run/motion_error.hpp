@@ -42,8 +42,8 @@ public:
     // smoothness is that of MotionMeasures. Nothing where a coarser run has no energy: it has ended before, whatever
     // made it fail, or it was told to pause, as the run will be.
     std::optional<double> at(double time, double energy, int order, double smoothness);
-    // Whether coarser runs are at this time, which is that of the last energy; then they can get fewer triangles, as
-    // the run has: so many that it asked for, and so many that it has.
+    // Whether coarser runs are at this time, which is that of the last energy, on meshes of the start; then they can
+    // get fewer triangles, as the run has: so many that it asked for, and so many that it has.
     bool is_at(double time) const;
     void coarsen(int asked, int triangles);
     // The part of it that is due to time, largest; nothing where that is not known apart.

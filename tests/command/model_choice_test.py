@@ -167,7 +167,7 @@ class ModelChoice(ProgramTest):
         kind = f"case.toml:{OBLATE[: OBLATE.index('kind')].count(chr(10)) + 1}:8: model.kind must not be \"auto\""
         self.assertEqual(refusal(OBLATE, "stability", "case.toml").strip(), kind + " for growth rates: name a model with --model")
         self.assertIn(kind + " in a scan, whose points would have different models", refusal(OBLATE, "scan", "case.toml", "--over", "energy.k42=0,0.1", "-o", "scan.hdf"))
-        self.assertIn(kind + ' with discretisation.scheme = "paper", which has not all models; name one',
+        self.assertIn(kind + ' with discretisation.scheme = "paper", which does not support all models; name one',
                       refusal(OBLATE.replace('"axisym"', '"surface3d"') + '[discretisation]\nscheme = "paper"\nstep = 0.1\n', "run", "case.toml"))  # fmt: skip
         self.assertIn('model.kind must not be "auto" in a chart', self.chart_refusal())
         self.write("case.toml", CAPSULE + '[model]\nkind = "auto"\n')
@@ -179,6 +179,28 @@ class ModelChoice(ProgramTest):
             out, err = process.communicate()
         self.assertEqual(process.returncode, 2, out + err)
         return out + err
+
+
+class Rates(ProgramTest):
+    def test_growth_rates_have_the_friction_of_the_case(self):
+        """`tubule stability --model overdamped` of a case whose model is "auto" is that of the overdamped case."""
+        case = """tier = "axisym"
+[energy]
+k20 = 1.0
+[model]
+kind = "auto"
+gamma = 300.0
+[shape]
+kind = "tube"
+radius = 1.0
+length = 8.0
+[time]
+end = 1.0
+"""
+        chosen = self.tubule("stability", self.write("auto.toml", case), "--model", "overdamped")[0]
+        named = self.tubule("stability", self.write("named.toml", case.replace("auto", "overdamped")))[0]
+        self.assertIn("overdamped, gamma = 300", chosen)
+        self.assertEqual(chosen, named)
 
 
 if __name__ == "__main__":

@@ -88,7 +88,8 @@ Model with_kind(const Model& own, ModelKind kind) {
     if (model_entry(kind).inextensible && model_entry(own.kind).inextensible) {
         Model model = own;
         model.kind = kind;
-        if (model_entry(kind).viscous != model_entry(own.kind).viscous) model.gamma.reset();
+        const bool rubs = own.kind == ModelKind::automatic && own.gamma.value_or(0) > 0;  // whichever is chosen
+        if (model_entry(kind).viscous != model_entry(own.kind).viscous && !rubs) model.gamma.reset();
         return model;
     }
     return {.kind = kind, .Re = own.Re, .gamma = own.gamma, .keeps_volume = {}};
@@ -110,8 +111,7 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
         models.push_back(model);
     }
     if (!viscous && (options.Re || options.gamma))
-        throw std::invalid_argument("--Re and --gamma are only valid with --model " +
-                                    quoted_names(&ModelEntry::viscous) + " or \"all\"");
+        throw std::invalid_argument("--Re and --gamma are only valid with --model \"stokes\", \"fluid\" or \"all\"");
     return models;
 }
 

@@ -386,7 +386,7 @@ std::string json_of(const ModelReport& report) {
         "\"reduced_tension\": {}, \"radius_rate\": {},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": "
         "{},\n\"fastest_fitting\": {}}}",
         json(name(report.model)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
-        json(report.model.Re), json(report.model.gamma.value_or(0)), json(report.tube.tension), json(report.tension_source),
+        json(report.model.Re), json(motion_law(report.model).friction), json(report.tube.tension), json(report.tension_source),
         json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least) : "null",
         list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest, fitting);
 }
