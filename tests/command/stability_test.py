@@ -133,6 +133,14 @@ class Stability(ProgramTest):
         self.assertAlmostEqual(self.json(fluid, "--set", 'model.volume="free"')["models"][0]["tension"], 0, delta=1e-12)
         viscous = self.json(self.tube, "--model", "stokes", "--Re", "4", "--gamma", "0.5", "--tension", "1")["models"][0]
         self.assertEqual((viscous["Re"], viscous["gamma"]), (4, 0.5))
+        # Overdamped, all rates are those of friction 1 divided by the friction.
+        once, slowed = (
+            self.json(self.tube, "--model", "overdamped", "--gamma", gamma, "--tension", "1")["models"][0]
+            for gamma in ("1", "4")
+        )
+        self.assertEqual(slowed["gamma"], 4)
+        for slow, fast in zip(slowed["waves"], once["waves"], strict=True):
+            self.assertAlmostEqual(slow["rate"], fast["rate"] / 4, delta=1e-12 * (1 + abs(fast["rate"])))
 
     def test_ensembles(self):
         """The tension of the case, or that of its axial force, theory.md (3.22) with f + 1/R f_H = 0 at H0 = -1/R."""
@@ -295,7 +303,9 @@ equilibrium = {modes = 2, area = 41.074}
         self.refuses("2 to 100000", self.tube, "--q", "2:1:5")
         self.refuses("'x' is not a number", self.tube, "--q", "1,x")
         self.refuses("are >= 0", self.tube, "--q=-1")
-        self.refuses("--Re and --gamma are only valid", self.tube, "--Re", "3")
+        self.refuses('--Re is only valid with --model "stokes"', self.tube, "--Re", "3")
+        self.refuses('--gamma is only valid with --model "overdamped"', self.tube, "--gamma", "3")
+        self.refuses("--gamma must be > 0", self.tube, "--model", "overdamped", "--gamma", "0")
         self.refuses("with the volume free", self.write("fluid.toml", FLUID), "--set", 'model.volume="free"', "--tension", "1")
         self.refuses("a picture is written as", self.tube, "--plot", "waves.txt")
         self.refuses("apply only to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")

@@ -98,7 +98,7 @@ Model with_kind(const Model& own, ModelKind kind) {
 std::vector<Model> models_of(const StabilityOptions& options, const Model& own) {
     const bool all = options.model == "all";
     std::vector<Model> models;
-    bool viscous = false;
+    bool viscous = false, inextensible = false;
     for (const ModelEntry& other : tubule::models) {
         if (other.kind == ModelKind::automatic) continue;
         if (!all && (options.model.empty() ? other.kind != own.kind : options.model != other.name)) continue;
@@ -106,12 +106,19 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
         model.kind = other.kind;
         if (other.kind != own.kind) model = with_kind(own, other.kind);
         if (options.Re) model.Re = *options.Re;
-        if (options.gamma && other.viscous) model.gamma = *options.gamma;
-        viscous = viscous || other.viscous;
+        // Without viscosity or friction nothing would resist: with --model all, such a model keeps its own.
+        if (options.gamma && (other.viscous || (other.inextensible && *options.gamma > 0)))
+            model.gamma = *options.gamma;
+        viscous = viscous || other.viscous, inextensible = inextensible || other.inextensible;
         models.push_back(model);
     }
-    if (!viscous && (options.Re || options.gamma))
-        throw std::invalid_argument("--Re and --gamma are only valid with --model \"stokes\", \"fluid\" or \"all\"");
+    if (!viscous && options.Re)
+        throw std::invalid_argument("--Re is only valid with --model \"stokes\", \"fluid\" or \"all\"");
+    if (!inextensible && options.gamma)
+        throw std::invalid_argument(
+            "--gamma is only valid with --model \"overdamped\", \"stokes\", \"fluid\" or \"all\"");
+    if (!viscous && options.gamma && !(*options.gamma > 0))
+        throw std::invalid_argument("--gamma must be > 0 with --model \"overdamped\": nothing else resists the motion");
     return models;
 }
 
@@ -274,7 +281,7 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--Re", o->Re, "of viscous models, where the case has none")
         ->check(refuse_infinite)
         ->check(CLI::PositiveNumber);
-    command->add_option("--gamma", o->gamma, "friction of viscous models, where the case has none")
+    command->add_option("--gamma", o->gamma, "friction of all models but gradient flow, where the case has none")
         ->check(refuse_infinite)
         ->check(CLI::NonNegativeNumber);
     command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)")

@@ -21,8 +21,7 @@ public:
         : result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
-        for (std::size_t i = 0; i < values.size(); ++i)
-            result_.series.at(result_.series_names[i]).push_back(values[i]);
+        for (std::size_t i = 0; i < values.size(); ++i) result_.series.at(result_.series_names[i]).push_back(values[i]);
         if (writer_) writer_->row(values);
     }
     std::size_t mesh(const SurfaceCells& cells) override {
@@ -89,9 +88,9 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 }  // namespace
 
 Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
-    PauseWatch watch(given.time.limit, options.interrupted);
-    const ChosenCase chosen = with_chosen_model(given);
+    const ChosenCase chosen = with_chosen_model(given);  // trial runs do not count for time.limit
     const Case& c = chosen.c;
+    PauseWatch watch(c.time.limit, options.interrupted);
     const auto engine = engine_for(c);
     Result result;
     result.case_text = {c.text, c.sets};

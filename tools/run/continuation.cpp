@@ -121,6 +121,7 @@ bool is_hdf5(const std::filesystem::path& file) {
 Case case_of_result(const Result& result, const std::filesystem::path& file, const std::vector<std::string>& sets) {
     std::set<std::string> replaced;
     for (const std::string& set : sets) replaced.insert(key_of(set));
+    if (replaced.contains("model.kind")) replaced.insert("model.chosen");  // what was chosen before is no longer asked
     std::vector<std::string> all = result.case_text.sets;
     std::erase_if(all, [&](const std::string& set) { return replaced.contains(key_of(set)); });
     all.insert(all.end(), sets.begin(), sets.end());

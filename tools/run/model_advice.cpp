@@ -13,6 +13,7 @@
 
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/choice.hpp"
@@ -145,6 +146,7 @@ std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymm
     } catch (const SolveError&) {
         return {};
     }
+    if (tubule::interrupted()) throw Paused{Stop::interrupted, {}};
     if ((s.stop.reason != Stop::finished && s.stop.reason != Stop::stationary) || path.points.empty()) return {};
     const double fall = path.points.front().energy - path.points.back().energy;
     if (path.speeds_up(std::clamp(c.accuracy.energy * s.reference_energy / 2, fall / most_parts, fall / least_parts)))

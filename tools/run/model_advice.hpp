@@ -24,7 +24,8 @@ struct SimplerModels {
 
 // By trial runs of these models: of an axisymmetric start in tier axisym, while no wave around the axis grows if the case
 // has another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a start
-// brings its own triangles, or a trial run does not come to its end. Throws as an engine and its run.
+// brings its own triangles, or a trial run does not come to its end. Throws as an engine and its run; Paused if a signal
+// ends a trial run.
 SimplerModels simpler_models(const Case& c);
 
 struct ModelChoice {
@@ -35,7 +36,7 @@ struct ModelChoice {
 };
 
 // The simplest model whose expected difference is at most accuracy.energy, else that of the case; "auto" counts as a
-// fluid. The same each time. Throws as simpler_models().
+// fluid. The same each time, unless a trial run takes more than 20 s of a processor. Throws as simpler_models().
 ModelChoice choose_model(const Case& c);
 
 // The case itself or, of model.kind = "auto", with the model of that choice instead, which from then on stands among
