@@ -48,6 +48,20 @@ double sum_of_step(double tau, double before, double rate, double now, double pa
     return tau * (now + rate) / 2 - bend * tau * tau * tau / 6;
 }
 
+// The first of the fewest steps over an interval that grow evenly from the last one, each by at most this factor.
+double first_of_steps(double interval, double last, double most_growth) {
+    if (!(last > 0) || interval <= most_growth * last) return interval;
+    int count = 1;
+    const auto sum = [&](double r) { return r * (std::pow(r, count) - 1) / (r - 1); };
+    while (last * sum(most_growth) < interval) ++count;
+    double low = 1, high = most_growth;
+    while (high - low > 1e-6) {
+        const double r = (low + high) / 2;
+        (last * sum(r) < interval ? low : high) = r;
+    }
+    return high * last;
+}
+
 }  // namespace
 
 MotionAttempt::MotionAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const MotionSettings& settings,
@@ -389,8 +403,10 @@ void MotionAttempt::advance_to(double time, double growth) {
     until_ = time;
     memory_.next_step = std::min(time - state_.time, state_.step > 0 ? growth * state_.step : HUGE_VAL);
     const auto tried = [this] { return memory_.count.steps + memory_.count.rejected; };
-    const auto before = tried();
+    const auto before = tried(), rejected = memory_.count.rejected;
     while (!stop_ && is_before(state_.time, time)) {
+        if (surface().law().inertia == 0 && memory_.count.rejected == rejected)
+            memory_.next_step = first_of_steps(time - state_.time, state_.step, growth);
         advance();
         if (!stop_ && tried() - before > most_at_once)
             end({Stop::resolution_lost, state_.time,
@@ -453,7 +469,7 @@ double MotionAttempt::what_may_change() const {
 void MotionAttempt::compare() {
     if (!out_.reported()) return;
     std::optional<double> error;
-    if (error_) error = error_->at(state_.time, comparable(), memory_.order, now_.smoothness.order);
+    if (error_) error = error_->at(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
     const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
     error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
     if (error) memory_.error = std::max({memory_.error, *error, rise});

@@ -41,7 +41,7 @@ public:
     void go();
     void advance();
     // Of a coarser run: in one step, or in several where that is refused or more than `growth` times as long as the
-    // last.
+    // last. Without inertia these are as few as can grow evenly.
     void advance_to(double time, double growth = HUGE_VAL);
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more
     // Of a coarser run: goes on with about so many triangles, beside a run that has so many of them now.
@@ -53,6 +53,7 @@ public:
     const MotionSettings& settings() const { return memory_.settings; }
     const MotionState& state() const { return state_; }  // no nodes: it could not begin
     double energy() const { return comparable(); }       // with loads: F
+    int steps() const { return memory_.count.steps; }
     CurvedMesh mesh() const { return scheme_->surface().mesh(state_); }
     Record saved() const { return state_record(state_, memory_); }
     // Largest errors, absolute: of the energy; of the balance with dissipation.

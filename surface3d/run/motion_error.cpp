@@ -36,7 +36,11 @@ void compared_fields(Fields&& f, R& r) {
     f.number("restart_compared_in_time", r.in_time), f.number("restart_compared_growth", r.growth);
     f.array("restart_compared_times", r.times);
     f.array("restart_compared_energies", r.energies, r.times.size());
+    f.array("restart_compared_dissipations", r.dissipations, r.times.size());
     f.array("restart_compared_orders", r.orders, r.times.size());
+    f.number("restart_compared_slowest_at", r.slowest_at), f.number("restart_compared_slowest", r.slowest);
+    f.number("restart_compared_difference_then", r.difference_then);
+    f.number("restart_compared_steps_then", r.steps_then);
     f.optional_array("restart_compared_coarser_at", r.coarser_at);
     f.optional_array("restart_compared_asked", r.asked, r.coarser_at.size());
     f.optional_array("restart_compared_had", r.had, r.coarser_at.size());
@@ -159,6 +163,7 @@ void MotionError::begin(Role role, double coarser_by) {
     if (tells_apart()) same_steps_ = begun();
     of_run_ = {.times = of_run_.times,
                .energies = of_run_.energies,
+               .dissipations = of_run_.dissipations,
                .orders = of_run_.orders,
                .growth = of_run_.growth,
                .coarser_at = of_run_.coarser_at,
@@ -224,12 +229,25 @@ void MotionError::coarsen(int asked, int triangles) {
     if (!failure_) attempt([&] { follow_mesh(last); }, r.times[last]);
 }
 
+// Where one coarser run tells errors in space and in time: theory.md (11.2), and (11.4) where the motion has sped up.
+double MotionError::error_at_once(std::size_t i, double smoothness) {
+    ComparedEnergies& r = of_run_;
+    const double part = error_by_difference(case_, coarser_->run->settings(), smoothness);
+    const double difference = coarser_->run->energy() - r.energies[i], at = static_cast<double>(i);
+    const int steps = coarser_->run->steps();
+    if (i == 0 || r.dissipations[i] <= r.slowest)
+        r.slowest_at = at, r.slowest = r.dissipations[i], r.difference_then = difference, r.steps_then = steps;
+    if (!has_sped_up(case_, r.dissipations[i], r.slowest)) return std::abs(difference) * part;
+    const double by_change = error_by_change((at - r.slowest_at) / std::max(steps - r.steps_then, 1.0));
+    return std::abs(r.difference_then) * part + std::abs(difference - r.difference_then) * std::max(by_change, part);
+}
+
 // Which all coarser runs have got to.
 double MotionError::error_at(std::size_t i, double smoothness) {
     ComparedEnergies& r = of_run_;
     const MotionSettings& settings = coarser_->run->settings();
+    if (!same_steps_) return error_at_once(i, smoothness);
     const double longer_steps = coarser_->run->energy();
-    if (!same_steps_) return std::abs(longer_steps - r.energies[i]) * error_by_difference(case_, settings, smoothness);
     const double same_steps = same_steps_->run->energy();
     const std::size_t since = i == 0 ? 0 : steps_at_once * ((i - 1) / steps_at_once) + 1;
     const auto order = static_cast<int>(*std::min_element(r.orders.begin() + since, r.orders.begin() + i + 1));
@@ -255,8 +273,9 @@ void MotionError::follow(double smoothness) {
     }
 }
 
-std::optional<double> MotionError::at(double time, double energy, int order, double smoothness) {
+std::optional<double> MotionError::at(double time, double energy, double dissipation, int order, double smoothness) {
     of_run_.times.push_back(time), of_run_.energies.push_back(energy), of_run_.orders.push_back(order);
+    of_run_.dissipations.push_back(dissipation);
     if (failure_) return std::nullopt;
     try {
         attempt([&] { follow(smoothness); }, time);

@@ -16,13 +16,16 @@ namespace tubule::surface3d {
 // high order that factor is far beyond that of errors in space; another coarser run then takes the steps of the run and
 // tells both apart, theory.md (11.3).
 struct ComparedEnergies {
-    std::vector<double> times, energies, orders;  // of the run and its steps
-    int compared = 0;                             // so many of them, as yet
-    double error = 0;                             // at the last time compared
-    double between = 0;                           // then, of the two coarser runs
-    double sum_in_time = 0;                       // then, of the parts that steps have added to the error in time
-    double in_time = 0;                           // largest error in time
-    double growth = 1e9;                          // of steps of the coarser run, from one to the next, at most
+    std::vector<double> times, energies, dissipations, orders;  // of the run and its steps
+    int compared = 0;                                           // so many of them, as yet
+    double error = 0;                                           // at the last time compared
+    double between = 0;                                         // then, of the two coarser runs
+    double sum_in_time = 0;  // then, of the parts that steps have added to the error in time
+    double in_time = 0;      // largest error in time
+    double growth = 1e9;     // of steps of the coarser run, from one to the next, at most
+    // Where the surface was slowest, of the times compared: the number of that time, the dissipation, the difference of
+    // the energies and the steps that the coarser run had made.
+    double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0;
     // The run has gone on with fewer triangles: the number of that time, the triangles asked for and had.
     std::vector<double> coarser_at, asked, had;
 };
@@ -39,9 +42,9 @@ public:
     void save(Record& record) const;
 
     // Of this energy, which is that after a step of this order, or of the last one that was compared, absolute; the
-    // smoothness is that of MotionMeasures. Nothing where a coarser run has no energy: it has ended before, whatever
-    // made it fail, or it was told to pause, as the run will be.
-    std::optional<double> at(double time, double energy, int order, double smoothness);
+    // dissipation and the smoothness are those of MotionMeasures. Nothing where a coarser run has no energy: it has
+    // ended before, whatever made it fail, or it was told to pause, as the run will be.
+    std::optional<double> at(double time, double energy, double dissipation, int order, double smoothness);
     // Whether coarser runs are at this time, which is that of the last energy, on meshes of the start; then they can
     // get fewer triangles, as the run has: so many that it asked for, and so many that it has.
     bool is_at(double time) const;
@@ -68,6 +71,7 @@ private:
     void follow(double smoothness);
     bool catch_up(double smoothness);
     double error_at(std::size_t i, double smoothness);
+    double error_at_once(std::size_t i, double smoothness);
     void follow_mesh(std::size_t i);
     bool is_compared(std::size_t i) const;
     bool tells_apart() const;

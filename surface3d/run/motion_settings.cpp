@@ -28,7 +28,9 @@ constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of 
 constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
 constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
 constexpr double high_accuracy = 1e-4;                    // from here on, without inertia, steps of higher order pay
-constexpr double surest_growth = 4.5;  // of errors: they have maxima between the steps that are compared
+constexpr double sped_up = 2;             // times the least dissipation: the motion has left what it rested at
+constexpr double least_more_steps = 1.5;  // of the run, than of the coarser one: fewer would tell nothing
+constexpr double surest_growth = 4.5;     // of errors: they have maxima between the steps that are compared
 
 double tolerance_for(const Case& c) {
     const double accuracy = c.accuracy.energy;
@@ -108,6 +110,15 @@ double growth_of_coarser(const Case& c, const Smoothness& start) {
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {
     const double in_time = std::pow(steps_at_once, entry(time_scheme(c)).order);
     return 1 / (std::min({growth_in_space(coarser, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
+}
+
+bool has_sped_up(const Case& c, double dissipation, double slowest) {
+    const MotionLaw law = motion_law(c.model);
+    return law.inertia == 0 && !law.loads_change() && dissipation > sped_up * slowest;
+}
+
+double error_by_change(double more_steps) {
+    return 1 / (std::max(more_steps, least_more_steps) - 1);
 }
 
 double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness) {

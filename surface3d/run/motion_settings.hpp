@@ -45,6 +45,13 @@ double growth_of_coarser(const Case& c, const Smoothness& start);
 // have where H is so smooth (MotionMeasures).
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
 
+// Where surfaces leave a state in which they have nearly rested, errors made before become a delay, and grow with the
+// rate at which the energy falls. Whether one has left the slowest time so far, by the dissipation now and then (models
+// without inertia under constant loads: elsewhere it changes for other reasons); the error over what the difference
+// from the coarser run has changed by since then, if the run has made so many times more steps.
+bool has_sped_up(const Case& c, double dissipation, double slowest);
+double error_by_change(double more_steps);
+
 // Whether steps have so high an order that errors in time grow far more than those in space when several are made at
 // once: the two are then told apart. Errors in space over the difference from the coarser run with the same steps; in
 // time over that of steps of this order from several at once.

@@ -116,6 +116,53 @@ TEST(MotionSettings, TheCoarserRunMakesLongStepsAtOnceOnlyFromRoughStarts) {
     EXPECT_GT(growth_of_coarser(bdf, {.order = 2, .missed = 0}), 1e6);
 }
 
+TEST(MotionSettings, WhatHasSpedUpMayBeLate) {
+    const auto sped_up = [](const std::vector<std::string>& model, double dissipation) {
+        return has_sped_up(begin(wavy, model).c, dissipation, 1);
+    };
+    EXPECT_TRUE(sped_up({"model.kind=stokes"}, 2.1));
+    EXPECT_FALSE(sped_up({"model.kind=stokes"}, 1.9));
+    EXPECT_FALSE(sped_up({"model.kind=fluid"}, 100));  // waves
+    EXPECT_TRUE(sped_up({"model.pressure=1"}, 2.1));
+    EXPECT_FALSE(sped_up({"model.pressure={time = [0, 1], value = [0, 1]}"}, 100));  // what drives it grows
+    // Errors of first order, since steps are long for what grows: as many times larger as steps are fewer.
+    EXPECT_NEAR(error_by_change(3), 1.0 / 2, 1e-12);
+    EXPECT_NEAR(error_by_change(1), 2, 1e-12);
+}
+
+TEST(MotionRun, WhatLeavesASaddleStatesItsDelay) {
+    // Waves l = 4 decay, and l = 2 takes their area: the energy, which nearly rests, falls faster again. The steps come
+    // late by far more than the energy was off before. The same mesh with a twentieth of the tolerance tells by how
+    // much.
+    const std::string saddle = R"(
+[energy]
+k20 = 1.0
+[model]
+kind = "stokes"
+Re = 2.632
+gamma = 0.5
+[shape]
+kind = "sphere"
+radius = 1
+mode = [{amplitude = 0.05, l = 4, m = 0}, {amplitude = 0.043, l = 2, m = 1}]
+[discretisation]
+elements = 180
+time_tolerance = 1e-4
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.0226
+)";
+    const Outcome o = run_case(saddle);
+    const Outcome exact = run_case(saddle, {"discretisation.time_tolerance=5e-6", "accuracy.estimate=false"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished);
+    ASSERT_EQ(exact.summary.stop.reason, Stop::finished);
+    const double error = (o.last("energy") - exact.last("energy")) / o.summary.reference_energy;
+    EXPECT_GT(error, 5e-4);
+    EXPECT_LT(error, o.summary.estimated_error);
+    EXPECT_GT(error, o.summary.estimated_error / 5);
+}
+
 TEST(MotionSettings, SmoothnessIsTheOrderOfLinearInterpolation) {
     const CurvedMesh mesh = flat_mesh(icosphere(2), 4);
     const auto values = [&](auto f) {
@@ -396,6 +443,25 @@ TEST(MotionAttempt, ACoarserRunThatTakesFarShorterStepsIsLost) {
     };
     EXPECT_DOUBLE_EQ(got_to(1e-4), 1e-3);
     EXPECT_LT(got_to(1e-9), 1e-3);
+}
+
+TEST(MotionAttempt, StepsOfACoarserRunGrowEvenlyWithoutInertia) {
+    const auto last_step = [](const std::string& kind) {
+        Outcome o = begin(wavy, {"model.kind=" + kind});
+        const Start start(o.c);
+        const RunClock clock(o.c, o.watch);
+        MotionAttempt run(o.c, o.watch, clock, {80, 1e-2, 0, 1, Role::fewer_triangles}, nullptr);
+        run.begin(start);
+        run.advance_to(1e-5, 2.4);
+        EXPECT_EQ(run.steps(), 1);
+        run.advance_to(7e-5, 2.4);
+        return std::pair{run.steps(), run.state().step};
+    };
+    // 6 = 2 + 2^2
+    EXPECT_EQ(last_step("overdamped").first, 3);
+    EXPECT_NEAR(last_step("overdamped").second, 4e-5, 1e-9);
+    EXPECT_EQ(last_step("fluid").first, 4);
+    EXPECT_NEAR(last_step("fluid").second, 2e-5, 1e-9);
 }
 
 TEST(MotionRun, TheOtherRunHasOtherElementsWhereFewerTrianglesLoseTheSurface) {
