@@ -400,13 +400,15 @@ void MotionAttempt::advance() {
 }
 
 void MotionAttempt::advance_to(double time, double growth) {
-    until_ = time;
     memory_.next_step = std::min(time - state_.time, state_.step > 0 ? growth * state_.step : HUGE_VAL);
     const auto tried = [this] { return memory_.count.steps + memory_.count.rejected; };
     const auto before = tried(), rejected = memory_.count.rejected;
     while (!stop_ && is_before(state_.time, time)) {
-        if (surface().law().inertia == 0 && memory_.count.rejected == rejected)
+        until_ = time;
+        if (surface().law().inertia == 0 && memory_.count.rejected == rejected) {
             memory_.next_step = first_of_steps(time - state_.time, state_.step, growth);
+            if (memory_.next_step < time - state_.time) until_ = state_.time + memory_.next_step;
+        }
         advance();
         if (!stop_ && tried() - before > most_at_once)
             end({Stop::resolution_lost, state_.time,

@@ -40,7 +40,7 @@ void compared_fields(Fields&& f, R& r) {
     f.array("restart_compared_orders", r.orders, r.times.size());
     f.number("restart_compared_slowest_at", r.slowest_at), f.number("restart_compared_slowest", r.slowest);
     f.number("restart_compared_difference_then", r.difference_then);
-    f.number("restart_compared_steps_then", r.steps_then);
+    f.number("restart_compared_steps_then", r.steps_then), f.number("restart_compared_fastest", r.fastest);
     f.optional_array("restart_compared_coarser_at", r.coarser_at);
     f.optional_array("restart_compared_asked", r.asked, r.coarser_at.size());
     f.optional_array("restart_compared_had", r.had, r.coarser_at.size());
@@ -236,8 +236,10 @@ double MotionError::error_at_once(std::size_t i, double smoothness) {
     const double difference = coarser_->run->energy() - r.energies[i], at = static_cast<double>(i);
     const int steps = coarser_->run->steps();
     if (i == 0 || r.dissipations[i] <= r.slowest)
-        r.slowest_at = at, r.slowest = r.dissipations[i], r.difference_then = difference, r.steps_then = steps;
-    if (!has_sped_up(case_, r.dissipations[i], r.slowest)) return std::abs(difference) * part;
+        r.slowest_at = at, r.slowest = r.fastest = r.dissipations[i], r.difference_then = difference,
+        r.steps_then = steps;
+    r.fastest = std::max(r.fastest, r.dissipations[i]);
+    if (!has_sped_up(case_, r.fastest, r.slowest)) return std::abs(difference) * part;
     const double by_change = error_by_change((at - r.slowest_at) / std::max(steps - r.steps_then, 1.0));
     return std::abs(r.difference_then) * part + std::abs(difference - r.difference_then) * std::max(by_change, part);
 }

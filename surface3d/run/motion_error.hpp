@@ -24,8 +24,8 @@ struct ComparedEnergies {
     double in_time = 0;      // largest error in time
     double growth = 1e9;     // of steps of the coarser run, from one to the next, at most
     // Where the surface was slowest, of the times compared: the number of that time, the dissipation, the difference of
-    // the energies and the steps that the coarser run had made.
-    double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0;
+    // the energies and the steps that the coarser run had made. The largest dissipation since then.
+    double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0, fastest = 0;
     // The run has gone on with fewer triangles: the number of that time, the triangles asked for and had.
     std::vector<double> coarser_at, asked, had;
 };

@@ -112,9 +112,9 @@ double error_by_difference(const Case& c, const MotionSettings& coarser, double 
     return 1 / (std::min({growth_in_space(coarser, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
 }
 
-bool has_sped_up(const Case& c, double dissipation, double slowest) {
+bool has_sped_up(const Case& c, double fastest, double slowest) {
     const MotionLaw law = motion_law(c.model);
-    return law.inertia == 0 && !law.loads_change() && dissipation > sped_up * slowest;
+    return law.inertia == 0 && !law.loads_change() && fastest > sped_up * slowest;
 }
 
 double error_by_change(double more_steps) {

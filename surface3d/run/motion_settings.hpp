@@ -46,10 +46,10 @@ double growth_of_coarser(const Case& c, const Smoothness& start);
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
 
 // Where surfaces leave a state in which they have nearly rested, errors made before become a delay, and grow with the
-// rate at which the energy falls. Whether one has left the slowest time so far, by the dissipation now and then (models
-// without inertia under constant loads: elsewhere it changes for other reasons); the error over what the difference
-// from the coarser run has changed by since then, if the run has made so many times more steps.
-bool has_sped_up(const Case& c, double dissipation, double slowest);
+// rate at which the energy falls. Whether one has left the slowest time so far, by the dissipation then and the largest
+// since (models without inertia under constant loads: elsewhere it changes for other reasons); the error over what the
+// difference from the coarser run has changed by since then, if the run has made so many times more steps.
+bool has_sped_up(const Case& c, double fastest, double slowest);
 double error_by_change(double more_steps);
 
 // Whether steps have so high an order that errors in time grow far more than those in space when several are made at
