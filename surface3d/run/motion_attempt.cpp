@@ -472,8 +472,9 @@ void MotionAttempt::compare() {
     if (!out_.reported()) return;
     std::optional<double> error;
     if (error_) error = error_->at(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
-    const double rise = total() - memory_.balance.lowest_total, defect = memory_.balance.defect_at(total());
-    error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, std::abs(defect)});
+    const double rise = total() - memory_.balance.lowest_total, spare = error_ ? error_->spare() : 1,
+                 defect = spare * std::abs(memory_.balance.defect_at(total()));
+    error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, defect});
     if (error) memory_.error = std::max({memory_.error, *error, rise});
 }
 

@@ -38,6 +38,7 @@ void compared_fields(Fields&& f, R& r) {
     f.array("restart_compared_energies", r.energies, r.times.size());
     f.array("restart_compared_dissipations", r.dissipations, r.times.size());
     f.array("restart_compared_orders", r.orders, r.times.size());
+    f.number("restart_compared_spare", r.spare);
     f.number("restart_compared_slowest_at", r.slowest_at), f.number("restart_compared_slowest", r.slowest);
     f.number("restart_compared_difference_then", r.difference_then);
     f.number("restart_compared_steps_then", r.steps_then), f.number("restart_compared_fastest", r.fastest);
@@ -137,6 +138,7 @@ void MotionError::attempt(const Work& work, double time) {
 
 double MotionError::begin(int triangles, const MotionMeasures& start) {
     of_run_.growth = growth_of_coarser(case_, start.smoothness);
+    of_run_.spare = spare_for_waves(case_, start.smoothness);
     attempt([&] { begin(triangles); }, begin_time(case_));
     return error_of_start(case_, start_, of_.elements, start.free_energy);
 }
@@ -166,6 +168,7 @@ void MotionError::begin(Role role, double coarser_by) {
                .dissipations = of_run_.dissipations,
                .orders = of_run_.orders,
                .growth = of_run_.growth,
+               .spare = of_run_.spare,
                .coarser_at = of_run_.coarser_at,
                .asked = of_run_.asked,
                .had = of_run_.had};
@@ -285,7 +288,7 @@ std::optional<double> MotionError::at(double time, double energy, double dissipa
         return std::nullopt;
     }
     if (failure_ || of_run_.compared < std::ssize(of_run_.times)) return std::nullopt;
-    return of_run_.error;
+    return of_run_.spare * of_run_.error;
 }
 
 std::optional<double> MotionError::in_time() const {

@@ -23,6 +23,7 @@ struct ComparedEnergies {
     double sum_in_time = 0;  // then, of the parts that steps have added to the error in time
     double in_time = 0;      // largest error in time
     double growth = 1e9;     // of steps of the coarser run, from one to the next, at most
+    double spare = 1;        // what is stated over what is known, spare_for_waves()
     // Where the surface was slowest, of the times compared: the number of that time, the dissipation, the difference of
     // the energies and the steps that the coarser run had made. The largest dissipation since then.
     double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0, fastest = 0;
@@ -49,6 +50,8 @@ public:
     // get fewer triangles, as the run has: so many that it asked for, and so many that it has.
     bool is_at(double time) const;
     void coarsen(int asked, int triangles);
+    // What is stated of the balance, too, is so many times what is known.
+    double spare() const { return of_run_.spare; }
     // The part of it that is due to time, largest; nothing where that is not known apart.
     std::optional<double> in_time() const;
     // Why and when a coarser run ended, if it has.

@@ -42,7 +42,7 @@ public:
             run.begin(start_);
         }
         run.go();
-        ended_ = {std::move(run.summary), {run.error(), error.in_time(), run.defect()}};
+        ended_ = {std::move(run.summary), {run.error(), error.in_time(), error.spare() * run.defect()}};
         judge(error.stop());
         return ended_.summary;
     }

@@ -28,6 +28,7 @@ constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of 
 constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
 constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
 constexpr double high_accuracy = 1e-4;                    // from here on, without inertia, steps of higher order pay
+constexpr double unresolved_waves = 1.6;                  // of rough fluids: at most 1.37 was seen to be missing
 constexpr double sped_up = 2;             // times the least dissipation: the motion has left what it rested at
 constexpr double least_more_steps = 1.5;  // of the run, than of the coarser one: fewer would tell nothing
 constexpr double surest_growth = 4.5;     // of errors: they have maxima between the steps that are compared
@@ -64,6 +65,10 @@ int triangles_for_start(const Case& c, const Start& start) {
         const bool more = error > asked || error_of_start(c, start, n, energy) > asked;
         if (!more || growth_of_start * n > most_first_triangles) return n;
     }
+}
+
+bool is_rough(const Smoothness& start) {
+    return start.order < rough_below && start.missed > rough_missed;
 }
 
 }  // namespace
@@ -103,8 +108,13 @@ bool is_of_high_order(const Case& c) {
 }
 
 double growth_of_coarser(const Case& c, const Smoothness& start) {
-    const bool rough = element_order(c) < 4 || (start.order < rough_below && start.missed > rough_missed);
+    const bool rough = element_order(c) < 4 || is_rough(start);
     return rough || is_of_high_order(c) ? any_growth : stable_growth;
+}
+
+double spare_for_waves(const Case& c, const Smoothness& start) {
+    const bool waves = motion_law(c.model).inertia != 0 && element_order(c) == 4 && is_rough(start);
+    return waves ? unresolved_waves : 1;
 }
 
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {
