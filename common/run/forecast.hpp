@@ -16,7 +16,8 @@ struct Forecast {
     std::string resolution;                // in words
     std::optional<double> steps, seconds;  // of wall time, of moving surfaces on a quiet machine; none: it is not known
     double bytes = 0;
-    std::string ill_posed;  // why the run stops at its start, or empty
+    std::string ill_posed;    // why the run stops at its start, or empty
+    bool finer_runs = false;  // may follow, which are not counted
 };
 
 // Counts the steps of a run.

@@ -235,6 +235,7 @@ void MotionAttempt::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.lowest_total = std::min(memory_.balance.lowest_total, total());
     memory_.balance.defect = std::max(memory_.balance.defect, std::abs(memory_.balance.defect_at(total())));
     ++memory_.count.steps;
+    rough_steps_ += is_rough(m.smoothness);
 }
 
 // A step that was cut short by an output says little about how long the next one may be.

@@ -54,6 +54,7 @@ public:
     const MotionState& state() const { return state_; }  // no nodes: it could not begin
     double energy() const { return comparable(); }       // with loads: F
     int steps() const { return memory_.count.steps; }
+    int rough_steps() const { return rough_steps_; }  // of this attempt, to surfaces that are rough for their mesh
     CurvedMesh mesh() const { return scheme_->surface().mesh(state_); }
     Record saved() const { return state_record(state_, memory_); }
     // Largest errors, absolute: of the energy; of the balance with dissipation.
@@ -130,6 +131,7 @@ private:
     std::optional<StopReport> stop_;
     double until_ = HUGE_VAL;  // no step goes farther
     double error_now_ = 0;
+    int rough_steps_ = 0;
     LinearWork linear_work_;
 };
 

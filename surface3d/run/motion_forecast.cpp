@@ -25,7 +25,9 @@ constexpr double cost_power = 1.2;        // of the number of triangles: the cos
 constexpr double with_coarser_run = 1.35, with_coarser_runs = 1.6;
 constexpr double threads_power = 0.6;                         // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
-constexpr double usual_steps = 100, usual_step = 0.5e-3;      // at the loosest tolerance; seconds for a triangle
+// Fluids of whose steps so many lead to rough surfaces may need finer runs, where less than this is asked.
+constexpr double rough_part = 0.1, asked_of_rough = 5e-3;
+constexpr double usual_steps = 100, usual_step = 0.5e-3;  // at the loosest tolerance; seconds for a triangle
 
 // Seconds that this process has used, over those that so many threads save on a quiet machine.
 double quiet_seconds() {
@@ -49,7 +51,7 @@ double steps_by_tolerance(const Case& c, double from, double to) {
 
 struct PilotRun {
     double steps = 0, seconds_per_step = 0;
-    bool useful = false;
+    bool useful = false, rough = false;
     std::string ill_posed = {};  // why it cannot begin
 };
 
@@ -75,16 +77,28 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
         if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
         if (!whole && pilot.has_collapsed()) return {};
         return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (quiet_seconds() - before) / pilot.steps(),
-                true};
+                true, run.rough_steps() > rough_part * run.steps()};
     } catch (const SolveError&) {
     }
     return {};
+}
+
+// Whether a finer run would follow if a fluid states more than is asked.
+bool can_be_repeated(const Case& c, const Start& start) {
+    return motion_law(c.model).inertia != 0 && c.accuracy.estimate && c.accuracy.energy < asked_of_rough &&
+           start.resizable() && !settings_given(c);
+}
+
+bool is_rough(const StartMesh& start) {
+    const SurfaceSpace space(start.mesh);
+    return is_rough(smoothness_of(start.mesh, motion_fields(space, start.mesh, Projection(space, start.mesh)).H));
 }
 
 }  // namespace
 
 bool may_be_long(const Case& c, const Start& start) {
     const MotionSettings s = first_settings(c, start);
+    if (can_be_repeated(c, start) && is_rough(start.mesh(s.elements, element_order(c)))) return true;
     const double steps = c.surface.step ? c.time.end / *c.surface.step
                                         : usual_steps * std::max(1.0, steps_by_tolerance(c, 1e-4, s.tolerance));
     return steps * s.elements * usual_step > 20;
@@ -109,6 +123,7 @@ Forecast forecast_motion(const Case& c, const Start& start) {
                 out.seconds = runs_at_once(c) * *out.steps * per_step;
             }
             out.ill_posed = pilot.ill_posed;
+            out.finer_runs = pilot.rough && can_be_repeated(c, start);
             if (own == triangles || !out.ill_posed.empty()) break;
         }
     } catch (const Paused&) {  // the start alone takes long

@@ -67,11 +67,11 @@ int triangles_for_start(const Case& c, const Start& start) {
     }
 }
 
-bool is_rough(const Smoothness& start) {
-    return start.order < rough_below && start.missed > rough_missed;
-}
-
 }  // namespace
+
+bool is_rough(const Smoothness& smoothness) {
+    return smoothness.order < rough_below && smoothness.missed > rough_missed;
+}
 
 Scheme time_scheme(const Case& c) {
     if (c.surface.scheme) return *c.surface.scheme;

@@ -41,6 +41,9 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
 // run. Where H is rough, errors of the first moments are large, and only several steps at once tell them.
 double growth_of_coarser(const Case& c, const Smoothness& start);
 
+// Whether the mesh does not resolve what it has to represent, by H.
+bool is_rough(const Smoothness& smoothness);
+
 // Rough starts of fluids leave waves that no step resolves. Their energy is off by more at some times than what the
 // coarser run and the balance tell of others: what is stated is so many times that, else 1.
 double spare_for_waves(const Case& c, const Smoothness& start);

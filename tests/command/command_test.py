@@ -26,6 +26,23 @@ r_min = {value = 0.9, abs = 0.2}
 energy_42 = {value = -7, abs = 1e-3}
 """
 
+# Its seams make waves that few triangles do not resolve.
+ROUGH = """tier = "surface3d"
+[energy]
+k20 = 0.125
+k42 = 0.12
+[model]
+kind = "fluid"
+[shape]
+kind = "capsule"
+radius = 0.5
+length = 1.0
+[accuracy]
+energy = 1e-3
+[time]
+end = 0.005
+"""
+
 # Moves in three dimensions: 1 s.
 SURFACE = """tier = "surface3d"
 [energy]
@@ -308,6 +325,17 @@ class Check(ProgramTest):
         self.tubule("run", surface, "--quiet", "-o", "surface.hdf")
         steps = about(self.folder / "surface.hdf")["steps"]
         self.assertTrue(0.5 < int(found[1]) / steps < 2, f"{words}, but {steps} steps")
+
+    def test_finer_runs_are_told(self):
+        """A capsule as a fluid is rough; an accuracy of 1e-2 takes one run."""
+        rough = self.write("rough.toml", ROUGH)
+        told = "; the motion is rough: finer runs may follow, each at least twice as long\n"
+        words = self.tubule("check", rough)[1]
+        self.assertRegex(words, r"expected: about \d+ triangles of order 4; about \d+ steps, [^,]+, \d+ MB" + told + "$")
+        self.assertTrue(json.loads(self.tubule("check", "--json", rough)[0])["expected"]["finer_runs"])
+        with open(rough, "w") as file:
+            file.write(ROUGH.replace("1e-3", "1e-2"))
+        self.assertRegex(self.tubule("check", rough)[1], r" MB\n$")
 
     def test_all_bad_cases_are_told(self):
         one = self.write("one.toml", QUICK.replace("kind", "knid"))

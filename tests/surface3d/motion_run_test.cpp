@@ -14,6 +14,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/motion_attempt.hpp"
+#include "surface3d/run/motion_forecast.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/run.hpp"
@@ -158,6 +159,22 @@ end = 0.015
     EXPECT_GT(o.summary.estimated_error * o.summary.reference_energy, 1.37 * defect);
     const std::vector<double> errors = o.series("energy_error"), defects = o.series("identity_defect");
     for (std::size_t i = 0; i < errors.size(); ++i) EXPECT_GE(errors[i], 1.37 * std::abs(defects[i]));
+}
+
+TEST(MotionForecast, FinerRunsMayFollowForRoughFluids) {
+    const auto may_follow = [](const std::string& kind, const std::string& shape, const std::string& more) {
+        const Case c = begin("[energy]\nk20 = 0.125\nk42 = 0.12\n[shape]\n" + shape + "[time]\nend = 0.005\n",
+                             {"model.kind=" + kind, more})
+                           .c;
+        return forecast_motion(c, Start(c)).finer_runs;
+    };
+    const std::string capsule = "kind = \"capsule\"\nradius = 0.5\nlength = 1.0\n",
+                      ellipsoid = "kind = \"ellipsoid\"\na = 1.3\nb = 1\nc = 0.8\n", asked = "accuracy.energy=1e-3";
+    EXPECT_TRUE(may_follow("fluid", capsule, asked));
+    EXPECT_FALSE(may_follow("fluid", ellipsoid, asked));
+    EXPECT_FALSE(may_follow("stokes", capsule, asked));
+    EXPECT_FALSE(may_follow("fluid", capsule, "accuracy.energy=1e-2"));
+    EXPECT_FALSE(may_follow("fluid", capsule, "discretisation.elements=180"));
 }
 
 TEST(MotionSettings, WhatHasSpedUpMayBeLate) {

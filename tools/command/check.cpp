@@ -175,9 +175,10 @@ std::string json_of(const Checked& c) {
     for (const Complaint& one : c.complaints) errors.push_back(json_of(one));
     std::string expected = "null";
     if (c.expected)
-        expected = fmt::format("{{\"resolution\": {}, \"steps\": {}, \"seconds\": {}, \"bytes\": {}}}",
-                               json(c.expected->resolution), or_null(c.expected->steps), or_null(c.expected->seconds),
-                               json(c.expected->bytes));
+        expected =
+            fmt::format("{{\"resolution\": {}, \"steps\": {}, \"seconds\": {}, \"bytes\": {}, \"finer_runs\": {}}}",
+                        json(c.expected->resolution), or_null(c.expected->steps), or_null(c.expected->seconds),
+                        json(c.expected->bytes), c.expected->finer_runs);
     const std::string model = c.model.empty() ? "null"
                                               : fmt::format("{{\"kind\": {}, \"reason\": {}}}", json(c.model),
                                                             json(valid_utf8(c.model_reason)));

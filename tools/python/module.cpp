@@ -333,6 +333,7 @@ void add_closed_forms(py::module_& m) {
         const Forecast f = without_gil(0, [&] { return forecast(c); });
         py::dict out;
         out["resolution"] = f.resolution, out["steps"] = f.steps, out["seconds"] = f.seconds, out["bytes"] = f.bytes;
+        out["finer_runs"] = f.finer_runs;
         return out;
     });
 }

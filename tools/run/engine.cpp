@@ -49,7 +49,7 @@ public:
     std::optional<Forecast> forecast_if_long() const override {
         if (!case_.moves() || !surface3d::may_be_long(case_, start_)) return std::nullopt;
         const Forecast f = surface3d::forecast_motion(case_, start_);
-        return f.seconds.value_or(0) > long_run ? std::optional(f) : std::nullopt;
+        return f.seconds.value_or(0) > long_run || f.finer_runs ? std::optional(f) : std::nullopt;
     }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from

@@ -68,7 +68,8 @@ std::string words(const Forecast& f) {
     if (f.steps) out += fmt::format("about {} steps, ", rounded(*f.steps));
     out += f.seconds ? (*f.seconds < 1 ? "less than a second" : "about " + duration(*f.seconds))
                      : "the time cannot be estimated: set time.limit";
-    return out + fmt::format(", {} MB", rounded(f.bytes / 1e6));
+    out += fmt::format(", {} MB", rounded(f.bytes / 1e6));
+    return out + (f.finer_runs ? "; the motion is rough: finer runs may follow, each at least twice as long" : "");
 }
 
 }  // namespace tubule

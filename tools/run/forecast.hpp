@@ -12,7 +12,7 @@ namespace tubule {
 // seconds of the run itself. Throws as an engine and its run.
 Forecast forecast(const Case& c);
 
-// "about 180 triangles of order 4; about 41 steps, 5 s, 120 MB"
+// "about 180 triangles of order 4; about 41 steps, 5 s, 120 MB", and whether finer runs may follow
 std::string words(const Forecast& f);
 
 }  // namespace tubule
