@@ -29,19 +29,19 @@ void saved_fields(Fields&& f, S& s) {
     f.number("time", s.time), f.number("stop", s.stop), f.number("stop_time", s.stop_time);
     f.number("order", s.cells.order), f.number("period", s.cells.period);
 }
-template <class Fields, class R>
-void compared_fields(Fields&& f, R& r) {
-    f.number("restart_compared", r.compared), f.number("restart_compared_error", r.error);
-    f.number("restart_compared_between", r.between), f.number("restart_compared_sum_in_time", r.sum_in_time);
-    f.number("restart_compared_in_time", r.in_time), f.number("restart_compared_growth", r.growth);
+template <class Fields, class R, class C>
+void compared_fields(Fields&& f, R& r, C& c) {
+    f.number("restart_compared", c.compared), f.number("restart_compared_error", c.error);
+    f.number("restart_compared_between", c.between), f.number("restart_compared_sum_in_time", c.sum_in_time);
+    f.number("restart_compared_in_time", c.in_time), f.number("restart_compared_growth", r.growth);
     f.array("restart_compared_times", r.times);
     f.array("restart_compared_energies", r.energies, r.times.size());
     f.array("restart_compared_dissipations", r.dissipations, r.times.size());
     f.array("restart_compared_orders", r.orders, r.times.size());
     f.number("restart_compared_spare", r.spare);
-    f.number("restart_compared_slowest_at", r.slowest_at), f.number("restart_compared_slowest", r.slowest);
-    f.number("restart_compared_difference_then", r.difference_then);
-    f.number("restart_compared_steps_then", r.steps_then), f.number("restart_compared_fastest", r.fastest);
+    f.number("restart_compared_slowest_at", c.slowest_at), f.number("restart_compared_slowest", c.slowest);
+    f.number("restart_compared_difference_then", c.difference_then);
+    f.number("restart_compared_steps_then", c.steps_then), f.number("restart_compared_fastest", c.fastest);
     f.optional_array("restart_compared_coarser_at", r.coarser_at);
     f.optional_array("restart_compared_asked", r.asked, r.coarser_at.size());
     f.optional_array("restart_compared_had", r.had, r.coarser_at.size());
@@ -163,15 +163,7 @@ void MotionError::begin(Role role, double coarser_by) {
     };
     coarser_ = begun();
     if (tells_apart()) same_steps_ = begun();
-    of_run_ = {.times = of_run_.times,
-               .energies = of_run_.energies,
-               .dissipations = of_run_.dissipations,
-               .orders = of_run_.orders,
-               .growth = of_run_.growth,
-               .spare = of_run_.spare,
-               .coarser_at = of_run_.coarser_at,
-               .asked = of_run_.asked,
-               .had = of_run_.had};
+    compared_ = {};
 }
 
 bool MotionError::is_compared(std::size_t i) const {
@@ -184,15 +176,15 @@ bool MotionError::catch_up(double smoothness) {
         run.advance_to(time, of_run_.growth);
         return run.state().X.size() > 0 && !is_before(run.state().time, time);
     };
-    ComparedEnergies& r = of_run_;
+    const std::vector<double>& times = of_run_.times;
     double largest = 0;
-    for (; r.compared < std::ssize(r.times); ++r.compared) {
-        if (same_steps_ && !gets_to(*same_steps_->run, r.times[r.compared])) return false;
-        if (!is_compared(r.compared)) continue;
-        if (!gets_to(*coarser_->run, r.times[r.compared])) return false;
-        largest = std::max(largest, error_at(r.compared, smoothness));
-        r.error = largest;
-        follow_mesh(r.compared);
+    for (int& i = compared_.compared; i < std::ssize(times); ++i) {
+        if (same_steps_ && !gets_to(*same_steps_->run, times[i])) return false;
+        if (!is_compared(i)) continue;
+        if (!gets_to(*coarser_->run, times[i])) return false;
+        largest = std::max(largest, error_at(i, smoothness));
+        compared_.error = largest;
+        follow_mesh(i);
     }
     return true;
 }
@@ -200,7 +192,7 @@ bool MotionError::catch_up(double smoothness) {
 // Where the run has got fewer triangles after this step, so do the coarser ones. If that is interrupted they begin
 // again when the run goes on, since which of them has followed is not known.
 void MotionError::follow_mesh(std::size_t i) try {
-    const ComparedEnergies& r = of_run_;
+    const FollowedRun& r = of_run_;
     for (std::size_t k = 0; k < r.coarser_at.size(); ++k)
         if (r.coarser_at[k] == static_cast<double>(i))
             for (const auto* coarser : {&coarser_, &same_steps_}) {
@@ -226,40 +218,42 @@ bool MotionError::is_at(double time) const {
 }
 
 void MotionError::coarsen(int asked, int triangles) {
-    ComparedEnergies& r = of_run_;
+    FollowedRun& r = of_run_;
     const std::size_t last = r.times.size() - 1;
     r.coarser_at.push_back(static_cast<double>(last)), r.asked.push_back(asked), r.had.push_back(triangles);
     if (!failure_) attempt([&] { follow_mesh(last); }, r.times[last]);
 }
 
-// Where one coarser run tells errors in space and in time: theory.md (11.2), and (11.4) where the motion has sped up.
+// Where one coarser run tells errors in space and in time: theory.md (11.2), and (11.3) where the motion has sped up.
 double MotionError::error_at_once(std::size_t i, double smoothness) {
-    ComparedEnergies& r = of_run_;
+    const FollowedRun& r = of_run_;
+    Comparison& c = compared_;
     const double part = error_by_difference(case_, coarser_->run->settings(), smoothness);
     const double difference = coarser_->run->energy() - r.energies[i], at = static_cast<double>(i);
     const int steps = coarser_->run->steps();
-    if (i == 0 || r.dissipations[i] <= r.slowest)
-        r.slowest_at = at, r.slowest = r.fastest = r.dissipations[i], r.difference_then = difference,
-        r.steps_then = steps;
-    r.fastest = std::max(r.fastest, r.dissipations[i]);
-    if (!has_sped_up(case_, r.fastest, r.slowest)) return std::abs(difference) * part;
-    const double by_change = error_by_change((at - r.slowest_at) / std::max(steps - r.steps_then, 1.0));
-    return std::abs(r.difference_then) * part + std::abs(difference - r.difference_then) * std::max(by_change, part);
+    if (i == 0 || r.dissipations[i] <= c.slowest)
+        c.slowest_at = at, c.slowest = c.fastest = r.dissipations[i], c.difference_then = difference,
+        c.steps_then = steps;
+    c.fastest = std::max(c.fastest, r.dissipations[i]);
+    if (!has_sped_up(case_, c.fastest, c.slowest)) return std::abs(difference) * part;
+    const double by_change = error_by_change((at - c.slowest_at) / std::max(steps - c.steps_then, 1.0));
+    return std::abs(c.difference_then) * part + std::abs(difference - c.difference_then) * std::max(by_change, part);
 }
 
 // Which all coarser runs have got to.
 double MotionError::error_at(std::size_t i, double smoothness) {
-    ComparedEnergies& r = of_run_;
+    const FollowedRun& r = of_run_;
+    Comparison& c = compared_;
     const MotionSettings& settings = coarser_->run->settings();
     if (!same_steps_) return error_at_once(i, smoothness);
     const double longer_steps = coarser_->run->energy();
     const double same_steps = same_steps_->run->energy();
     const std::size_t since = i == 0 ? 0 : steps_at_once * ((i - 1) / steps_at_once) + 1;
     const auto order = static_cast<int>(*std::min_element(r.orders.begin() + since, r.orders.begin() + i + 1));
-    r.sum_in_time += (longer_steps - same_steps - r.between) * error_in_time(order);
-    r.between = longer_steps - same_steps;
-    r.in_time = std::max(r.in_time, std::abs(r.sum_in_time));
-    return std::abs(same_steps - r.energies[i]) * error_in_space(case_, settings, smoothness) + std::abs(r.sum_in_time);
+    c.sum_in_time += (longer_steps - same_steps - c.between) * error_in_time(order);
+    c.between = longer_steps - same_steps;
+    c.in_time = std::max(c.in_time, std::abs(c.sum_in_time));
+    return std::abs(same_steps - r.energies[i]) * error_in_space(case_, settings, smoothness) + std::abs(c.sum_in_time);
 }
 
 // Without an end, or to that of a coarser run; what is lost on fewer triangles is tried with elements of another order.
@@ -287,13 +281,13 @@ std::optional<double> MotionError::at(double time, double energy, double dissipa
     } catch (const Paused&) {
         return std::nullopt;
     }
-    if (failure_ || of_run_.compared < std::ssize(of_run_.times)) return std::nullopt;
-    return of_run_.spare * of_run_.error;
+    if (failure_ || compared_.compared < std::ssize(of_run_.times)) return std::nullopt;
+    return of_run_.spare * compared_.error;
 }
 
 std::optional<double> MotionError::in_time() const {
     if (!same_steps_) return std::nullopt;
-    return of_run_.in_time;
+    return compared_.in_time;
 }
 
 std::optional<StopReport> MotionError::stop() const {
@@ -309,13 +303,13 @@ void MotionError::save(Record& record) const {
     const auto is_begun = [](const auto& coarser) { return coarser && coarser->run->state().X.size() > 0; };
     const bool exists = is_begun(coarser_), both = exists && is_begun(same_steps_);
     writer.number(of_coarser + "exists", exists), writer.number(of_same_steps + "exists", both);
-    compared_fields(writer, of_run_);
+    compared_fields(writer, of_run_, compared_);
     if (exists) save_coarser(*coarser_->run, of_coarser, record);
     if (both) save_coarser(*same_steps_->run, of_same_steps, record);
 }
 
 void MotionError::resume(const Record& record, int triangles) {
-    compared_fields(RecordReader(record), of_run_);
+    compared_fields(RecordReader(record), of_run_, compared_);
     if (!is_saved(record, of_coarser)) return attempt([&] { begin(triangles); }, record.time);
     const auto resumed = [&](const std::string& prefix) {
         Record own = record_of(record, prefix);
@@ -333,8 +327,9 @@ void MotionError::resume(const Record& record, int triangles) {
 }
 
 void check_error_restart(const Case& c, const Record& record) {
-    ComparedEnergies compared;
-    compared_fields(RecordReader(record), compared);
+    FollowedRun run;
+    Comparison compared;
+    compared_fields(RecordReader(record), run, compared);
     for (const std::string& prefix : {of_coarser, of_same_steps}) {
         if (!is_saved(record, prefix)) continue;
         Record own = record_of(record, prefix);

@@ -10,27 +10,32 @@
 
 namespace tubule::surface3d {
 
+// The run itself, as far as coarser runs are to follow it.
+struct FollowedRun {
+    std::vector<double> times, energies, dissipations, orders;  // of its steps
+    double growth = 1e9;  // of steps of the coarser run, from one to the next, at most
+    double spare = 1;     // what is stated over what is known, spare_for_waves()
+    // It has gone on with fewer triangles: the number of that time, the triangles asked for and had.
+    std::vector<double> coarser_at, asked, had;
+};
+
+// How far the run and its coarser runs have been compared.
+struct Comparison {
+    int compared = 0;        // so many times of the run, as yet
+    double error = 0;        // at the last time compared
+    double between = 0;      // then, of the two coarser runs
+    double sum_in_time = 0;  // then, of the parts that steps have added to the error in time
+    double in_time = 0;      // largest error in time
+    // Where the surface was slowest, of the times compared: the number of that time, the dissipation, the difference of
+    // the energies and the steps that the coarser run had made. The largest dissipation since then.
+    double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0, fastest = 0;
+};
+
 // Coarser runs have fewer triangles, so that errors in space are larger by a known factor, or elements of another order
 // where fewer triangles would be too few, are not ours to choose, or lose the surface on the way. One goes over several
 // steps of the run at once, so that errors in time are larger by a known factor, too: theory.md (11.2). With schemes of
 // high order that factor is far beyond that of errors in space; another coarser run then takes the steps of the run and
-// tells both apart, theory.md (11.3).
-struct ComparedEnergies {
-    std::vector<double> times, energies, dissipations, orders;  // of the run and its steps
-    int compared = 0;                                           // so many of them, as yet
-    double error = 0;                                           // at the last time compared
-    double between = 0;                                         // then, of the two coarser runs
-    double sum_in_time = 0;  // then, of the parts that steps have added to the error in time
-    double in_time = 0;      // largest error in time
-    double growth = 1e9;     // of steps of the coarser run, from one to the next, at most
-    double spare = 1;        // what is stated over what is known, spare_for_waves()
-    // Where the surface was slowest, of the times compared: the number of that time, the dissipation, the difference of
-    // the energies and the steps that the coarser run had made. The largest dissipation since then.
-    double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0, fastest = 0;
-    // The run has gone on with fewer triangles: the number of that time, the triangles asked for and had.
-    std::vector<double> coarser_at, asked, had;
-};
-
+// tells both apart, theory.md (11.4).
 class MotionError {
 public:
     // All references must outlive it. `of`: the run whose error it is.
@@ -85,7 +90,8 @@ private:
     const RunClock& clock_;
     MotionSettings of_;
     std::unique_ptr<Coarser> coarser_, same_steps_;  // the second one where errors are told apart
-    ComparedEnergies of_run_;
+    FollowedRun of_run_;
+    Comparison compared_;
     std::optional<StopReport> failure_;  // there are no coarser runs
 };
 

@@ -332,7 +332,8 @@ class Check(ProgramTest):
         told = "; the motion is rough: finer runs may follow, each at least twice as long\n"
         words = self.tubule("check", rough)[1]
         self.assertRegex(words, r"expected: about \d+ triangles of order 4; about \d+ steps, [^,]+, \d+ MB" + told + "$")
-        self.assertTrue(json.loads(self.tubule("check", "--json", rough)[0])["expected"]["finer_runs"])
+        found = json.loads(self.tubule("check", "--json", rough)[0])["cases"][0]["expected"]
+        self.assertTrue(found["finer_runs"])
         with open(rough, "w") as file:
             file.write(ROUGH.replace("1e-3", "1e-2"))
         self.assertRegex(self.tubule("check", rough)[1], r" MB\n$")
