@@ -85,7 +85,7 @@ def copied():
         "-P", Path(__file__).parent / "add_term.cmake")  # fmt: skip
     (COPY / "common/shapes/egg.hpp").write_text(SHAPE)
     edit("common/case/case.hpp", r"(?=#include \"common/shapes/)", '#include "common/shapes/egg.hpp"\n')
-    edit("common/case/case.hpp", r"(?<= Dumbbell,)(?= MeshFile)", " Egg,")
+    edit("common/case/case.hpp", r"(?<= Dumbbell,)", " Egg,")
     edit("common/solve/stop.hpp", r"(?<=\"SIGINT or SIGTERM\"\))", " \\\n    " + STOP)
 
 
