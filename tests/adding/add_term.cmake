@@ -8,7 +8,7 @@ if(begin EQUAL -1 OR end EQUAL -1)
   message(FATAL_ERROR "${INPUT} has no list `bending_terms = ...});` any more")
 endif()
 set(term "BendingTerm{\"22\", \"k22\", \"k_{22}H^2K\",
-                [](auto H, auto K, double) { return H * H * K; },
+                [](auto H, auto K, auto) { return H * H * K; },
                 [](auto H, auto K, double) { return H * H * H * H + K * K; }}")
 if(PLACE STREQUAL last)
   math(EXPR cut "${begin} + ${end} + 1")

@@ -474,7 +474,7 @@ TEST(Case, HoldsWhatTheFileSays) {
     EXPECT_EQ(c.path, "case.toml");
     EXPECT_EQ(c.text, good);
     EXPECT_EQ(c.title, "test");
-    EXPECT_EQ(c.energy.k, (std::array{1.0, 0.0, 0.06}));
+    EXPECT_EQ(c.energy.k, (decltype(c.energy.k){1.0, 0.0, 0.06}));
     EXPECT_EQ(c.energy.H0, 0);
     const Tube& tube = std::get<Tube>(c.shape);
     EXPECT_EQ(tube.radius, 1);
@@ -502,7 +502,7 @@ TEST(Case, DefaultsAreThoseOfThePlainData) {
         "tier = \"axisym\"\nenergy.k40 = 1\ntime.end = 2\n"
         "shape = {kind = \"tube\", radius = 1, length = 3}\n",
         {}, "case.toml");
-    EXPECT_EQ(c.energy.k, (std::array{0.0, 1.0, 0.0}));  // an integer where a float is wanted
+    EXPECT_EQ(c.energy.k, (decltype(c.energy.k){0.0, 1.0, 0.0}));  // an integer where a float is wanted
     EXPECT_EQ(c.model.kind, ModelKind::gradient_flow);
     EXPECT_EQ(c.accuracy.energy, Accuracy{}.energy);
     EXPECT_EQ(c.accuracy.r_min, Accuracy{}.r_min);
