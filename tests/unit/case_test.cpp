@@ -206,7 +206,8 @@ TEST(CaseRefusal, UnknownChoices) {
         Edit{"\"axisym\"", "\"Axisim\"",
              "1:8: tier must be one of \"axisym\", \"surface3d\", \"auto\", not \"Axisim\"; did you mean 'axisym'?"},
         Edit{"\"gradient-flow\"", "\"water\"",
-             "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not \"water\""},
+             "8:8: model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not "
+             "\"water\""},
         Edit{"\"gradient-flow\"", "\"gradient-flow\"\nvolume = \"kept\"",
              "9:10: model.volume must be one of \"free\", \"fixed\", not \"kept\""},
         Edit{"\"tube\"", "\"cube\"",
@@ -452,7 +453,8 @@ TEST(CaseRefusal, Overrides) {
                  "velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
-                 "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not \"honey\""},
+                 "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not "
+                 "\"honey\""},
         Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},
