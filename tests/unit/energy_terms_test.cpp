@@ -61,7 +61,7 @@ TEST(EnergyTerms, NamesFollowFromPowers) {
 }
 
 TEST(EnergyTerms, UnboundedDensitiesAreKnown) {
-    const auto unbounded = [](std::array<double, 3> k, std::vector<EnergyTerm> terms, double H0 = -1) {
+    const auto unbounded = [](decltype(Bending::k) k, std::vector<EnergyTerm> terms, double H0 = -1) {
         return !unbounded_below(Bending{.k = k, .H0 = H0, .terms = std::move(terms)}).empty();
     };
     EXPECT_FALSE(unbounded({1, 0, 0}, {}));
