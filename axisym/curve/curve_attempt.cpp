@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_series.hpp"
+#include "axisym/integration/bdf_flow.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
@@ -107,7 +108,7 @@ void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& ra
     };
     system.n_guards = curve_guards().size();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    flow_ = std::make_unique<Flow>(std::move(system), y, rate, time, setup_.control(first_step));
+    flow_ = std::make_unique<BdfFlow>(std::move(system), y, rate, time, setup_.control(first_step));
     observe(time, flow_->x(), flow_->v());
     keep_good();
 }

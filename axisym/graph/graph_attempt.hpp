@@ -45,6 +45,7 @@ private:
     struct Good {
         Eigen::VectorXd x;
         double time = 0;
+        double balance = 0;                                             // free energy and what is dissipated so far
         double least_energy = std::numeric_limits<double>::infinity();  // so far
         int failures = 0;                                               // of the integrator since
     };
@@ -59,6 +60,7 @@ private:
     const Observation& observe(double t, const double* x, const double* v);
     void use_stage(std::unique_ptr<GraphStage> stage);
     FlowSystem system();
+    bool is_one_step() const { return settings_.one_step; }
     void make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
 
     std::optional<StopReport> step();
@@ -70,15 +72,16 @@ private:
     GraphLimits limits() const;
 
     std::optional<StopReport> remesh();
-    double first_step_after(const Eigen::VectorXd& x) const;
     std::optional<StopReport> recover();
     StopReport failure(const std::string& what) const;
     std::string suspects() const;
 
+    double least_error() const;
     void end_with(const StopReport& stop);
-    void write_outputs(double until, const Observation& o);
-    void write(double t, const Observation& o, const double* x, const double* v);
-    void write_row(double t, const Observation& o, const double* x);
+    void write_outputs(double from, double error, const Observation& o);
+    void write_path(double from, double until, double error);
+    void write(double t, double error, const Observation& o, const double* x, const double* v);
+    void write_row(double t, double error, const Observation& o, const double* x);
     Record record(double t, const Observation& o, const double* x, const double* v) const;
     double dissipated(double t) const { return past_.dissipated + flow_->dissipated(t); }
 
@@ -91,6 +94,7 @@ private:
     std::unique_ptr<GraphStage> stage_;
     std::unique_ptr<Flow> flow_;
     Now now_;
+    std::vector<std::pair<double, Observation>> seen_;  // on the way of the last step, by time
     GraphError error_;
     Past past_;
     Good good_;

@@ -10,9 +10,9 @@ constexpr double error_change = 0.25;
 
 }  // namespace
 
-bool GraphError::due(const Observation& o) {
+bool GraphError::due(const Observation& o, bool long_steps) {
     const double change = std::abs(std::log(o.dissipation / dissipation_last_));
-    return ++steps_since_ >= error_steps || !(change < error_change);
+    return ++steps_since_ >= error_steps || long_steps || !(change < error_change);
 }
 
 void GraphError::carry_on(GraphStage& stage, const Observation& o) {

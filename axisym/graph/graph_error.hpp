@@ -12,10 +12,11 @@ namespace tubule::axisym {
 
 class GraphError {
 public:
-    // The transport begins anew with this observation, after so many steps that it has not carried the error over.
-    void begin(const Observation& o, int steps = 0) { dissipation_last_ = o.dissipation, steps_since_ = steps; }
-    // Whether it is time, after a step, to carry the error on.
-    bool due(const Observation& o);
+    // The transport begins anew with this observation.
+    void begin(const Observation& o) { dissipation_last_ = o.dissipation, steps_since_ = 0; }
+    // Whether it is time, after a step, to carry the error on: after each long step of a one-step method, or when some
+    // short ones of backward differences have changed the shape.
+    bool due(const Observation& o, bool long_steps);
     void carry_on(GraphStage& stage, const Observation& o);
     // Beyond what is allowed, for a reason that finer settings remedy.
     bool is_curable(const GraphSettings& settings, double allowed) const;

@@ -15,67 +15,90 @@ std::vector<double> halved(const std::vector<double>& breaks) {
 
 }  // namespace
 
+ErrorTransport::Level::Level(const Forms& f) : forms(f), matrix(f.pattern().nonZeros()), lu(f.pattern()) {
+    state = rate = middle = slope = residual = rest = driven = Eigen::VectorXd::Zero(f.space().size());
+}
+
+// The residual at (middle, slope) drives the error for this long.
+void ErrorTransport::Level::add(double weight) {
+    forms.residual(middle.data(), slope.data(), residual.data());
+    driven += weight * residual;
+}
+
+// M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
+void ErrorTransport::Level::advance(double time, Eigen::VectorXd& error) {
+    forms.jacobian(state.data(), rate.data(), 1 / time, matrix.data());
+    lu.factor(matrix.data());
+    forms.residual(state.data(), rate.data(), rest.data());
+    middle = state + error;
+    forms.residual(middle.data(), rate.data(), residual.data());
+    residual += driven / time - rest;
+    lu.solve(residual.data());
+    error -= residual;
+    driven.setZero();
+}
+
 ErrorTransport::ErrorTransport(const Forms& coarse)
     : coarse_(coarse),
       fine_space_(coarse.space().cell(), halved(coarse.space().breaks()), coarse.space().degree(),
                   coarse.space().smoothness()),
       fine_(fine_space_, coarse.bending(), coarse.loads()),
       prolongation_(fine_space_.prolongation(coarse.space())),
-      matrix_(fine_.pattern()) {
-    total = spatial = residual_ = defect_ = Eigen::VectorXd::Zero(fine_space_.size());
+      on_fine_(fine_),
+      on_coarse_(coarse) {
+    total = Eigen::VectorXd::Zero(fine_space_.size());
+    temporal = Eigen::VectorXd::Zero(coarse.space().size());
+}
+
+void ErrorTransport::set(const Eigen::VectorXd& all, const Eigen::VectorXd& of_space) {
+    total = all;
+    temporal = coarse_.space().prolong(fine_space_, all - of_space);
 }
 
 void ErrorTransport::inherit(const ErrorTransport& other, const Eigen::VectorXd& x_old, const Eigen::VectorXd& x_new) {
     // The exact profile stays; what changes is the computed one.
     const Eigen::VectorXd computed = prolongation_ * x_new, before = other.prolongation_ * x_old;
     total = fine_space_.prolong(other.fine_space_, before + other.total) - computed;
-    spatial = fine_space_.prolong(other.fine_space_, before + other.spatial) - computed;
+    temporal = coarse_.space().prolongation(other.coarse_.space()) * other.temporal;
 }
 
 void ErrorTransport::begin(const double* x, const double* v) {
     const int n = coarse_.space().size();
-    state_ = prolongation_ * Eigen::Map<const Eigen::VectorXd>(x, n);
-    rate_ = prolongation_ * Eigen::Map<const Eigen::VectorXd>(v, n);
-    defect_.setZero();
+    on_coarse_.state = Eigen::Map<const Eigen::VectorXd>(x, n);
+    on_coarse_.rate = Eigen::Map<const Eigen::VectorXd>(v, n);
+    on_coarse_.driven.setZero();
+    on_fine_.driven.setZero();
     elapsed_ = 0;
 }
 
-void ErrorTransport::add_step(double h, const double* x, const double* v) {
-    if (h == 0) return;  // below the resolution of the time: the next step spans it
-    const int n = coarse_.space().size();
-    next_state_.noalias() = prolongation_ * Eigen::Map<const Eigen::VectorXd>(x, n);
-    next_rate_.noalias() = prolongation_ * Eigen::Map<const Eigen::VectorXd>(v, n);
-    middle_ = 0.5 * (state_ + next_state_) + (h / 8) * (rate_ - next_rate_);
-    slope_ = (1.5 / h) * (next_state_ - state_) - 0.25 * (rate_ + next_rate_);
-    fine_.residual(middle_.data(), slope_.data(), residual_.data());
-    defect_ += (2.0 / 3.0) * h * residual_;
-    state_.swap(next_state_);
-    rate_.swap(next_rate_);
+void ErrorTransport::add_step(const Flow& flow, double from) {
+    const double h = flow.time() - from;
+    Level &c = on_coarse_, &f = on_fine_;
+    for (std::size_t q = 0; q < path_points.size(); ++q) {
+        flow.interpolate(from + path_points[q] * h, c.middle.data(), c.slope.data());
+        f.middle.noalias() = prolongation_ * c.middle;
+        f.slope.noalias() = prolongation_ * c.slope;
+        c.add(path_weights[q] * h);
+        f.add(path_weights[q] * h);
+    }
+    c.state = Eigen::Map<const Eigen::VectorXd>(flow.x(), c.state.size());
+    c.rate = Eigen::Map<const Eigen::VectorXd>(flow.v(), c.rate.size());
     elapsed_ += h;
 }
 
 void ErrorTransport::advance() {
     if (elapsed_ == 0) return;
-    fine_.jacobian(state_.data(), rate_.data(), 1 / elapsed_, matrix_.valuePtr());
-    lu_.factor(matrix_);
-    // M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
-    const auto at_error = [&](const Eigen::VectorXd& error) {
-        middle_ = state_ + error;
-        fine_.residual(middle_.data(), rate_.data(), residual_.data());
-    };
-    at_error(spatial);
-    spatial -= lu_.solve(residual_);
-    fine_.residual(state_.data(), rate_.data(), slope_.data());
-    at_error(total);
-    // Simpson: the ends of the steps have weight 1/3, and there the residual is that of the space alone.
-    residual_ += defect_ / elapsed_ - (2.0 / 3.0) * slope_;
-    total -= lu_.solve(residual_);
-    defect_.setZero();
+    on_fine_.state.noalias() = prolongation_ * on_coarse_.state;
+    on_fine_.rate.noalias() = prolongation_ * on_coarse_.rate;
+    on_fine_.advance(elapsed_, total);
+    on_coarse_.advance(elapsed_, temporal);
     elapsed_ = 0;
 }
 
 ErrorTransport::EnergyError ErrorTransport::energy_error(double energy) const {
-    return {fine_.free_energy(state_ + total) - energy, fine_.free_energy(state_ + spatial) - energy};
+    const Eigen::VectorXd fine = prolongation_ * on_coarse_.state + total, coarse = on_coarse_.state + temporal;
+    const double of_all = fine_.free_energy(fine) - energy;
+    return {of_all, of_all - (coarse_.free_energy(coarse) - energy)};
 }
 
 }  // namespace tubule::axisym

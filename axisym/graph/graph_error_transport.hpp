@@ -1,13 +1,14 @@
-// Estimates how far the computed profile is from the exact one. The error obeys the linearised flow, driven by
-// the residual of the flow along a smooth curve through the
-// computed states, tested with splines on halved elements. It is carried along with the run by linearly
-// implicit Euler steps, each spanning several steps of the run.
+// Estimates how far the computed profile is from the exact one. The error obeys the linearised flow, driven by the
+// residual of the flow along the path of the run in time, tested with splines on halved elements; the part that the
+// steps in time make is driven by the same residual tested with the splines of the run. Linearly implicit Euler steps
+// carry it along, each spanning some steps of the run.
 #pragma once
 
 #include <Eigen/Core>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "common/solve/sparse.hpp"
+#include "axisym/integration/flow.hpp"
+#include "axisym/splines/band_lu.hpp"
 
 namespace tubule::axisym {
 
@@ -20,18 +21,23 @@ public:
 
     const ProfileSpace& space() const { return fine_space_; }
 
-    // Errors (exact minus computed) as coefficients in space(): total, and the part due to the mesh alone.
-    Eigen::VectorXd total, spatial;
+    // Errors (exact minus computed) as coefficients: of space and time in space(), and the part of time in the space of
+    // the run.
+    Eigen::VectorXd total, temporal;
+
+    // The part of space, and the other way round.
+    Eigen::VectorXd spatial() const { return total - prolongation_ * temporal; }
+    void set(const Eigen::VectorXd& all, const Eigen::VectorXd& of_space);
 
     // Takes the error over from another mesh; x_old and x_new are the profile before and after remeshing.
     void inherit(const ErrorTransport& other, const Eigen::VectorXd& x_old, const Eigen::VectorXd& x_new);
 
-    // Starts the path here, with the errors that are set in total and spatial.
+    // Starts the path here, with the errors that are set in total and temporal.
     void begin(const double* x, const double* v);
-    // One step of the run, of size h, to the state x with rates v. The cubic through both states with their
-    // rates solves the flow at its ends; Simpson's rule leaves its residual in the middle as the local error.
-    // (IDA's own estimates cannot replace it: after changes of step or order they are off by a factor of 3.)
-    void add_step(double h, const double* x, const double* v);
+    // The last step of the run, which began at time `from`: the residual of its path, a polynomial in time, is
+    // integrated by Gauss' rule. (The error estimate of the method cannot replace it: it is that of a method of lower
+    // order.)
+    void add_step(const Flow& flow, double from);
     // Brings the errors to the time of the last step.
     void advance();
 
@@ -45,9 +51,18 @@ private:
     const Forms& coarse_;
     ProfileSpace fine_space_;
     Forms fine_;
-    Eigen::SparseMatrix<double> prolongation_, matrix_;
-    SparseLu lu_;
-    Eigen::VectorXd state_, rate_, next_state_, next_rate_, middle_, slope_, residual_, defect_;
+    Eigen::SparseMatrix<double> prolongation_;
+    // On the fine mesh and on that of the run.
+    struct Level {
+        const Forms& forms;
+        std::vector<double> matrix;
+        BandLu lu;
+        Eigen::VectorXd state, rate, middle, slope, residual, rest, driven;
+        explicit Level(const Forms& f);
+        void add(double weight);
+        void advance(double time, Eigen::VectorXd& error);
+    };
+    Level on_fine_, on_coarse_;
     double elapsed_ = 0;
 };
 

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <type_traits>
 
 #include "axisym/splines/added_terms.hpp"
+#include "axisym/splines/band_lu.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
-#include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -113,11 +114,48 @@ template <int P>
     return by_added(bending_, kernel);
 }
 
+// Adds the matrix of an element, local[column][half of the rows].
+template <class Local>
+void Forms::scatter(int element, const Local& local, double* values) const {
+    constexpr int w = static_cast<int>(std::extent_v<Local>);
+    const int* slot = &slots_[static_cast<std::size_t>(element) * w * w];
+    alignas(32) double column[wide];
+#pragma GCC unroll 8
+    for (int b = 0; b < w; ++b) {
+        store(local[b][0], column);
+        store(local[b][1], column + lanes);
+        for (int a = 0; a < w; ++a) values[slot[b * w + a]] += images_ * column[a];
+    }
+}
+
 template <int P>
-[[gnu::flatten]] void Forms::jacobian_kernel(const Bending& bending, const Loads& loads, const double* x,
-                                             const double* v, double cj, double* values) const {
+[[gnu::flatten]] void Forms::mass_kernel(const double* x, double* values) const {
+    for (int e = 0; e < space_.elements(); ++e) {
+        const int* dofs = space_.dofs(e);
+        Pack local[P + 1][2];
+        for (auto& row : local) row[0] = row[1] = Pack(0.0);
+        for (int g = 0; g < space_.groups(); ++g) {
+            const auto& basis = space_.basis(e, g);
+            const Local<P> at(basis, dofs, x);
+            alignas(32) double drag[lanes];
+            store((2 * pi) * load(basis.weight) * at.r * graph_point(at.r, at.r1, at.r2).inverse_speed, drag);
+            for (int q = 0; q < lanes; ++q) {
+                const auto& s = basis.by_spline[q];
+#pragma GCC unroll 8
+                for (int half = 0; half * lanes <= P; ++half) {
+                    const Pack column = drag[q] * load(s[0] + half * lanes);
+#pragma GCC unroll 8
+                    for (int b = 0; b <= P; ++b) local[b][half] += s[0][b] * column;
+                }
+            }
+        }
+        scatter(e, local, values);
+    }
+}
+
+template <int P>
+[[gnu::flatten]] void Forms::jacobian_kernel(const double* x, const double* v, double cj, double* values) const {
     const auto kernel = [&]<Added added>() -> void {
-        const int w = P + 1;
         for (int e = 0; e < space_.elements(); ++e) {
             const int* dofs = space_.dofs(e);
             Pack local[P + 1][2];
@@ -126,7 +164,7 @@ template <int P>
                 const auto& basis = space_.basis(e, g);
                 const Local<P> at(basis, dofs, x);
                 ProfilePoint<Jet<Pack, 3, 2>> p;
-                const auto energy = energy_density<2, added>(bending, loads, at.r, at.r1, at.r2, p);
+                const auto energy = energy_density<2, added>(bending_, loads_, at.r, at.r1, at.r2, p);
                 const Pack weight = load(basis.weight), rate = gather<P>(basis, dofs, v);
                 // Drag 2 pi (r/g) v and its derivatives in r, r', v.
                 const Pack ig = p.inverse_speed.v, drag = (2 * pi) * weight * ig;
@@ -157,17 +195,10 @@ template <int P>
                     }
                 }
             }
-            const int* slot = &slots_[static_cast<std::size_t>(e) * w * w];
-            alignas(32) double column[wide];
-#pragma GCC unroll 8
-            for (int b = 0; b <= P; ++b) {
-                store(local[b][0], column);
-                store(local[b][1], column + lanes);
-                for (int a = 0; a <= P; ++a) values[slot[b * w + a]] += images_ * column[a];
-            }
+            scatter(e, local, values);
         }
     };
-    return by_added(bending, kernel);
+    return by_added(bending_, kernel);
 }
 
 bool Forms::residual(const double* x, const double* v, double* out) const {
@@ -177,14 +208,14 @@ bool Forms::residual(const double* x, const double* v, double* out) const {
            (bending_.terms.empty() || std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
 
-void Forms::jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
-                        double* values) const {
+void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
     std::fill_n(values, pattern_.nonZeros(), 0.0);
-    return for_degree(space_.degree(), [&](auto P) { return jacobian_kernel<P()>(bending, loads, x, v, cj, values); });
+    for_degree(space_.degree(), [&](auto P) { jacobian_kernel<P()>(x, v, cj, values); });
 }
 
-void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
-    jacobian_of(bending_, loads_, x, v, cj, values);
+void Forms::mass(const double* x, double* values) const {
+    std::fill_n(values, pattern_.nonZeros(), 0.0);
+    for_degree(space_.degree(), [&](auto P) { mass_kernel<P()>(x, values); });
 }
 
 double Forms::free_energy(const Eigen::VectorXd& x) const {
@@ -228,16 +259,15 @@ Eigen::SparseMatrix<double> Forms::hessian(const Eigen::VectorXd& x) const {
 }
 
 Eigen::SparseMatrix<double> Forms::mass(const Eigen::VectorXd& x) const {
-    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
     Eigen::SparseMatrix<double> out = pattern_;
-    jacobian_of(Bending{}, Loads{}, x.data(), rest.data(), 1, out.valuePtr());
+    mass(x.data(), out.valuePtr());
     return out;
 }
 
 Eigen::VectorXd Forms::rate(const Eigen::VectorXd& x) const {
-    SparseLu lu;
-    lu.factor(mass(x));
-    return lu.solve(-gradient(x));
+    BandLu lu(pattern_);
+    lu.factor(mass(x).valuePtr());
+    return lu.solved(-gradient(x));
 }
 
 template <int P>

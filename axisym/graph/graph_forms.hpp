@@ -13,8 +13,8 @@
 
 namespace tubule::axisym {
 
-// Diagnostics of a state, integrated or extremised over the whole period. Many fields: a list of measurements that share no
-// rule.
+// Diagnostics of a state, integrated or extremised over the whole period. Many fields: a list of measurements that
+// share no rule.
 struct Observation {
     double energy = 0, free_energy = 0;
     std::vector<double> energy_term;  // of each term, see term_names()
@@ -47,7 +47,9 @@ public:
     // M(x) v + grad F(x), which vanishes for the rate v of the gradient flow. Arrays of space().size() numbers.
     // False, with `out` unusable, if at a quadrature point the radius is not positive or the energy is not defined.
     bool residual(const double* x, const double* v, double* out) const;
-    // Its derivative in x + cj that in v, into the values of a matrix with pattern().
+    // Its derivative in v, the mass, into the values of a matrix with pattern().
+    void mass(const double* x, double* values) const;
+    // Its derivative in x + cj that in v, likewise.
     void jacobian(const double* x, const double* v, double cj, double* values) const;
     // Compressed columns shared by hessian, mass and jacobian.
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
@@ -71,15 +73,16 @@ private:
     template <int P>
     bool residual_kernel(const double* x, const double* v, double* out) const;
     template <int P>
-    void jacobian_kernel(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
-                         double* values) const;
+    void jacobian_kernel(const double* x, const double* v, double cj, double* values) const;
+    template <int P>
+    void mass_kernel(const double* x, double* values) const;
+    template <class Local>
+    void scatter(int element, const Local& local, double* values) const;
     FormulaDomain::Margin domain(const double* x) const;
     template <int P>
     Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
     template <int P>
     double axial_force_kernel(const double* x) const;
-    void jacobian_of(const Bending& bending, const Loads& loads, const double* x, const double* v, double cj,
-                     double* values) const;
 
     const ProfileSpace& space_;
     Bending bending_;

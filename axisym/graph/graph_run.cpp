@@ -1,7 +1,5 @@
 #include "axisym/graph/graph_run.hpp"
 
-#include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -16,10 +14,14 @@ constexpr int most_attempts = 6;
 class GraphRuns : public EstimatedRuns {
 public:
     GraphRuns(const Case& c, RunObserver& watch, const RunClock& clock, const Record* restart)
-        : case_(c), watch_(watch), clock_(clock), restart_(restart), settings_(first_graph_settings(c)) {}
+        : case_(c),
+          watch_(watch),
+          clock_(clock),
+          restart_(restart),
+          settings_(first_graph_settings(c, c.discretisation.time_order == 5)) {}
 
     RunSummary& next() override {
-        settings_.may_give_up = count_ < most_attempts;
+        settings_.may_give_up = --left_ > 0;
         run_.emplace(case_, watch_, clock_, settings_);
         if (restart_)
             run_->resume(*std::exchange(restart_, nullptr));
@@ -32,12 +34,9 @@ public:
     }
 
     bool refine(const tubule::RunSummary& last) override {
-        if (!run_->gave_up) return false;
+        if (!run_->gave_up) return try_backward_differences(last);
         const double allowed = case_.accuracy.energy * last.reference_energy / stated_over_computed;
-        const double of_space = std::abs(run_->latest_error().spatial);
-        const bool space_is_stuck = of_space > 0.5 * of_space_;
-        settings_ = tightened(settings_, run_->latest_error(), allowed, count_++, space_is_stuck);
-        of_space_ = of_space;
+        settings_ = tightened(settings_, run_->latest_error(), allowed, count_++);
         return true;
     }
 
@@ -49,13 +48,22 @@ public:
     const RunSummary& summary() const { return run_->summary; }
 
 private:
+    // Where H is zero an energy of powers of H alone has no stiffness. What appears there within a step, the linearised
+    // flow of a Rosenbrock method does not see; Newton's method does.
+    bool try_backward_differences(const tubule::RunSummary& last) {
+        const bool lost = last.stop.reason == Stop::resolution_lost || last.stop.reason == Stop::solver_failed;
+        if (!settings_.one_step || !lost) return false;
+        settings_ = first_graph_settings(case_, false);
+        left_ = most_attempts, ++count_;
+        return true;
+    }
+
     const Case& case_;
     RunObserver& watch_;
     const RunClock& clock_;
     const Record* restart_;  // until the run goes on from it
     GraphSettings settings_;
-    int count_ = 1;
-    double of_space_ = std::numeric_limits<double>::infinity();  // error of the attempt before the last
+    int count_ = 1, left_ = most_attempts;
     std::optional<GraphAttempt> run_;  // the last one
 };
 

@@ -14,14 +14,12 @@ struct GraphSettings {
     double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
     bool free_time = true, free_mesh = true;
     bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
+    bool one_step = true;     // Rosenbrock's method, else backward differences
 };
 
-GraphSettings first_graph_settings(const Case& c);
+GraphSettings first_graph_settings(const Case& c, bool one_step);
 
-// After attempt number `attempt`, whose error (absolute) was beyond what is allowed. `space_is_stuck`: the attempt before
-// had the same error of space. What remains of Newton's iteration counts as such, and only a smaller tolerance of time
-// makes it smaller.
-GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt,
-                        bool space_is_stuck);
+// After attempt number `attempt`, whose error (absolute) was beyond what is allowed.
+GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt);
 
 }  // namespace tubule::axisym

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 
+#include "axisym/splines/band_lu.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -54,15 +55,15 @@ std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x
     std::vector<double> largest, defect;
     forms.observe(x.data(), rest.data(), &largest);
     Eigen::SparseMatrix<double> matrix = forms.pattern();
-    SparseLu lu;
+    BandLu lu(matrix);
     for (double dt = span; dt > 5e-7 * span; dt /= 10) {
         forms.jacobian(x.data(), rest.data(), 1 / dt, matrix.valuePtr());
         try {
-            lu.factor(matrix);
+            lu.factor(matrix.valuePtr());
         } catch (const SolveError&) {
             continue;  // a step this long goes nowhere; shorter ones may
         }
-        const Eigen::VectorXd ahead = x - lu.solve(force);
+        const Eigen::VectorXd ahead = x - lu.solved(force);
         const Observation o = forms.observe(ahead.data(), rest.data(), &defect);
         if (!(o.r_min > 0 && o.symbol > 0)) continue;  // not where the flow goes
         for (std::size_t e = 0; e < defect.size(); ++e) largest[e] = std::max(largest[e], defect[e]);

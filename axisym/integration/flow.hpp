@@ -1,9 +1,9 @@
-// A profile's motion F(t, x, x_t) = 0 in time: the one place that sees IDA (its variant IDAS, which also integrates the
-// dissipation).
+// A profile's motion F(t, x, x_t) = 0 in time: what every method of integration is given and gives.
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -25,7 +25,12 @@ struct TimeControl {
 
 struct FlowCounters {
     long steps = 0, residuals = 0, jacobians = 0, newton_iterations = 0, error_failures = 0, newton_failures = 0;
-    FlowCounters& operator+=(const FlowCounters& other);
+    FlowCounters& operator+=(const FlowCounters& o) {
+        steps += o.steps, residuals += o.residuals, jacobians += o.jacobians;
+        newton_iterations += o.newton_iterations, error_failures += o.error_failures;
+        newton_failures += o.newton_failures;
+        return *this;
+    }
 };
 
 // Guards are functions of the state, positive while all is well; a step that takes one of them through zero ends there.
@@ -38,6 +43,8 @@ struct FlowSystem {
     // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
     std::function<void(double t, const double* x, const double* v, double cj, double* values)> jacobian;
     const Eigen::SparseMatrix<double>* pattern = nullptr;
+    // dF/dv at x, likewise, of a system that is linear in v and does not depend on the time; RosenbrockFlow needs it.
+    std::function<void(const double* x, double* values)> mass;
     bool banded = false;           // the unknowns stand in an order that is good for elimination
     Eigen::VectorXd scale;         // of each unknown; empty: 1
     Eigen::VectorXd differential;  // 0 for unknowns without a rate, whose local errors do not count; empty: 1
@@ -47,36 +54,36 @@ struct FlowSystem {
     std::size_t n_guards = 0;  // how many these are
 };
 
+// Gauss points and weights of a step: what is integrated along its path is so there.
+inline constexpr std::array path_points{0.1127016653792583, 0.5, 0.8872983346207417};
+inline constexpr std::array path_weights{5.0 / 18, 8.0 / 18, 5.0 / 18};
+
+// A system on its way. Which method takes the steps is the choice of who makes it.
 class Flow {
 public:
-    // From x0 with rates v0, which solve the system.
-    Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-         const TimeControl& control);
-    ~Flow();
+    Flow() = default;
     Flow(Flow&&) = delete;
+    virtual ~Flow() = default;
 
     enum class Outcome { step, end, guard, failed };
     // One step, not beyond t_end. After `failed` the state is that of the last good step.
-    Outcome advance(double t_end);
+    virtual Outcome advance(double t_end) = 0;
 
-    double time() const;
-    const double* x() const;
-    const double* v() const;  // the rates that solve the flow's equations, not the slope of the dense output
-    // State at a time within the last step (dense output of the order of the step).
-    void interpolate(double t, double* x, double* v) const;
-    // Second derivative of the coefficients in time at the end of the last step; 0 if that was of order 1.
-    Eigen::VectorXd acceleration() const;
-    double dissipated(double t) const;  // INT dissipation dt from t0 to a time within the last step
-    double work(double t) const;        // INT work dt likewise
-    double step_size() const;           // of the last step
-    int order() const;
-    int tripped() const;          // index of the guard that ended the step
-    std::string failure() const;  // what IDA said
-    FlowCounters counters() const;
-
-private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    virtual double time() const = 0;
+    virtual const double* x() const = 0;
+    virtual const double* v()
+        const = 0;  // the rates that solve the flow's equations, not the slope of the dense output
+    // The path through the last step, a polynomial in time, and its slope.
+    virtual void interpolate(double t, double* x, double* v) const = 0;
+    // State and rates at a time within the last step, as exact as at its end.
+    virtual void look_back(double t, double* x, double* v) = 0;
+    virtual double dissipated(double t) const = 0;  // INT dissipation dt from t0 to a time within the last step
+    virtual double work(double t) const = 0;        // INT work dt likewise
+    virtual double step_size() const = 0;           // of the last step
+    virtual int order() const = 0;
+    virtual int tripped() const = 0;          // index of the guard that ended the step
+    virtual std::string failure() const = 0;  // why
+    virtual FlowCounters counters() const = 0;
 };
 
 }  // namespace tubule::axisym

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "axisym/splines/band_lu.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/solve/memory.hpp"
 #include "common/solve/pause.hpp"
-#include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -205,9 +205,9 @@ Eigen::VectorXd ProfileSpace::solve_mass(const Eigen::VectorXd& load) const {
             }
     Eigen::SparseMatrix<double> mass(size_, size_);
     mass.setFromTriplets(entries.begin(), entries.end());
-    SparseLu lu;
-    lu.factor(mass);
-    return lu.solve(load);
+    BandLu lu(mass);
+    lu.factor(mass.valuePtr());
+    return lu.solved(load);
 }
 
 Eigen::VectorXd ProfileSpace::prolong(const ProfileSpace& other, const Eigen::VectorXd& c) const {

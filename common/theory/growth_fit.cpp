@@ -65,7 +65,8 @@ std::vector<Point> usable(const std::vector<double>& times, const std::vector<do
     const int n = static_cast<int>(points.size());
     if (n < fewest)
         throw std::invalid_argument(
-            fmt::format("a growth rate needs amplitudes at {} or more times, not {}", fewest, n));
+            fmt::format("a growth rate needs amplitudes at {} or more times, not {}; each time in time.output adds one",
+                        fewest, n));
     if (n <= most_points) return points;
     std::vector<Point> some;
     for (int i = 0; i < most_points; ++i) some.push_back(points[static_cast<long>(i) * (n - 1) / (most_points - 1)]);

@@ -89,7 +89,7 @@ class Schemas(ProgramTest):
         self.write("sphere.toml", SPHERE)
         self.assertEqual(self.answer("stability", "stability", "tube.toml", "--model", "all", "--modes", "2")["shape"], "tube")
         self.assertEqual(self.answer("stability", "stability", "sphere.toml")["shape"], "sphere")
-        self.tubule("run", "tube.toml", "--set", "time.end=0.1", "--set", "time.output=[]")
+        self.tubule("run", "tube.toml", "--set", "time.end=0.1", "--set", "time.output=[0.02,0.04,0.06]")
         self.assertEqual(self.answer("stability", "stability", "tube.hdf", "--numerical")["shape"], "profile")
         self.assertIn("rate", self.answer("stability", "stability", "tube.hdf", "--fit", "1"))
 

@@ -1,4 +1,4 @@
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/bdf_flow.hpp"
 
 #include <fmt/format.h>
 #include <idas/idas.h>
@@ -18,14 +18,8 @@
 
 namespace tubule::axisym {
 
-FlowCounters& FlowCounters::operator+=(const FlowCounters& o) {
-    steps += o.steps, residuals += o.residuals, jacobians += o.jacobians;
-    newton_iterations += o.newton_iterations, error_failures += o.error_failures, newton_failures += o.newton_failures;
-    return *this;
-}
-
 // Many fields: the objects of IDA, each to be freed.
-struct Flow::Impl {
+struct BdfFlow::Impl {
     FlowSystem system;
     SUNContext context = nullptr;
     N_Vector x = nullptr, v = nullptr, slope = nullptr, dissipated = nullptr, scratch = nullptr, weights = nullptr;
@@ -125,8 +119,8 @@ void require(int status, const char* what) {
 
 }  // namespace
 
-Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-           const TimeControl& control)
+BdfFlow::BdfFlow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+                 const TimeControl& control)
     : impl_(std::make_unique<Impl>(std::move(system))) {
     Impl& s = *impl_;
     static_assert(sizeof(sunindextype) == sizeof(std::int64_t) || sizeof(sunindextype) == sizeof(int));
@@ -177,9 +171,9 @@ Flow::Flow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& 
     require(IDAQuadInit(s.ida, dissipation<Impl>, s.dissipated), "the dissipation integral");
 }
 
-Flow::~Flow() = default;
+BdfFlow::~BdfFlow() = default;
 
-Flow::Outcome Flow::advance(double t_end) {
+Flow::Outcome BdfFlow::advance(double t_end) {
     Impl& s = *impl_;
     require(IDASetStopTime(s.ida, t_end), "the end time");
     N_VScale(1, s.v, s.scratch);
@@ -198,17 +192,17 @@ Flow::Outcome Flow::advance(double t_end) {
     return status < 0 ? Outcome::failed : Outcome::step;
 }
 
-double Flow::time() const {
+double BdfFlow::time() const {
     return impl_->time;
 }
-const double* Flow::x() const {
+const double* BdfFlow::x() const {
     return data(impl_->x);
 }
-const double* Flow::v() const {
+const double* BdfFlow::v() const {
     return data(impl_->v);
 }
 
-void Flow::interpolate(double t, double* x, double* v) const {
+void BdfFlow::interpolate(double t, double* x, double* v) const {
     const auto n = N_VGetLength(impl_->x);
     for (int k = 0; k < 2; ++k) {
         require(IDAGetDky(impl_->ida, t, k, impl_->scratch), "dense output");
@@ -216,42 +210,36 @@ void Flow::interpolate(double t, double* x, double* v) const {
     }
 }
 
-Eigen::VectorXd Flow::acceleration() const {
-    if (order() < 2) return Eigen::VectorXd::Zero(N_VGetLength(impl_->x));
-    require(IDAGetDky(impl_->ida, impl_->time, 2, impl_->scratch), "the acceleration");
-    return Eigen::Map<const Eigen::VectorXd>(data(impl_->scratch), N_VGetLength(impl_->x));
-}
-
-double Flow::dissipated(double t) const {
+double BdfFlow::dissipated(double t) const {
     require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
     return data(impl_->dissipated)[0];
 }
 
-double Flow::work(double t) const {
+double BdfFlow::work(double t) const {
     require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
     return data(impl_->dissipated)[1];
 }
 
-double Flow::step_size() const {
+double BdfFlow::step_size() const {
     double h = 0;
     IDAGetLastStep(impl_->ida, &h);
     return h;
 }
 
-int Flow::order() const {
+int BdfFlow::order() const {
     int k = 0;
     IDAGetLastOrder(impl_->ida, &k);
     return k;
 }
 
-int Flow::tripped() const {
+int BdfFlow::tripped() const {
     return impl_->guard;
 }
-std::string Flow::failure() const {
+std::string BdfFlow::failure() const {
     return impl_->message;
 }
 
-FlowCounters Flow::counters() const {
+FlowCounters BdfFlow::counters() const {
     FlowCounters c;
     IDAGetNumSteps(impl_->ida, &c.steps);
     IDAGetNumResEvals(impl_->ida, &c.residuals);

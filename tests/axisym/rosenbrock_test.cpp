@@ -1,0 +1,145 @@
+// The method of integration of graphs on an equation with a known solution, and its linear solver.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_start.hpp"
+#include "axisym/integration/rosenbrock_flow.hpp"
+#include "axisym/splines/band_lu.hpp"
+#include "common/solve/sparse.hpp"
+#include "tests/axisym/runs.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+// (1 + y^2) (v - 0.2/y^3) = 0 from y = 1: y = (1 + 0.8 t)^(1/4). Dissipation 1/y, so that INT is (y^3 - 1)/(3 0.2).
+struct Growth {
+    Eigen::SparseMatrix<double> pattern{1, 1};
+    double least = 1e9;  // y is to stay below
+    Growth() { pattern.insert(0, 0) = 1, pattern.makeCompressed(); }
+    static double exact(double t) { return std::pow(1 + 0.8 * t, 0.25); }
+    static double rate(double y) { return 0.2 / (y * y * y); }
+    FlowSystem system() const {
+        FlowSystem s;
+        s.residual = [](double, const double* y, const double* v, double* out) {
+            out[0] = (1 + y[0] * y[0]) * (v[0] - rate(y[0]));
+            return y[0] > 0;
+        };
+        s.jacobian = [](double, const double* y, const double* v, double cj, double* out) {
+            const double m = 1 + y[0] * y[0];
+            out[0] = 2 * y[0] * (v[0] - rate(y[0])) + m * 0.6 / std::pow(y[0], 4) + cj * m;
+        };
+        s.pattern = &pattern;
+        s.mass = [](const double* y, double* out) { out[0] = 1 + y[0] * y[0]; };
+        s.dissipation = [](double, const double* y, const double*) { return 1 / y[0]; };
+        s.guards = [this](double, const double* y, const double*) { return Guards{least - y[0]}; };
+        s.n_guards = 1;
+        return s;
+    }
+    RosenbrockFlow flow(double tolerance, double first_step = 0) const {
+        TimeControl control;
+        control.relative = tolerance, control.absolute = 1e-3 * tolerance, control.first_step = first_step;
+        const Eigen::VectorXd y = Eigen::VectorXd::Ones(1);
+        return {system(), y, 0.2 * y, 0, control};
+    }
+};
+
+TEST(Rosenbrock, isOfOrderFive) {
+    const Growth growth;
+    double last = 0;
+    for (const double h : {0.2, 0.1, 0.05}) {
+        auto flow = growth.flow(1, h);  // a tolerance that refuses no step
+        flow.advance(h);
+        const double error = std::abs(flow.x()[0] - Growth::exact(h));
+        if (last > 0) {
+            EXPECT_NEAR(std::log2(last / error), 6, 0.3) << h;  // of one step
+        }
+        last = error;
+    }
+}
+
+TEST(Rosenbrock, errorsFollowTheTolerance) {
+    const Growth growth;
+    for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+        auto flow = growth.flow(tolerance);
+        while (flow.advance(5) == Flow::Outcome::step) {
+            const double back = flow.time() - 0.4 * flow.step_size();
+            double y = 0, v = 0;
+            flow.look_back(back, &y, &v);
+            EXPECT_NEAR(y, Growth::exact(back), tolerance);
+            EXPECT_NEAR(v, Growth::rate(y), 1e-14);
+            EXPECT_NEAR(flow.v()[0], Growth::rate(flow.x()[0]), 1e-14);
+        }
+        EXPECT_EQ(flow.time(), 5);
+        EXPECT_NEAR(flow.x()[0], Growth::exact(5), tolerance);
+        EXPECT_NEAR(flow.dissipated(5), (std::pow(Growth::exact(5), 3) - 1) / 0.6, 20 * tolerance);
+    }
+}
+
+TEST(Rosenbrock, endsWhereAGuardTrips) {
+    Growth growth;
+    growth.least = 1.2;
+    auto flow = growth.flow(1e-9);
+    Flow::Outcome outcome = Flow::Outcome::step;
+    while (outcome == Flow::Outcome::step) outcome = flow.advance(5);
+    EXPECT_EQ(outcome, Flow::Outcome::guard);
+    EXPECT_EQ(flow.tripped(), 0);
+    EXPECT_NEAR(flow.time(), (std::pow(1.2, 4) - 1) / 0.8, 1e-7);
+}
+
+TEST(Rosenbrock, refusesToleranceBelowRounding) {
+    const Growth growth;
+    auto flow = growth.flow(1e-17);
+    EXPECT_EQ(flow.advance(1), Flow::Outcome::failed);
+    EXPECT_NE(flow.failure().find("too much accuracy"), std::string::npos) << flow.failure();
+}
+
+// Without k20 and with a zero of H the flow is degenerate, and its linearisation does not see what stiffness appears
+// within a step: backward differences take over. Against a run with nothing else.
+TEST(Rosenbrock, leavesDegenerateFlowsToBackwardDifferences) {
+    Bending material = bending(0, 0);
+    material.k[1] = 0.00246;
+    Case c = tube_case(material, 0.69, 1.93, {{.amplitude = 0.026, .n = 2, .m = 0, .phase = 0}}, 0.05);
+    c.accuracy.energy = 1e-4;
+    const Outcome mixed = run_case(c);
+    c.discretisation.time_order = 4;
+    c.accuracy.energy = 1e-5;
+    const Outcome other = run_case(c);
+    ASSERT_EQ(mixed.summary.stop.reason, Stop::finished) << mixed.summary.stop.message;
+    ASSERT_EQ(other.summary.stop.reason, Stop::finished) << other.summary.stop.message;
+    EXPECT_GT(mixed.summary.attempts, 1);
+    EXPECT_LE(mixed.summary.estimated_error, 1e-4);
+    EXPECT_NEAR(mixed.summary.energy, other.summary.energy, 1e-4 * mixed.summary.reference_energy);
+}
+
+// With planes of symmetry and without, against Eigen's dense solver.
+TEST(BandLu, solves) {
+    std::mt19937 engine(5);
+    std::normal_distribution<double> normal;
+    for (const bool mirror : {true, false})
+        for (const int elements : {2, 3, 9, 40}) {
+            const Cell cell{0, 1, mirror, 1};
+            const ProfileSpace space(cell, uniform_breaks(cell, elements), 5, 4);
+            Eigen::SparseMatrix<double> A = Forms(space, bending(1, 0)).pattern();
+            for (int k = 0; k < A.nonZeros(); ++k) A.valuePtr()[k] = normal(engine);
+            const Eigen::VectorXd b = Eigen::VectorXd::Random(A.cols());
+            BandLu lu(A);
+            lu.factor(A.valuePtr());
+            const Eigen::VectorXd x = Eigen::MatrixXd(A).fullPivLu().solve(b);
+            EXPECT_LE((lu.solved(b) - x).norm(), 1e-9 * x.norm()) << mirror << " " << elements;
+        }
+}
+
+TEST(BandLu, refusesSingularMatrices) {
+    Eigen::SparseMatrix<double> A(2, 2);
+    A.insert(0, 0) = 1, A.insert(0, 1) = 2, A.insert(1, 0) = 2, A.insert(1, 1) = 4;
+    A.makeCompressed();
+    BandLu lu(A);
+    EXPECT_THROW(lu.factor(A.valuePtr()), SolveError);
+}
+
+}  // namespace
+}  // namespace tubule::axisym
