@@ -71,8 +71,7 @@ public:
 
     virtual double time() const = 0;
     virtual const double* x() const = 0;
-    virtual const double* v()
-        const = 0;  // the rates that solve the flow's equations, not the slope of the dense output
+    virtual const double* v() const = 0;  // rates that solve the equations, not the slope of the path
     // The path through the last step, a polynomial in time, and its slope.
     virtual void interpolate(double t, double* x, double* v) const = 0;
     // State and rates at a time within the last step, as exact as at its end.
