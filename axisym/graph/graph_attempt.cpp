@@ -346,7 +346,7 @@ void GraphAttempt::write_outputs(double from, double error, const Observation& o
 
 // Long steps have rows on their way, where guards have looked at the path. Its order is below that of the steps: the
 // balance of energy shows what its energy is off by, which counts as an error of the run. Where that is too much, a
-// shorter step gets there.
+// shorter step gets to the middle.
 void GraphAttempt::write_path(double from, double until, double error) {
     const double asked = case_.accuracy.energy * summary.reference_energy;
     const double allowed = path_error * std::min(3 * settings_.time_tolerance * summary.reference_energy, asked);
@@ -356,6 +356,7 @@ void GraphAttempt::write_path(double from, double until, double error) {
         const double lost = std::abs(o.free_energy + dissipated(t) - good_.balance);
         const double both = error + lost / stated_over_computed;
         if (lost > allowed || stated_over_computed * both > asked) {
+            if (&seen_[path_points.size() / 2].first != &t) continue;
             flow_->look_back(t, x.data(), v.data());
             write_row(t, error, stage_->look(x.data(), v.data(), nullptr), x.data());
         } else {
