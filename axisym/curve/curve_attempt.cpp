@@ -9,6 +9,7 @@
 #include "axisym/integration/bdf_flow.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
+#include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -54,14 +55,16 @@ const Snapshot& CurveAttempt::observe(double t, const double* y, const double* r
 }
 
 void CurveAttempt::begin() {
-    const CurveBegin at = begin_state(setup_);
-    make_flow(at.y, at.rate, at.time, at.first_step);
-    Snapshot s = measure(*setup_.motion, 0, at.shown.data(), at.rate.data());
-    if (!setup_.start.meridian.seams.empty()) {
-        const CurveObservation exact = observe_start(setup_);
-        s.free_energy += exact.energy - s.o.energy;
-        s.o.energy = exact.energy, s.o.energy_term = exact.energy_term;
+    CurveBegin at;
+    try {
+        at = begin_state(setup_);
+    } catch (const SolveError& error) {
+        at = given_state(setup_);
+        stop_ = StopReport{Stop::solver_failed, 0, error.what(),
+                           "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
     }
+    make_flow(at.y, at.rate, at.time, at.first_step);
+    const Snapshot s = setup_.initial_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
     past_.total_start = s.total();
     past_.least = past_.total_start;
     out_.note(doubt_before(setup_.c, s.free_energy, summary.reference_energy));
@@ -71,6 +74,8 @@ void CurveAttempt::begin() {
     add_to_trace(at.time);
     write_row(0, s, at.shown.data());
     write_frame(0, s, at.shown.data(), at.rate.data());
+    if (!stop_) stop_ = find_event(s, 0);
+    if (stop_) now_ = s;
     // The steps that lead from the curve to the first unknowns dissipate the difference.
     past_.dissipated = past_.total_start - now_.total();
 }
@@ -217,12 +222,14 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
 }
 
 // No law of motion lets the total energy, less the work of loads that change, rise: what it rises by is an error. Where
-// that is large, the run goes back to the last good step.
+// that is larger than the errors asked for and known, or the shape is none of a membrane, the run goes back to the last
+// good step.
 std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
     const bool asked = out_.reported() && !settings_given(setup_.c);
     const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
-                 allowed = (asked ? setup_.c.accuracy.energy : hopeless_rise) * summary.reference_energy;
-    if (!(rise <= allowed)) {
+                 allowed = asked ? std::max(setup_.c.accuracy.energy * summary.reference_energy, error)
+                                 : hopeless_rise * summary.reference_energy;
+    if (!is_admissible(s) || !(rise <= allowed)) {
         restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time);
         return StopReport{
             Stop::resolution_lost, past_.time,
@@ -246,17 +253,20 @@ void CurveAttempt::keep_good() {
 std::optional<StopReport> CurveAttempt::check_start() {
     const double t = flow_->time();
     if (outputs_.done()) return StopReport{Stop::finished, t, "reached time.end", ""};
+    auto event = find_event(now_, t);
+    if (event) write_row(t, now_, flow_->x());
+    return event;
+}
+
+std::optional<StopReport> CurveAttempt::find_event(const Snapshot& s, double t) const {
     for (const CurveGuard& guard : curve_guards())
-        if (!(guard.value(now_, setup_.c.accuracy.r_min) > 0)) {
-            write_row(t, now_, flow_->x());
-            return guard.report(now_, t);
-        }
+        if (!(guard.value(s, setup_.c.accuracy.r_min) > 0)) return guard.report(s, t);
     return std::nullopt;
 }
 
 void CurveAttempt::go() {
     look_at_mesh();
-    std::optional<StopReport> stop = check_start();
+    std::optional<StopReport> stop = stop_ ? stop_ : check_start();
     try {
         while (!stop) stop = step();
     } catch (const Paused& pause) {

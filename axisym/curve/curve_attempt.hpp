@@ -49,6 +49,7 @@ private:
     void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
     void restart_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time);
     std::optional<StopReport> check_start();
+    std::optional<StopReport> find_event(const Snapshot& s, double t) const;
     std::optional<StopReport> step();
     std::optional<StopReport> find_rise(const Snapshot& s);
     std::optional<StopReport> check(double t);
@@ -80,6 +81,7 @@ private:
     CurveStall stall_;
     Past past_;
     double error_now_ = 0;
+    std::optional<StopReport> stop_;  // at the start
 };
 
 }  // namespace tubule::axisym

@@ -643,6 +643,8 @@ struct Equilibrated {
 
 CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
     constexpr int most_iterations = 25;
+    constexpr double most_growth = 10;  // of a correction, before smaller ones follow
+    constexpr double rounding = 1e-9;   // of the curve: corrections below it need not become smaller
     Start s{y0, Eigen::VectorXd::Zero(at_.size)};
     Eigen::VectorXd before = y0, F(at_.size);
     Eigen::SparseMatrix<double> J = pattern_;
@@ -661,8 +663,9 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
             s.y -= change;
             s.rate = (s.y - before) / h;
             const double size = change.head(space().size()).norm();
-            if (size >= 0.5 * last || size == 0) break;  // as good as rounding allows
-            if (iteration == most_iterations) throw SolveError("no consistent start of the motion was found");
+            if (size == 0 || (size >= 0.5 * last && size <= rounding * s.y.head(space().size()).norm())) break;
+            if (!(size < most_growth * last) || iteration == most_iterations)
+                throw SolveError("Newton's method for the initial velocities does not converge");
             last = size;
         }
     }

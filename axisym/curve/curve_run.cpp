@@ -20,7 +20,8 @@ bool failed(const StopReport& stop) {
 // Whether the energies of two runs of a pair can be compared.
 bool comparable(const StopReport& coarse, const StopReport& fine, double end) {
     if (can_go_on(fine.reason)) return true;
-    return coarse.reason == fine.reason && (!failed(fine) || std::min(coarse.time, fine.time) > too_early * end);
+    if (coarse.time == 0 && fine.time == 0 && !failed(fine)) return true;  // the initial shape, whose energy is exact
+    return coarse.reason == fine.reason && std::min(coarse.time, fine.time) > too_early * end;
 }
 
 // Whether a flow may have been ill-posed without being seen to be: the two runs of a pair are at least half as far
@@ -37,7 +38,7 @@ public:
           clock_(clock),
           restart_(restart),
           start_(beginning_of(c)),
-          settings_(first_settings(c, start_.images())) {
+          settings_(settings_for(c, start_, first_settings(c, start_.images()))) {
         if (!restart) return;
         begun_ = curve_restart(*restart).settings;
         if (!begun_->is_coarser) settings_ = *begun_;

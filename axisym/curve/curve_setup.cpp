@@ -22,6 +22,7 @@ namespace {
 // The run's own are not smaller than `least_seam`, or rounding there keeps the integrator from starting; its first step
 // smooths the seam over far more than that.
 constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 3e-4;
+constexpr double most_risen = 0.1;     // of E_ref: the energy of a first step that cannot be believed
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
@@ -36,17 +37,6 @@ double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
     const CurveObservation o = squares(0);
     const double sum = (o.energy + o.area - squares(1).energy) / 2;
     return 1 - sum * sum / (o.area * o.energy);
-}
-
-// E_ref, theory.md (11.1).
-struct StartEnergy {
-    double energy, magnitude;  // F, and E_ref by the size of its terms
-};
-StartEnergy start_energy(const CurveForms& forms, const MotionLaw& law, const Eigen::VectorXd& x) {
-    const CurveObservation o = forms.observe(x);
-    const double length = forms.space().length(x.data());
-    const double energy = o.energy + loads_at(law, 0).energy(o.area, o.volume, length);
-    return {energy, std::max(std::abs(energy), forms.reference_energy(x) + load_scale(law, o.area, o.volume, length))};
 }
 
 // Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
@@ -109,7 +99,17 @@ Beginning beginning_of(const Case& c) {
     }
     const auto [area, volume] = area_and_volume(whole);
     const auto* file = std::get_if<ProfileFile>(&c.shape);
-    return {std::move(whole), area, volume, std::move(velocity), file ? start_profile(c, *file).note() : ""};
+    ShapeEnergy energy = bending_energy(whole, c.energy);
+    return {std::move(whole),
+            area,
+            volume,
+            std::move(energy),
+            std::move(velocity),
+            file ? start_profile(c, *file).note() : ""};
+}
+
+double Beginning::free_energy(const MotionLaw& law) const {
+    return bending.energy + loads_at(law, 0).energy(area, volume, meridian.length);
 }
 
 int Beginning::images() const {
@@ -127,9 +127,10 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
     law.swirls = law.swirls || (start.velocity && start.velocity->swirls);
-    const StartEnergy energy = start_energy(forms, law, x);
-    magnitude = energy.magnitude;
-    reference_energy = tubule::reference_energy(c, energy.energy, magnitude);
+    const double energy = start.free_energy(law);
+    magnitude = std::max(std::abs(energy), std::max(std::abs(start.bending.energy), start.bending.magnitude) +
+                                               load_scale(law, start.area, start.volume, start.meridian.length));
+    reference_energy = tubule::reference_energy(c, energy, magnitude);
     const double variation = variation_of_H(*space, x);
     law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
     // Where area and volume are the same condition, one multiplier has no value.
@@ -138,6 +139,13 @@ CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSetting
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
     if (c.energy.H0_varies()) motion->fix_H0(x);
+}
+
+Snapshot CurveSetup::initial_shape(Snapshot s) const {
+    s.o.energy = start.bending.energy, s.o.energy_term = start.bending.energy_term;
+    s.o.area = start.area, s.o.volume = start.volume;
+    s.free_energy = start.free_energy(motion->law());
+    return s;
 }
 
 FlowSystem CurveSetup::system() const {
@@ -175,13 +183,29 @@ TimeControl CurveSetup::control(double first_step) const {
     return control;
 }
 
-CurveObservation observe_start(const CurveSetup& setup) {
-    const ArcLength arc(setup.start.meridian);
-    const auto space = space_of(setup.c, setup.start.meridian, first_breaks(arc, setup.settings, setup.c, 0));
-    const Eigen::VectorXd x = fit(*space, arc);
-    CurveForms forms(*space, setup.c.energy);
-    fix_H0(setup.c, forms, x);
-    return forms.observe(x);
+CurveBegin given_state(const CurveSetup& setup) {
+    const MotionLayout& at = setup.motion->layout();
+    CurveBegin out;
+    out.y = Eigen::VectorXd::Zero(at.size), out.rate = out.y;
+    out.y.head(setup.space->size()) = fit(*setup.space, ArcLength(setup.start.meridian));
+    out.shown = out.y;
+    return out;
+}
+
+CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings s) {
+    constexpr double most_lost = 1e-3;  // of the energy, where less accuracy is asked for
+    if (settings_given(c) || !start.meridian.seams.empty()) return s;
+    const double allowed = std::min(c.accuracy.energy, most_lost) * start.bending.magnitude;
+    const ArcLength arc(start.meridian);
+    while (can_be_finer(s)) {
+        const auto space = space_of(c, start.meridian, first_breaks(arc, s, c, least_seam));
+        CurveForms forms(*space, c.energy);
+        const Eigen::VectorXd x = fit(*space, arc);
+        fix_H0(c, forms, x);
+        if (!(std::abs(forms.observe(x).energy - start.bending.energy) > allowed)) break;
+        s.elements = static_cast<int>(std::ceil(1.5 * s.elements));
+    }
+    return s;
 }
 
 namespace {
@@ -218,8 +242,14 @@ CurveBegin begin_state(const CurveSetup& setup) {
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
     double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
                         0.1 * OutputTimes(setup.c).next());
+    const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
+                        most_risen * setup.reference_energy;
     for (int tries = 0; !consistent; ++tries) try {
-            consistent = setup.motion->consistent(y, h);
+            const CurveMotion::Start found = setup.motion->consistent(y, h);
+            const Snapshot soon = measure(*setup.motion, found.time, found.y.data(), found.rate.data());
+            if (!is_admissible(soon) || !(soon.total() <= most))
+                throw SolveError("the first step leads to no admissible shape of lower energy");
+            consistent = found;
         } catch (const SolveError&) {
             if (tries == 4) throw;
             h *= 10;

@@ -8,6 +8,7 @@
 #include "axisym/curve/curve_series.hpp"
 #include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/curve_start.hpp"
+#include "axisym/curve/shape_integrals.hpp"
 #include "axisym/integration/flow.hpp"
 #include "common/case/case.hpp"
 
@@ -19,10 +20,12 @@ CurveLaw law_of(const Case& c);
 struct Beginning {
     Meridian meridian;
     double area = 0, volume = 0;
+    ShapeEnergy bending;
     std::optional<StartVelocity> velocity = {};
     std::string note = {};  // what there is to say of it
 
-    int images() const;  // of the meridian in the whole shape
+    double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
+    int images() const;                              // of the meridian in the whole shape
 };
 Beginning beginning_of(const Case& c);
 
@@ -41,20 +44,26 @@ struct CurveSetup {
 
     int elements() const { return space->splines().elements() * space->images(); }
     Eigen::VectorXd curve(const double* y) const { return Eigen::Map<const Eigen::VectorXd>(y, space->size()); }
+    // What was measured on the spline that is nearest to the initial shape, with the energy, area and volume of the
+    // shape.
+    Snapshot initial_shape(Snapshot measured) const;
     // Without the monitored quantities: dissipation and guards.
     FlowSystem system() const;
     TimeControl control(double first_step) const;
 };
-
-// Energy and size of the start, with elements at seams as small as the accuracy demands: smaller ones than the run has.
-CurveObservation observe_start(const CurveSetup& setup);
 
 // Unknowns and rates at the start: those to compute from, and those to show, with the exact curve.
 struct CurveBegin {
     Eigen::VectorXd y, rate, shown;
     double time = 0, first_step = 0;  // when the unknowns are those to compute from
 };
-// Throws SolveError where the equations have no solution.
+// Throws SolveError where the equations have no solution that the motion may reach.
 CurveBegin begin_state(const CurveSetup& setup);
+// The initial shape alone, with no velocity: what can be shown where begin_state() throws.
+CurveBegin given_state(const CurveSetup& setup);
+
+// These settings, with as many more elements as a spline needs that has the energy of the initial shape to the accuracy
+// asked for.
+CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings settings);
 
 }  // namespace tubule::axisym

@@ -1,6 +1,8 @@
 // Measurements of a curve at one time.
 #pragma once
 
+#include <cmath>
+
 #include "axisym/curve/curve_motion.hpp"
 #include "common/shapes/tube.hpp"
 
@@ -15,6 +17,11 @@ struct Snapshot {
 
     double total() const { return free_energy + balance.kinetic; }
 };
+
+// Whether the state is one of a membrane at all: what else is seen of it means something.
+inline bool is_admissible(const Snapshot& s) {
+    return std::isfinite(s.total()) && s.o.r_min > 0 && s.neck.radius > 0;
+}
 
 // Of the unknowns and their rates.
 Snapshot measure(const CurveMotion& motion, double t, const double* y, const double* rate);

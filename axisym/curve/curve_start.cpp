@@ -151,26 +151,6 @@ Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology top
     return spline_meridian(space, x);
 }
 
-std::array<double, 2> area_and_volume(const Meridian& m) {
-    constexpr int panels = 64;
-    const GaussRule rule = gauss_rule(16);
-    std::vector<double> edges{0};
-    edges.insert(edges.end(), m.seams.begin(), m.seams.end());
-    edges.push_back(1);
-    double area = 0, volume = 0;
-    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
-        const double h = (edges[k + 1] - edges[k]) / panels;
-        for (int i = 0; i < panels; ++i)
-            for (std::size_t q = 0; q < rule.nodes.size(); ++q) {
-                const auto [r, r1, z, z1] = m.at(edges[k] + h * (i + rule.nodes[q]));
-                area += h * rule.weights[q] * 2 * pi * r * std::hypot(r1, z1);
-                volume += h * rule.weights[q] * pi * r * r * z1;
-            }
-    }
-    const int images = m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1;
-    return {images * area, images * volume};
-}
-
 Meridian half(const Meridian& whole) {
     const bool cell = whole.topology == Topology::cell;
     if (!cell && whole.topology != Topology::tube) throw std::invalid_argument("the curve is already one half");

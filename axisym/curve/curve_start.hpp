@@ -25,8 +25,6 @@ Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x);
 // Through points (r, z) from end to end, by a quintic spline of the chord length. Closed cells begin and end with
 // r = 0, half ones end with z = 0; of a period both ends are given. Throws std::invalid_argument.
 Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology topology, double length = 0);
-// Area and enclosed volume of the whole surface, exact up to quadrature.
-std::array<double, 2> area_and_volume(const Meridian& meridian);
 // The first half of a mirror-symmetric meridian: from the pole to the equator, or half a period from its z = 0.
 // Throws std::invalid_argument if the halves differ by more than 1e-6 of the size.
 Meridian half(const Meridian& whole);

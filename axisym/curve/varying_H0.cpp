@@ -13,8 +13,8 @@ namespace {
 
 constexpr int lanes = ProfileSpace::lanes;
 
-// M(i, j): the integral over [0, x_i] of what interpolates weight_j times a value at the Gauss points x_j of an
-// element.
+}  // namespace
+
 Eigen::MatrixXd partial_sums(int points) {
     const GaussRule rule = gauss_rule(points);
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(points, points);
@@ -30,6 +30,8 @@ Eigen::MatrixXd partial_sums(int points) {
         }
     return out;
 }
+
+namespace {
 
 // Sums of a value at all points up to each of them; and, transposed, of what follows each.
 class RunningSums {

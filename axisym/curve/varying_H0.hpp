@@ -20,6 +20,9 @@ struct VaryingH0 {
     bool empty() const { return value.empty(); }
 };
 
+// M(i, j): the integral over [0, x_i] of what interpolates weight_j times a value at the Gauss points x_j of [0, 1].
+Eigen::MatrixXd partial_sums(int points);
+
 // H0 at the parameters, as the formula has it on the curve x. Throws std::invalid_argument where that is no number.
 VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::VectorXd& x);
 

@@ -11,6 +11,7 @@
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/curve/curve_samples.hpp"
+#include "axisym/curve/shape_integrals.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/equilibrium.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"

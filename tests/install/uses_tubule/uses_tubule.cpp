@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "axisym/curve/curve_start.hpp"
+#include "axisym/curve/shape_integrals.hpp"
 #include "common/case/read.hpp"
 #include "surface3d/run/run.hpp"
 

@@ -1,0 +1,23 @@
+// Integrals over a given shape, by quadrature on its meridian itself: no spline stands between.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "common/energy/bending.hpp"
+#include "common/shapes/meridian.hpp"
+
+namespace tubule::axisym {
+
+// Area and volume of the whole cell or period.
+std::array<double, 2> area_and_volume(const Meridian& meridian);
+
+struct ShapeEnergy {
+    double energy = 0, magnitude = 0;  // the bending energy; the size of its terms, theory.md (11.1)
+    std::vector<double> energy_term;   // of each term, see term_names()
+};
+// To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not
+// defined on the shape.
+ShapeEnergy bending_energy(const Meridian& meridian, const Bending& bending);
+
+}  // namespace tubule::axisym
