@@ -25,10 +25,12 @@ from pathlib import Path
 from sandbox import Finding, Sandbox
 
 # Each is a module with
-#     FAST             how many cases belong to the fast tests
+#     FAST             how many cases belong to the fast tests, or which
 #     one(rng, box)    makes and judges one case, all of it drawn from `rng`, in the Sandbox `box`: a word for the counts,
 #                      such as "refused" or "finished"; raises Finding
-FUZZERS = ("cases", "scenes", "surfaces", "results", "kills", "meshes", "starts", "commands", "coverage")
+FUZZERS = (
+    "cases", "scenes", "surfaces", "loads", "auto", "results", "kills", "resumes", "memory", "meshes", "starts", "commands", "pages", "arguments", "coverage",
+)  # fmt: skip
 
 
 class Campaign:
@@ -113,7 +115,7 @@ def parsed():
     parser.add_argument("--index", type=int, help="this case only")
     parser.add_argument("--keep", type=Path, default=Path("findings"), help="folder for what findings need (findings)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="cases at a time, with --minutes")
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     if unknown := set(arguments.fuzzers) - set(FUZZERS):
         parser.error(f"no such fuzzer: {', '.join(sorted(unknown))}")
     return arguments
@@ -126,7 +128,8 @@ def main():
         campaign.share(arguments.minutes, arguments.jobs)
     else:
         for name, module in campaign.modules.items():
-            wanted = range(module.FAST if arguments.count is None else arguments.count)
+            fast = range(module.FAST) if isinstance(module.FAST, int) else module.FAST
+            wanted = fast if arguments.count is None else range(arguments.count)
             for index in wanted if arguments.index is None else [arguments.index]:
                 campaign.run(name, index)
     sys.exit(campaign.summary())

@@ -55,8 +55,8 @@ class Sandbox:
         with open(self.folder / "commands", "a", encoding="utf-8", errors="surrogateescape") as file:
             file.write(line + "\n")
 
-    def start(self, *arguments, prepare=lambda: None, **options):
-        """The program in this folder, not waited for. `prepare` runs in the child, before the program."""
+    def start(self, *arguments, program=None, prepare=lambda: None, **options):
+        """The program, or another one, in this folder, not waited for. `prepare` runs in the child, before the program."""
 
         def begin():
             if not self.sanitized:
@@ -64,7 +64,7 @@ class Sandbox:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             prepare()
 
-        command = [str(self.program), *map(str, arguments)]
+        command = [str(program or self.program), *map(str, arguments)]
         self.note(shlex.join(command))
         options = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
         environment = os.environ | {"OMP_NUM_THREADS": "1"}

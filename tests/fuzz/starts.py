@@ -1,17 +1,21 @@
-"""Starts and energies that users write: profiles as CSV, radii and energies as formulas, noise; sound, spoilt and broken.
+"""Starts and energies that users write: profiles as CSV, radii, energies and spontaneous curvatures as formulas, noise; sound, spoilt
+and broken.
 
-The program runs each for a moment: no crash, no hang; a refusal names the file and the line, or the case; no number of a
-result is nan or inf. A sound profile is never refused."""
+The program runs each for a moment: no crash, no hang; a refusal names the file and the line, or the case, in whole characters; no
+number of a result is nan or inf. A sound profile is never refused, a formula that is not defined on the start always, for that reason."""
 
 import math
 import re
+import unicodedata
 
 from cases import LIMIT, broken_text, no_number_is_lost
 from sandbox import Finding
 
-FAST = 40
+FAST = range(10, 50)
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "sinh", "cosh", "tanh", "atan")
 OPERATORS = ("+", "+", "-", "*", "*", "/", "^")
+UNICODE = ("\u00b2", "\u03c0", "\u2212", "\u00d7", "\u0397", "\u221e", "\u200b", "\u0301", "\0", "\x7f", "\U0001f9ea", "\ufeff", "\u202e")
+OVERFLOWS = ("exp(exp(exp(H^2)))", "1e308*1e308*H", "cosh(1000*H)", "exp(1e3*K)", "H*1e300*exp(H^2*99)", "(1e200*H)^2")
 
 
 def number(rng):
@@ -48,6 +52,9 @@ def quoted(rng, words):
     """As a string of TOML, its characters broken now and then."""
     if rng.random() < 0.25:
         words = broken_text(rng, words).decode("utf-8", "replace")
+    if rng.random() < 0.1:
+        at = rng.randrange(len(words) + 1)
+        words = words[:at] + rng.choice(UNICODE) + words[at:]
     return '"' + "".join(c if c.isprintable() and c not in '"\\' else f"\\u{ord(c) % 0xD800:04x}" for c in words) + '"'
 
 
@@ -125,9 +132,18 @@ def noisy(rng, box, tier):
     return "noise", base + noise
 
 
-def terms(rng):
+def varied(rng, tier):
+    """A spontaneous curvature as a formula of places, which may be sharp, or not defined."""
+    variables = ("area", *(("r", "z") if tier == "axisym" else ("x", "y", "z")))
+    width = rng.choice((0.1, 0.1, 0.3, 1e-3, 1e-300))
+    mild_one = rng.choice((f"-1-tanh((area-0.6)/{width})", "-2+0.3*z^2", "cos(2*pi*area)", "area*(1-area)", "1e9*area", "1/area", "log(area)"))
+    return quoted(rng, mild_one if rng.random() < 0.6 else formula(rng, variables, rng.choice((1, 2, 4))))
+
+
+def terms(rng, tier):
     """The energy: the shorthands, and often further terms."""
-    energy = f"[energy]\nk20 = {rng.choice((1.0, 0.5, 0.0, -0.2))}\nH0 = {rng.choice((0.0, -1.0, -2.0, 1.0))}\n"
+    H0 = varied(rng, tier) if rng.random() < 0.3 else rng.choice((0.0, -1.0, -2.0, 1.0))
+    energy = f"[energy]\nk20 = {rng.choice((1.0, 0.5, 0.0, -0.2))}\nH0 = {H0}\n"
     for _ in range(rng.choice((0, 0, 1, 1, 2))):
         energy += f"[[energy.term]]\nmodulus = {rng.choice((0.1, 0.01, 1.0, -0.1, 1e9)):g}\n"
         if rng.random() < 0.5:
@@ -139,14 +155,40 @@ def terms(rng):
     return energy
 
 
+def undefined(rng, box):
+    """A formula that has its pole, or its end, within the curvatures of a spheroid of axes 1 and 2, which has H from -4 to -1.25; or one
+    that no double holds there."""
+    end = f"H+{rng.uniform(1.5, 3.7):.4g}"
+    words = rng.choice((*(f"{before}({end}){after}" for before, after in (("1/", ""), ("K/", "^3"), ("log", ""), ("sqrt", ""), ("", "^0.5"))), *OVERFLOWS))
+    tier = rng.choice(("axisym", "surface3d"))
+    energy = f'{{k20 = 1.0, term = [{{modulus = {rng.choice((0.1, 1e-9, -0.5))}, formula = "{words}"}}]}}'
+    box.write("case.toml", f'tier = "{tier}"\nenergy = {energy}\nshape = {{kind = "ellipsoid", a = 1.0, b = 1.0, c = 2.0}}\naccuracy = {{energy = 1e-2}}\ntime = {{end = 1e-4, limit = 5}}\n')
+    done = box.run("run", "case.toml", "--quiet", limit=30)
+    clean(done)
+    if "before the first state was computed" in done.out:
+        return "no state in time"
+    if done.status not in (2, 4) or not re.search("formula|divisor|overflow|too large", done.out + done.err):
+        raise Finding("no-reason", f"{words}: exit {done.status}, {(done.out + done.err)[:500]!r}")
+    return f"undefined: exit {done.status}"
+
+
+def clean(refused):
+    """No half characters and no control characters in what is said."""
+    if bad := [c for c in refused.err if c != "\n" and unicodedata.category(c) in ("Cc", "Cs")]:
+        raise Finding("unclean", f"says {bad[0]!r}: {refused.err[:500]!r}")
+
+
 def one(rng, box):
-    energy = terms(rng) if rng.random() < 0.5 else "[energy]\nk20 = 1.0\n"
+    if rng.random() < 0.1:
+        return undefined(rng, box)
     tier = rng.choice(("axisym", "axisym", "surface3d"))
+    energy = terms(rng, tier) if rng.random() < 0.5 else "[energy]\nk20 = 1.0\n"
     state, shape = rng.choice((profile, profile, radius, noisy))(rng, box, tier)
     box.write("case.toml", f'tier = "{tier}"\n{energy}[shape]\n{shape}\n[accuracy]\nenergy = 1e-2\n[time]\nend = 1e-3\nlimit = {LIMIT}\n')
     checked = box.run("check", "--quick", "case.toml", statuses=(0, 2))
     done = box.run("run", "case.toml", "--quiet", "--overwrite", limit=30)
     for refused in (checked, done):
+        clean(refused)
         if refused.status == 2 and not re.search(r"profile\.csv|case\.toml:\d+:\d+: ", refused.err):
             raise Finding("no-place", f"refused without naming file or case: {refused.err[:500]!r}")
     if checked.status == 2 != done.status:

@@ -7,8 +7,8 @@ stated error is zero. Some of the runs that finish without a warning are compare
 import math
 import re
 
-import h5py
 import numpy as np
+import rows
 import toml
 from sandbox import Finding
 
@@ -78,19 +78,6 @@ def case(rng):
     return scene | {"accuracy": {"energy": number(10 ** rng.uniform(-2.5, -1))}, "discretisation": choices, "time": time}
 
 
-class Outcome:
-    def __init__(self, path):
-        with h5py.File(path) as file:
-            self.about = {key: value for key, value in file["about"].attrs.items()}
-            self.series = {name: data[:] for name, data in file["series"].items()}
-        self.stop, self.E_ref = self.about["stop"], self.about["E_ref"]
-        self.error = self.about["estimated_error"]
-
-    def drift(self, name):
-        values = self.series[name]
-        return float(np.abs(values / values[0] - 1).max()) if len(values) else 0.0
-
-
 def judge(scene, out):
     """What must hold of every run that has rows, wherever it stopped."""
     model, asked = scene["model"], scene["accuracy"]["energy"]
@@ -122,7 +109,7 @@ def compare(box, scene, out):
     finer["time"] = scene["time"] | {"limit": 4 * LIMIT}
     box.write("finer.toml", toml.dump(finer))
     box.run("run", "finer.toml", "--quiet", "-o", "finer.hdf", limit=8 * LIMIT)
-    reference = Outcome(box.folder / "finer.hdf")
+    reference = rows.Outcome(box.folder / "finer.hdf")
     if reference.stop != "finished":
         return "reference " + reference.stop
     apart = abs(out.series["energy"][-1] - reference.series["energy"][-1]) / out.E_ref
@@ -141,13 +128,12 @@ def one(rng, box):
         if re.search(r"case\.toml:\d+", done.err):
             return "refused"
         raise Finding("no-place", f"refused without a line: {done.err[:300]!r}")
-    out = Outcome(box.folder / "result.hdf")
+    rows.judge(scene, box.folder / "result.hdf")
+    out = rows.Outcome(box.folder / "result.hdf")
     if not out.about["stop_message"]:
         raise Finding("no-reason", f"{out.stop} without a message")
     if len(out.series["time"]):
         judge(scene, out)
-    elif out.stop in ("finished", "stationary"):
-        raise Finding("no-rows", out.stop)
     if compares and out.stop == "finished" and not out.about["warnings"]:
         return compare(box, scene, out)
     return out.stop

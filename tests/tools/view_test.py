@@ -84,6 +84,11 @@ class Pages(Folder):
             self.assertNotIn("@DATA@", page)
             self.assertNotIn("@SCRIPT@", page)
 
+    def test_titles_are_text_and_no_mathematics(self):
+        page = made(self.folder, [*TUBE, "--set", "about.title=$k$ & co", "--overwrite"])[1]
+        self.assertEqual(data_of(page)["title"], "$k$ & co")
+        self.assertIn("<title>$k$ &amp; co</title>", page.read_text())
+
     def test_map_of_a_scan_names_the_command_of_a_point(self):
         result, page = made(self.folder, SCAN)
         data = data_of(page)

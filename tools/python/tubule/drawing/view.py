@@ -143,7 +143,7 @@ def run_page(path):
     vary = result.case.get("equilibrium", {}).get("branch", {}).get("vary", along)
     return {
         "kind": "shapes",
-        "title": result.title,
+        "title": result.title.replace(r"\$", "$"),
         "file": os.path.basename(path),
         "case": [f"{key} = {value}" for key, value in flatten(result.case).items()],
         "about": told(result.about),
@@ -167,7 +167,7 @@ def scan_page(path):
     values = {name: data for name, data in points.items() if data.ndim == len(axes) and data.dtype.kind in "fiu"}
     return {
         "kind": "scan",
-        "title": as_label(title) or os.path.basename(path),
+        "title": as_label(title).replace(r"\$", "$") or os.path.basename(path),
         "file": os.path.basename(path),
         "command": ["tubule run " + case, *(f"--set {text}" for text in sets)],
         "axes": [{"key": axis.key, "label": axis.label, "texts": axis.texts} for axis in axes],
