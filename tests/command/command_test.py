@@ -141,7 +141,11 @@ class Refused(ProgramTest):
         self.assertIn("CASE", self.refused("run"))
 
     def test_no_folder_to_write_to(self):
-        self.assertIn("nowhere/x.hdf", self.refused("run", self.case, "-o", "nowhere/x.hdf"))
+        scan = ("scan", self.case, "--over", "energy.k42=0,0.1")
+        for command in (("run", self.case), scan):
+            self.assertEqual(self.refused(*command, "-o", "nowhere/x.hdf"),
+                             "nowhere/x.hdf: cannot be written: there is no folder nowhere; make it, or choose another "
+                             "file with -o\n")  # fmt: skip
 
     def test_output_that_is_no_result(self):
         self.assertIn("case.toml", self.refused("run", self.case, "-o", "case.toml"))
@@ -156,12 +160,21 @@ class Refused(ProgramTest):
         self.assertIn("case.hdf", self.refused("run", self.case, second))
 
     def test_unknown_subcommand_and_option(self):
-        self.assertIn("walk", self.refused("walk", self.case))
-        self.assertIn("--fast", self.refused("run", self.case, "--fast"))
+        self.assertIn("tubule: not expected: walk", self.refused("walk", self.case))
+        self.assertIn("tubule: not expected: Run case.toml; did you mean 'run'?\n", self.refused("Run", "case.toml"))
+        self.assertIn("not expected: case.toml; to run a case: tubule run case.toml\n", self.refused("case.toml"))
+        self.assertIn("not expected: x.hdf; to look at a result: tubule show x.hdf\n", self.refused("x.hdf"))
+        self.assertIn("tubule run: not expected: --fast\nRun `tubule run --help`", self.refused("run", self.case, "--fast"))
+        self.assertIn("not expected: --quite; did you mean '--quiet'?\n", self.refused("run", self.case, "--quite"))
+        words = self.refused("scan", self.case, "--over", "energy.k42", "0", "1", "2")
+        self.assertIn("tubule scan: not expected: 0 1 2\n", words)
 
     def test_results_that_are_none(self):
         self.assertIn("nowhere.hdf", self.refused("show", "nowhere.hdf"))
-        self.assertIn("case.toml", self.refused("show", "case.toml"))
+        for command in ("show", "plot", "view"):
+            self.assertRegex(self.refused(command, "case.toml"),
+                             r"case\.toml: is a case file, not a result: run it first \(tubule run \S*case\.toml; tubule scan "
+                             r"for a scan\), then give its result, case\.hdf\n")  # fmt: skip
         self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
         self.assertIn("nowhere.hdf: no such file", self.refused("confirm", "nowhere.hdf"))
 
@@ -358,6 +371,8 @@ class Others(ProgramTest):
         for subcommand in ("run", "check", "show", "plot"):
             self.assertIn(subcommand, out)
         self.assertEqual(self.tubule(), (out, ""))
+        self.assertEqual(self.tubule("help"), (out, ""))
+        self.assertEqual(self.tubule("help", "run"), self.tubule("run", "--help"))
 
     def test_help_of_each_command_has_examples_that_work(self):
         """And names the exit statuses and pages of docs/. `confirm` is left out: it computes in three dimensions."""

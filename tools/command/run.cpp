@@ -48,6 +48,11 @@ void check_output(const std::filesystem::path& file) {
         throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
                                     std::filesystem::path(file).replace_extension().string()));
     std::error_code error;
+    const std::filesystem::path folder = file.parent_path();
+    if (!folder.empty() && std::filesystem::status(folder, error).type() == std::filesystem::file_type::not_found)
+        throw CaseError(
+            fmt::format("{}: cannot be written: there is no folder {}; make it, or choose another file with -o",
+                        file.string(), folder.string()));
     if (std::filesystem::status(file, error).type() == std::filesystem::file_type::none)
         throw CaseError(fmt::format("{}: cannot be written: {}", file.string(), error.message()));
 }
