@@ -121,6 +121,46 @@ class Run(ProgramTest):
         self.assertTrue(self.result.exists())
 
 
+class Physics(ProgramTest):
+    """What surprises in cases that are valid is said by `check` and `run`, and by nobody with --quiet."""
+
+    ONE_WAVE = QUICK.replace("[accuracy]", '[model]\nkind = "overdamped"\n[accuracy]', 1)
+    ONE_WAVE = ONE_WAVE.replace("[[shape.mode]]\namplitude = 0.05\nn = 2\nphase = 1.1\n", "")
+
+    def said(self, text, *sets):
+        case = self.write("case.toml", text)
+        checked = self.tubule("check", "--quick", case, *sets)[1]
+        self.assertEqual(self.tubule("run", case, "-o", self.result, "--overwrite", *sets)[1].count("note:"), checked.count("note:"))
+        self.assertEqual(self.tubule("run", case, "-o", self.result, "--overwrite", "--quiet", *sets), ("", ""))
+        return checked
+
+    def test_a_single_wave_that_is_frozen(self):
+        words = self.said(self.ONE_WAVE)
+        self.assertIn("case.toml:12:1: note: shape.mode is a single wave, and can hardly move: area, volume and length are fixed", words)
+        self.assertIn('model.volume = "free", model.area = "reservoir" or model.period = "free"', words)
+        for change in ("model.volume=free", "model.area=reservoir", "model.kind=gradient-flow"):
+            self.assertEqual(self.said(self.ONE_WAVE, "--set", change), "", change)
+        self.assertEqual(self.said(QUICK), "")
+
+    def test_the_sign_of_H0(self):
+        words = self.said(QUICK, "--set", "energy.H0=2")
+        self.assertIn("--set energy.H0=2: note: energy.H0 = 2 is positive, but H is negative on a tube: -1/radius = -1 here", words)
+        sphere = QUICK.split("[shape]")[0] + "[shape]\nkind = 'sphere'\nradius = 2.0\n[time]\nend = 1e-3\n"
+        self.assertIn("case.toml:6:6: note: energy.H0 = 1 is positive, but H is negative on a sphere: -2/radius = -1 here",
+                      self.said(sphere.replace("H0 = -1.0", "H0 = 1.0")))  # fmt: skip
+        self.assertEqual(self.said(sphere), "")
+
+    def test_a_balance_that_is_off(self):
+        # Waves of the seams are lost on 80 triangles. (A run that estimates its error would make more of them.)
+        case = self.write("case.toml", ROUGH.replace("1e-3", "1e-4").replace("[time]", "estimate = false\n[discretisation]\nelements = 80\norder = 2\n[time]"))
+        out, _ = self.tubule("run", case, "-o", self.result, "--set", "time.end=1e-3")
+        defect, reference = np.abs(series(self.result)["identity_defect"]).max(), about(self.result)["E_ref"]
+        self.assertGreater(defect, 3e-4 * reference)
+        self.assertIn(f"warning: the energy balance is off by {defect:.2g}, {defect / reference:.2g} of E_ref (series identity_defect)", out)
+        self.assertIn("the energy balance is off by", self.tubule("show", self.result)[0])
+        self.assertNotIn("balance", self.tubule("run", self.write("quick.toml", QUICK))[0])
+
+
 class Refused(ProgramTest):
     """Bad input: exit status 2, and nothing is written."""
 
