@@ -21,8 +21,12 @@ void note_places(const toml::node& node, const std::string& path, std::map<std::
         for (const auto& [key, value] : *table) note_places(value, prefix + std::string(key.str()), places);
 }
 
-// Terms of the case that are those of the list, with the branch that varies one of them.
+// Terms of the case that are those of the list, with the branch that varies one of them. Messages find them where they
+// stand.
 void merge_terms(Case& c) {
+    for (const EnergyTerm& listed : c.energy.terms)
+        if (const std::size_t number = listed_as(listed); number < n_bending_terms)
+            c.places[term_key(c.energy, number)] = c.places[fmt::format("energy.term.{}.modulus", listed.entry)];
     std::optional<int> none, &varied = c.equilibrium ? c.equilibrium->branch.parameter : none;
     std::optional<EnergyTerm> term;
     if (varied >= static_cast<int>(n_bending_terms)) term = c.energy.terms[*varied - n_bending_terms];

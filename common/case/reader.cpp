@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 
+#include "common/case/other_names.hpp"
 #include "common/case/overrides.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
@@ -112,10 +113,13 @@ void Reader::refuse_unknown() {
     for (const auto& [key, node] : table_) {
         const std::string name(key.str());
         if (std::find(names_.begin(), names_.end(), name) != names_.end() || (accepts_ && accepts_(name))) continue;
-        const std::string suggestion = near_miss(name, names_).value_or("");
-        if (in_doubt && suggestion.empty()) continue;
+        const OtherName* other = other_name(path_, name);
+        const std::string suggestion = other ? std::string(other->key) : near_miss(name, names_).value_or("");
+        if (in_doubt && suggestion.empty() && !other) continue;
         meant_.push_back(suggestion);
-        const std::string words = meant(suggestion);
+        const std::string words = other           ? fmt::format(": {}.", other->words)
+                                  : name == path_ ? fmt::format(": under [{0}], keys have no {0}. before them.", name)
+                                                  : meant(suggestion);
         complaints_.found.push_back({place(key.source()), path_of(name),
                                      fmt::format("unknown key {}{} Allowed here: {}", path_of(name),
                                                  words.empty() ? "." : words, fmt::join(names_, ", ")),
@@ -193,7 +197,9 @@ void Reader::number_or_formula(const std::string& key, double& number, std::shar
 // Of a character of a string, if it stands in the file as it is, in quotes on one line.
 std::string Reader::where_in(const toml::node& node, std::size_t character) const {
     toml::source_region at = node.source();
-    const std::size_t length = node.as_string()->get().size();
+    const std::string& text = node.as_string()->get();
+    const auto length =  // in characters, as TOML++ counts
+        std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
     if (at.end.line == at.begin.line && at.end.column == at.begin.column + length + 2)
         at.begin.column += static_cast<toml::source_index>(character);
     return place(at);

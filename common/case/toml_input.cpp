@@ -7,28 +7,10 @@
 #include <string_view>
 
 #include "common/case/read.hpp"
+#include "common/case/toml_mistakes.hpp"
 
 namespace tubule {
 namespace {
-
-// The position behind the string that begins at `from`; a string that its line does not close ends with the line.
-std::size_t end_of_string(std::string_view text, std::size_t from) {
-    const char quote = text[from];
-    const std::string three(3, quote);
-    const bool of_lines = text.substr(from).starts_with(three);
-    for (std::size_t i = from + (of_lines ? 3 : 1); i < text.size(); ++i) {
-        if (text[i] == '\\' && quote == '"') {
-            ++i;
-        } else if (!of_lines && (text[i] == quote || text[i] == '\n')) {
-            return text[i] == quote ? i + 1 : i;
-        } else if (of_lines && text.substr(i).starts_with(three)) {
-            i += 3;  // up to two more quotes belong to its contents
-            for (int more = 0; more < 2 && i < text.size() && text[i] == quote; ++more) ++i;
-            return i;
-        }
-    }
-    return text.size();
-}
 
 // toml++ handles nested values up to a depth of its own, but walks down the parts of a key without any: a key of some
 // ten thousand parts overflows the stack.
@@ -69,7 +51,13 @@ toml::table parse_toml(const std::string& text, const std::string& path) {
     try {
         return toml::parse(text, std::string_view(path));
     } catch (const toml::parse_error& error) {
-        throw CaseError(fmt::format("{}: not valid TOML: {}", place(error.source()), error.description()));
+        toml::source_region where = error.source();
+        const std::string description(error.description());
+        const auto mistake = toml_mistake(text, where.begin.line, where.begin.column, description);
+        if (mistake)
+            where.begin = {static_cast<toml::source_index>(mistake->line),
+                           static_cast<toml::source_index>(mistake->column)};
+        throw CaseError(fmt::format("{}: not valid TOML: {}", place(where), mistake ? mistake->words : description));
     }
 }
 

@@ -38,6 +38,22 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 9> other_nam
                                                                                     {"acos", "atan"},
                                                                                     {"asin", "atan"}}};
 
+// Characters of other keyboards, in UTF-8, and what to write for them.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 10> other_characters{{{"\u00b2", "^2"},
+                                                                                          {"\u00b3", "^3"},
+                                                                                          {"\u2074", "^4"},
+                                                                                          {"\u00b7", "*"},
+                                                                                          {"\u22c5", "*"},
+                                                                                          {"\u00d7", "*"},
+                                                                                          {"\u2212", "-"},
+                                                                                          {"\u2013", "-"},
+                                                                                          {"\u221a", "sqrt(x)"},
+                                                                                          {"\u03c0", "pi"}}};
+
+bool continues_character(char c) {
+    return (static_cast<unsigned char>(c) & 0xc0) == 0x80;
+}
+
 template <class List>
 bool is_in(const List& list, std::string_view name) {
     return std::find(list.begin(), list.end(), name) != list.end();
@@ -56,7 +72,7 @@ public:
 
     Formula parse() {
         sum();
-        if (!at_end()) fail(at_, fmt::format("expected an operator, not '{}'", text_[at_]));
+        if (!at_end()) fail(at_, "expected an operator, not " + character());
         out_.text = text_;
         if (out_.depth > formula_depth)
             fail(0, fmt::format("the formula nests {} values; at most {} are read", out_.depth, formula_depth));
@@ -64,7 +80,21 @@ public:
     }
 
 private:
-    [[noreturn]] void fail(std::size_t at, const std::string& what) const { throw FormulaError(at + 1, what); }
+    [[noreturn]] void fail(std::size_t at, const std::string& what) const {
+        const auto before = static_cast<std::size_t>(
+            std::ranges::count_if(text_.substr(0, at), [](char c) { return !continues_character(c); }));
+        throw FormulaError(before + 1, what);
+    }
+    // The next one, in quotes, and what to write instead, if that is known.
+    std::string character() const {
+        std::size_t end = at_ + 1;
+        while (end < text_.size() && continues_character(text_[end])) ++end;
+        const std::string_view one = std::string_view(text_).substr(at_, end - at_);
+        const auto code = static_cast<unsigned char>(one.front());
+        if (code < 0x20 || code == 0x7f) return fmt::format("the control character U+{:04X}", code);
+        const auto* other = named(other_characters, one);
+        return fmt::format("'{}'{}", one, other ? fmt::format("; write {}", other->second) : "");
+    }
 
     bool at_end() {
         while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
@@ -91,6 +121,7 @@ private:
             out_.steps.pop_back();
             double& a = out_.steps.back().value;
             a = op == Op::add ? a + b : op == Op::subtract ? a - b : a * b;
+            require_finite(a, column);
         } else {
             out_.steps.push_back({.op = op, .column = column});
         }
@@ -101,7 +132,10 @@ private:
         a = step.op == Op::negate  ? -a
             : step.op == Op::power ? whole_power(a, step.number)
                                    : function_values(step, a).f;
-        if (!std::isfinite(a)) fail(step.column - 1, "has no finite value here");
+        require_finite(a, step.column);
+    }
+    void require_finite(double value, std::size_t column) const {
+        if (!std::isfinite(value)) fail(column - 1, "has no finite value here");
     }
 
     void sum() {
@@ -164,13 +198,13 @@ private:
         if (take('(')) return closed(at_ - 1);
         if (std::isdigit(static_cast<unsigned char>(c)) || c == '.') return number();
         if (std::isalpha(static_cast<unsigned char>(c)) || c == '_') return name();
-        fail(at_, fmt::format("expected a number, a name or a parenthesis, not '{}'", c));
+        fail(at_, "expected a number, a name or a parenthesis, not " + character());
     }
     void closed(std::size_t opened) {
         sum();
         if (!take(')'))
-            fail(opened, at_end() ? "this parenthesis is not closed"
-                                  : fmt::format("expected an operator or ')', not '{}'", text_[at_]));
+            fail(opened,
+                 at_end() ? "this parenthesis is not closed" : "expected an operator or ')', not " + character());
     }
     void number() {
         double value = 0;
@@ -376,10 +410,12 @@ FormulaDomain::Margin FormulaDomain::margin() const {
 }
 
 std::string words(const FormulaDomain::Margin& margin) {
+    constexpr double vanishing = 1e-6;
     const std::string out = fmt::format("{} at character {} of the formula is {:.4g}", words_for(margin.step->op),
                                         margin.step->column, margin.argument);
-    if (margin.step->op != Op::inverse || margin.value > 0) return out;
-    return out + ", and has the other sign elsewhere";
+    if (margin.step->op != Op::inverse) return out;
+    if (std::abs(margin.value) < vanishing) return out + ": it vanishes";
+    return margin.value > 0 ? out : out + ", and has the other sign elsewhere: it vanishes in between";
 }
 
 }  // namespace tubule

@@ -151,6 +151,11 @@ Handle make_group(hid_t parent, const std::string& name) {
 // ---- reading
 
 Handle open_file(const std::filesystem::path& file) {
+    if (file.extension() == ".toml")
+        throw std::runtime_error(fmt::format(
+            "is a case file, not a result: run it first (tubule run {}; tubule scan for a scan), then give its result, "
+            "{}",
+            file.string(), std::filesystem::path(file).filename().replace_extension(".hdf").string()));
     while (true) {
         const durable::File looked_at(file, O_RDONLY);
         require_whole(looked_at.descriptor(), file);

@@ -4,18 +4,23 @@
 #include <string>
 
 #include "common/case/case.hpp"
+#include "common/case/read.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule {
 
 // Throws CaseError where the formula of the energy is not defined on the start; `where` is the place of the margin.
 void require_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
+CaseError not_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
+// The key of the formula; "energy" if there is none.
+std::string key_of_formula(const Bending& energy);
 
 // The stop of a run that comes too near to where the formula is not defined.
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
-// The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or "energy".
-std::string key_of_ill_posed(const Bending& energy);
+// The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
+// "energy". That which the case has: a term of powers may stand for one of the list.
+std::string key_of_ill_posed(const Case& c);
 
 // Whether a run that failed came near to that.
 inline bool may_be_undefined(const FormulaDomain::Margin& margin) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/case/read.hpp"
+#include "common/run/energy_checks.hpp"
 
 namespace tubule {
 namespace {
@@ -16,6 +17,9 @@ constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it ha
 }  // namespace
 
 double reference_energy(const Case& c, double energy, double by_magnitude) {
+    const std::string formula = key_of_formula(c.energy);
+    if (formula != "energy" && !(std::isfinite(energy) && std::isfinite(by_magnitude)))
+        throw complaint(c, formula, "must be finite on the start, but it overflows there");
     if (!c.accuracy.relative_to_energy) return by_magnitude;
     if (std::abs(energy) < least_scale * by_magnitude)
         throw complaint(c, "accuracy.relative_to",

@@ -9,7 +9,7 @@
 namespace tubule {
 
 // E_ref of a run from the energy of its start and from (11.1), as the case has it. Throws CaseError where that energy
-// is too small to be a scale.
+// is too small to be a scale, or where the formula of a case has no finite value.
 double reference_energy(const Case& c, double energy, double by_magnitude);
 
 // Words if so, else empty; energies of the surface, E_ref as above. Before a run: errors may be larger than

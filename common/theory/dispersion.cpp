@@ -33,6 +33,21 @@ double symbol_along(const UniformTube& tube) {
     return f.HH - 2 * f.HK / tube.radius + f.KK / (tube.radius * tube.radius);
 }
 
+// The sum of the sizes of what stiffness() adds up.
+double size_of_stiffness(const UniformTube& tube, double q, int m) {
+    const double R = tube.radius, Y = q * q + (m * m + 1) / (R * R);
+    const auto f = on(tube);
+    return Y * (Y * (std::abs(f.HH) + 2 * std::abs(f.HK) / R + std::abs(f.KK) / (R * R)) + std::abs(f.f) +
+                2 * std::abs(f.H) / R + std::abs(tube.tension));
+}
+
+// A wave whose stiffness is rounding is neutral.
+double driving_stiffness(const UniformTube& tube, double q, int m) {
+    constexpr double rounding = 1e-13;
+    const double G = stiffness(tube, m)(q);
+    return std::abs(G) < rounding * size_of_stiffness(tube, q, m) ? 0 : G;
+}
+
 double squared_wave_number(const UniformTube& tube, double q, int m) {
     return q * q + m * m / (tube.radius * tube.radius);
 }
@@ -170,8 +185,8 @@ double mobility(const UniformTube& tube, const MotionLaw& law, double q, int m) 
 
 Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m) {
     m = std::abs(m);
-    const double R = tube.radius, Q = squared_wave_number(tube, q, m), G = stiffness(tube, m)(q);
-    if (!law.inextensible) return {{-G}};
+    const double R = tube.radius, Q = squared_wave_number(tube, q, m), G = driving_stiffness(tube, q, m);
+    if (!law.inextensible) return {{0.0 - G}};
     // The radius (m = 0) or the position (m = 1), which are conserved.
     const bool rigid = q == 0 && m < 2;
     if (law.inertia == 0) return {{rigid || G == 0 ? 0.0 : -mobility(tube, law, q, m) * G}};

@@ -60,7 +60,7 @@ Stiffness stiffness(const UniformTube& tube, int m);
 double stiffness(const UniformSphere& sphere, int l);
 
 // All rates of one wave, the fastest (largest real part) first: one; with inertia two or three. Infinite where a
-// viscous flow without inertia and friction meets no resistance (q = 0, m >= 2).
+// viscous flow without inertia and friction meets no resistance (q = 0, m >= 2). Zero where only rounding is left.
 struct Growth {
     std::vector<std::complex<double>> roots;
     double rate() const { return roots.front().real(); }

@@ -121,6 +121,46 @@ class Run(ProgramTest):
         self.assertTrue(self.result.exists())
 
 
+class Physics(ProgramTest):
+    """What surprises in cases that are valid is said by `check` and `run`, and by nobody with --quiet."""
+
+    ONE_WAVE = QUICK.replace("[accuracy]", '[model]\nkind = "overdamped"\n[accuracy]', 1)
+    ONE_WAVE = ONE_WAVE.replace("[[shape.mode]]\namplitude = 0.05\nn = 2\nphase = 1.1\n", "")
+
+    def said(self, text, *sets):
+        case = self.write("case.toml", text)
+        checked = self.tubule("check", "--quick", case, *sets)[1]
+        self.assertEqual(self.tubule("run", case, "-o", self.result, "--overwrite", *sets)[1].count("note:"), checked.count("note:"))
+        self.assertEqual(self.tubule("run", case, "-o", self.result, "--overwrite", "--quiet", *sets), ("", ""))
+        return checked
+
+    def test_a_single_wave_that_is_frozen(self):
+        words = self.said(self.ONE_WAVE)
+        self.assertIn("case.toml:12:1: note: shape.mode is a single wave, and can hardly move: area, volume and length are fixed", words)
+        self.assertIn('model.volume = "free", model.area = "reservoir" or model.period = "free"', words)
+        for change in ("model.volume=free", "model.area=reservoir", "model.kind=gradient-flow"):
+            self.assertEqual(self.said(self.ONE_WAVE, "--set", change), "", change)
+        self.assertEqual(self.said(QUICK), "")
+
+    def test_the_sign_of_H0(self):
+        words = self.said(QUICK, "--set", "energy.H0=2")
+        self.assertIn("--set energy.H0=2: note: energy.H0 = 2 is positive, but H is negative on a tube: -1/radius = -1 here", words)
+        sphere = QUICK.split("[shape]")[0] + "[shape]\nkind = 'sphere'\nradius = 2.0\n[time]\nend = 1e-3\n"
+        self.assertIn("case.toml:6:6: note: energy.H0 = 1 is positive, but H is negative on a sphere: -2/radius = -1 here",
+                      self.said(sphere.replace("H0 = -1.0", "H0 = 1.0")))  # fmt: skip
+        self.assertEqual(self.said(sphere), "")
+
+    def test_a_balance_that_is_off(self):
+        # Waves of the seams are lost on 80 triangles. (A run that estimates its error would make more of them.)
+        case = self.write("case.toml", ROUGH.replace("1e-3", "1e-4").replace("[time]", "estimate = false\n[discretisation]\nelements = 80\norder = 2\n[time]"))
+        out, _ = self.tubule("run", case, "-o", self.result, "--set", "time.end=1e-3")
+        defect, reference = np.abs(series(self.result)["identity_defect"]).max(), about(self.result)["E_ref"]
+        self.assertGreater(defect, 3e-4 * reference)
+        self.assertIn(f"warning: the energy balance is off by {defect:.2g}, {defect / reference:.2g} of E_ref (series identity_defect)", out)
+        self.assertIn("the energy balance is off by", self.tubule("show", self.result)[0])
+        self.assertNotIn("balance", self.tubule("run", self.write("quick.toml", QUICK))[0])
+
+
 class Refused(ProgramTest):
     """Bad input: exit status 2, and nothing is written."""
 
@@ -141,7 +181,11 @@ class Refused(ProgramTest):
         self.assertIn("CASE", self.refused("run"))
 
     def test_no_folder_to_write_to(self):
-        self.assertIn("nowhere/x.hdf", self.refused("run", self.case, "-o", "nowhere/x.hdf"))
+        scan = ("scan", self.case, "--over", "energy.k42=0,0.1")
+        for command in (("run", self.case), scan):
+            self.assertEqual(self.refused(*command, "-o", "nowhere/x.hdf"),
+                             "nowhere/x.hdf: cannot be written: there is no folder nowhere; make it, or choose another "
+                             "file with -o\n")  # fmt: skip
 
     def test_output_that_is_no_result(self):
         self.assertIn("case.toml", self.refused("run", self.case, "-o", "case.toml"))
@@ -156,12 +200,21 @@ class Refused(ProgramTest):
         self.assertIn("case.hdf", self.refused("run", self.case, second))
 
     def test_unknown_subcommand_and_option(self):
-        self.assertIn("walk", self.refused("walk", self.case))
-        self.assertIn("--fast", self.refused("run", self.case, "--fast"))
+        self.assertIn("tubule: not expected: walk", self.refused("walk", self.case))
+        self.assertIn("tubule: not expected: Run case.toml; did you mean 'run'?\n", self.refused("Run", "case.toml"))
+        self.assertIn("not expected: case.toml; to run a case: tubule run case.toml\n", self.refused("case.toml"))
+        self.assertIn("not expected: x.hdf; to look at a result: tubule show x.hdf\n", self.refused("x.hdf"))
+        self.assertIn("tubule run: not expected: --fast\nRun `tubule run --help`", self.refused("run", self.case, "--fast"))
+        self.assertIn("not expected: --quite; did you mean '--quiet'?\n", self.refused("run", self.case, "--quite"))
+        words = self.refused("scan", self.case, "--over", "energy.k42", "0", "1", "2")
+        self.assertIn("tubule scan: not expected: 0 1 2\n", words)
 
     def test_results_that_are_none(self):
         self.assertIn("nowhere.hdf", self.refused("show", "nowhere.hdf"))
-        self.assertIn("case.toml", self.refused("show", "case.toml"))
+        for command in ("show", "plot", "view"):
+            self.assertRegex(self.refused(command, "case.toml"),
+                             r"case\.toml: is a case file, not a result: run it first \(tubule run \S*case\.toml; tubule scan "
+                             r"for a scan\), then give its result, case\.hdf\n")  # fmt: skip
         self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
         self.assertIn("nowhere.hdf: no such file", self.refused("confirm", "nowhere.hdf"))
 
@@ -358,6 +411,8 @@ class Others(ProgramTest):
         for subcommand in ("run", "check", "show", "plot"):
             self.assertIn(subcommand, out)
         self.assertEqual(self.tubule(), (out, ""))
+        self.assertEqual(self.tubule("help"), (out, ""))
+        self.assertEqual(self.tubule("help", "run"), self.tubule("run", "--help"))
 
     def test_help_of_each_command_has_examples_that_work(self):
         """And names the exit statuses and pages of docs/. `confirm` is left out: it computes in three dimensions."""

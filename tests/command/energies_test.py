@@ -150,7 +150,7 @@ class EnergiesTest(ProgramTest):
     def test_formula_that_is_not_defined(self):
         tube = SHAPE + REST
         err = self.refused("run", self.write("case.toml", case(term(1.0, formula="log(-1 - H)"), more=tube.replace("0.8", "1.2"))))
-        self.assertRegex(err, r"case\.toml:7:11: energy\.term\.0\.formula must be defined on the start, but at z = .*")
+        self.assertRegex(err, r"case\.toml:7:11: energy\.term\.0\.formula must be defined on the start, but at r = 1\.2, z = .*")
         self.assertIn("the argument of log at character 1 of the formula is -0.1667", err)
         # The tube widens, H rises to -1, where the logarithm ends: with little weight it does not keep it from that.
         wide = tube.replace("0.8", "0.95").replace("1e-3", "100.0")
@@ -159,6 +159,21 @@ class EnergiesTest(ProgramTest):
         self.assertEqual(about(self.result)["stop"], "undefined")
         self.assertLess(series(self.result)["r_min"][-1], 1)
         self.assertGreater(series(self.result)["r_min"][-1], 0.99)
+
+    def test_formulas_that_have_no_value_are_named(self):
+        # K = 0 on the straight tube, and both signs on the wavy one; H = -3 at the poles of the ellipsoid: 2 a/c^2 there.
+        ellipsoid = "[shape]\nkind = 'ellipsoid'\na = 1.0\nb = 1.0\nc = 1.5\n" + REST
+        overflow = "must be finite on the start, but at r = .*, where H = .* and K = .*, it or a derivative of it overflows"
+        for formula, shape, words in (
+            ("K/K", SHAPE + REST, "must be defined .* the divisor at character 2 of the formula is .* it vanishes"),
+            ("1/K", SHAPE + MODE + REST, "the divisor at character 2 .*, and has the other sign elsewhere: it vanishes in between"),
+            ("1/(H + 3)", ellipsoid, "must be defined .* the divisor at character 2 of the formula is .*: it vanishes"),
+            ("exp(exp(exp(H^2)))", ellipsoid, overflow),
+            ("cosh(1000*H)", SHAPE + REST, overflow),
+        ):
+            path = self.write("case.toml", case(term(1.0, formula=formula), more=shape))
+            for command in ("run", "check"):
+                self.assertRegex(self.refused(command, path), r"case\.toml:7:11: energy\.term\.0\.formula .*" + words)
 
     def test_endless_energies_are_warned_of(self):
         path = self.write("case.toml", case(term(0.01, 3, 0)))
@@ -194,6 +209,7 @@ class EnergiesTest(ProgramTest):
             # f_HH = 2 k20 + 6 k30 (H - H0) < 0 at H = -1; 2 k20 + 2 k42 < 0 on the unit sphere; either of two
             (case(term(0.5, 3, 0), more=tube), "6:11: energy.term.0.modulus"),
             (case(tier="surface3d", listed="k20 = 1.0\nk42 = -1.05\n", more=sphere), "4:7: energy.k42"),
+            (case(term(-0.5, 4, 0), more=tube), "6:11: energy.term.0.modulus"),  # that of k40
             (case(term(0.5, 3, 0), term(0.1, 1, 1), more=tube), "2:1: energy"),
         ):
             path = self.write("case.toml", text)

@@ -45,6 +45,15 @@ class Equilibrium(ProgramTest):
         self.tubule("equilibrium", case, "--quiet", "-o", "other.hdf")
         self.assertIn("other.hdf", self.files())
 
+    def test_minus_zero_is_zero(self):
+        # The volume is free, so no pressure acts; the file has it as -0.
+        case = Path(__file__).parents[2] / "cases/equilibrium_two_domains.toml"
+        out, _ = self.tubule("equilibrium", case, "-o", self.result)
+        self.assertEqual(out.splitlines()[-1].split()[2], "0")
+        for words in (out, self.tubule("show", self.result)[0], self.tubule("show", self.result, "--csv")[0],
+                      self.tubule("show", self.result, "--json")[0]):  # fmt: skip
+            self.assertNotRegex(words, r"(?<![\w.])-0(\.0)?(?![\w.])")
+
     def test_branch_and_shapes_as_starts(self):
         case = self.write("branch.toml", CASE + BRANCH)
         out, _ = self.tubule("equilibrium", case)

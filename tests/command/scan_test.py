@@ -499,6 +499,10 @@ class Shown(ScanTest):
         self.assertEqual([p["r_min"] for p in document["points"]], list(values["r_min"].flat))
         self.assertEqual(document["case"]["text"], CASE)
         self.assertIn("no frames", self.tubule("show", self.result, "--csv", "--frame", "0", status=2)[1])
+        for name in ("height", "tension", "pressure", "growth", "free_energy"):  # of equilibria only
+            self.assertTrue(np.isnan(values[name]).all(), name)
+            self.assertEqual({row[name] for row in rows}, {"nan"})
+            self.assertEqual({p[name] for p in document["points"]}, {None})
 
     def test_pictures(self):
         picture = self.folder / "map.svg"

@@ -107,6 +107,13 @@ class Stability(ProgramTest):
         rings = next(line for line in lines if line[:2] == ["rings", "2"])
         self.assertAlmostEqual(float(rings[4]), -3 * 0.4, delta=1e-9)
 
+    def test_a_frozen_wave_is_neutral(self):
+        # Area, volume and length are fixed, which freezes the only wave: docs/theory.md, section 5.
+        out, _ = self.tubule("stability", self.tube, "--model", "overdamped")
+        row = next(line.split() for line in out.splitlines() if line.split()[:2] == ["0", "1"])
+        self.assertEqual(row[3:], ["0", "-", "neutral"])
+        self.assertIn("beyond the threshold of: pearling, buckling (by other waves than these)\n", out)
+
     def test_known_threshold(self):
         # H0 = 0: pearling of long waves beyond sigma0 R^2/(2 k20) = 3/2.
         found = self.json(self.tube, "--set", "energy.H0=0.0", "--set", "energy.k42=0.0")

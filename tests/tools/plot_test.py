@@ -19,6 +19,7 @@ from types import SimpleNamespace
 
 import h5py
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image, ImageSequence
 
 PACKAGE = Path(__file__).resolve().parents[2] / "tools/python/tubule"
@@ -479,6 +480,18 @@ class Films(InFolder):
         middle = (reds(first) + reds(last)) / 2
         self.assertAlmostEqual(reds(second), middle, delta=6)  # rows are 1/39 of the time apart
         self.assertFalse(list(self.folder.glob("*.part*")))
+
+    def test_small_times_do_not_overlap(self):
+        path = write(self.folder / "a.hdf", times=(0, 1e-4))
+        result = results.read_result(path)
+        stage = movie.Stage(result, result.frames, "H", "")
+        FigureCanvasAgg(stage.figure).draw()
+        panel = next(axes for axes in stage.figure.axes if axes.get_xlabel() == "time t")
+        low, high = panel.get_xlim()
+        boxes = [tick.label1.get_window_extent() for tick in panel.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+        self.assertGreaterEqual(len(boxes), 3)
+        for one, next_one in zip(boxes, boxes[1:]):
+            self.assertLess(one.x1 + 4, next_one.x0)
 
     def test_mp4(self):
         path = write(self.folder / "a.hdf", times=(0, 1))

@@ -480,6 +480,12 @@ TEST(Waves, areConservedTogether) {
         const double Z = std::pow(4 * pi / length, 2) - 1;
         EXPECT_NEAR(frozen.tension, -stiffness(tube, 0)(4 * pi / length) / Z, 1e-9);
         EXPECT_NEAR(frozen.tension, tension_of_waves(tube, law, length, {{2, 0, 5e-4}}), 1e-11);
+        // Its rate is none: what rounding leaves of it is no growth.
+        UniformTube held = tube;
+        held.tension = tension_of_waves(tube, law, length, {{2, 0, 5e-4}});
+        EXPECT_EQ(growth(held, law, 4 * pi / length, 0).rate(), 0);
+        held.tension *= 1 + 1e-9;
+        EXPECT_NE(growth(held, law, 4 * pi / length, 0).rate(), 0);
     }
 }
 

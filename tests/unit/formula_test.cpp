@@ -89,7 +89,13 @@ TEST(Formula, RefusesWithPlaceAndRemedy) {
     expect_refusal("tan(x)", 1, "sin(x)/cos(x)");
     expect_refusal("ln(x)", 1, "log(x)");
     expect_refusal("x + 1/0", 6, "no finite value");
+    expect_refusal("1e308*1e308*x", 6, "no finite value");
     expect_refusal("x + #", 5, "'#'");
+    expect_refusal("x\u00b2 + y", 2, "not '\u00b2'; write ^2");  // characters are whole, and counted as such
+    expect_refusal("(x\u00b2)", 1, "not '\u00b2'; write ^2");
+    expect_refusal("x + \u03b2", 5, "not '\u03b2'");
+    expect_refusal("x \u00b7 \u00b7 y", 3, "write *");
+    expect_refusal(std::string("x + y") + '\0', 6, "not the control character U+0000");
     expect_refusal("1e999", 1, "no number");
     std::string deep(300, '(');
     deep.append("x").append(300, ')');

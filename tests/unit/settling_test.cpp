@@ -7,6 +7,7 @@
 
 #include "common/case/read.hpp"
 #include "common/run/error_scale.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule {
 namespace {
@@ -72,6 +73,16 @@ TEST(ErrorScale, IsTheEnergyOfTheStartWhereTheCaseHasItSo) {
     c.accuracy.relative_to_energy = true;
     EXPECT_EQ(reference_energy(c, -3, 100), 3);
     EXPECT_THROW(reference_energy(c, -1e-8, 100), CaseError);
+}
+
+TEST(ErrorScale, AFormulaThatOverflowsIsRefused) {
+    Case c;
+    c.places["energy.term.0.formula"] = "case.toml:3:7";
+    c.energy.terms = {
+        {.modulus = 1, .formula = std::make_shared<const Formula>(parse_formula("exp(H)", EnergyTerm::variables))}};
+    EXPECT_EQ(reference_energy(c, -3, 100), 100);
+    EXPECT_EQ(test::message_of([&] { reference_energy(c, HUGE_VAL, HUGE_VAL); }),
+              "case.toml:3:7: energy.term.0.formula must be finite on the start, but it overflows there");
 }
 
 TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {

@@ -26,6 +26,7 @@
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
 #include "tools/run/model_advice.hpp"
+#include "tools/run/physics_notes.hpp"
 
 namespace tubule {
 
@@ -67,7 +68,7 @@ struct Checked {
     std::optional<Forecast> expected;   // with --quick nothing
     std::optional<Advice> advice;       // likewise
     std::string unknown;                // why nothing is expected
-    std::vector<std::string> warnings;  // of its energy, each with its place
+    std::vector<std::string> warnings;  // of its energy and its physics, each with its place
     bool valid() const { return complaints.empty(); }
 };
 
@@ -99,6 +100,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         out.toml = effective_toml(given);
         if (const std::string falls = unbounded_below(given.energy); !falls.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
+        for (const std::string& note : physics_notes(given)) out.warnings.push_back(valid_utf8(note));
         const Case c = chosen_case(given, options, out);
         out.chosen = chosen(c);
         engine_for(c);

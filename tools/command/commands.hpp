@@ -51,7 +51,8 @@ std::filesystem::path result_path(const RunOptions& options, const Case& c);
 // Names and formulas of the terms of the energy, for pictures: all listed ones, and those that a case adds.
 std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bending);
 
-// Refuses, before anything is computed, a name that no result can have. Throws CaseError.
+// Refuses, before anything is computed, a name that no result can have, or a folder that is not there. Throws
+// CaseError.
 void check_output(const std::filesystem::path& file);
 // And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another case.
 void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite);

@@ -177,7 +177,8 @@ void check(const ConfirmOptions& options) {
     std::error_code error;
     if (!fs::exists(options.scan, error))
         throw CaseError(fmt::format("{}: {}", options.scan, error ? error.message() : "no such file"));
-    if (!is_scan(options.scan)) throw CaseError(options.scan + ": is not a result of tubule scan");
+    if (!is_scan(options.scan))
+        throw CaseError(options.scan + ": is not a result of tubule scan, which is made with tubule scan FILE");
 }
 
 // All cases are checked before anything is run.

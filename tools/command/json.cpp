@@ -18,10 +18,10 @@ std::string json(const std::string& text) {
     }
     return quoted + '"';
 }
-// The shortest that reads back the same, with a point or exponent, so that 1.0 stays a floating-point number.
+// The shortest that reads back the same, with a point or exponent, so that 1.0 stays a floating-point number. -0 is 0.
 std::string json(double value) {
     if (!std::isfinite(value)) return "null";
-    const std::string digits = fmt::format("{}", value);
+    const std::string digits = fmt::format("{}", value + 0.0);
     return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
 }
 std::string json(std::int64_t value) {

@@ -1,6 +1,7 @@
 #include "tools/command/program.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
@@ -8,8 +9,11 @@
 #include <exception>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/parallel.hpp"
 #include "tools/command/build_info.hpp"
@@ -29,6 +33,40 @@ std::string version() {
     return text;
 }
 
+// `tubule help COMMAND` is `tubule COMMAND --help`.
+std::vector<const char*> arguments_of(int argc, char** argv) {
+    std::vector<const char*> arguments(argv, argv + argc);
+    if (argc < 2 || std::string_view(argv[1]) != "help") return arguments;
+    arguments.erase(arguments.begin() + 1);
+    arguments.push_back("--help");
+    return arguments;
+}
+
+// What may have been meant by a word that the command does not know; else empty.
+std::string meant_by(const std::string& word, const CLI::App& command) {
+    std::vector<std::string> names;
+    if (word.starts_with("-"))
+        for (const CLI::Option* option : command.get_options())
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    else
+        for (const CLI::App* one : command.get_subcommands({})) names.push_back(one->get_name());
+    if (const auto near = near_miss(word, names)) return fmt::format("; did you mean '{}'?", *near);
+    if (!names.empty() && word.ends_with(".toml")) return fmt::format("; to run a case: tubule run {}", word);
+    if (!names.empty() && word.ends_with(".hdf")) return fmt::format("; to look at a result: tubule show {}", word);
+    return "";
+}
+
+// Words that nothing asked for, in the order in which they were given.
+std::string unexpected_words(const CLI::App& app) {
+    const CLI::App* command = &app;
+    while (command->remaining().empty() && !command->get_subcommands().empty())
+        command = command->get_subcommands().front();
+    const std::string name = command == &app ? "tubule" : "tubule " + command->get_name();
+    const std::vector<std::string> words = command->remaining();
+    return fmt::format("{}: not expected: {}{}\nRun `{} --help` for more information.\n", name, fmt::join(words, " "),
+                       words.empty() ? "" : meant_by(words.front(), *command), name);
+}
+
 // The exit status.
 int run(int argc, char** argv) {
     CLI::App app("Membranes as fluid deformable surfaces whose bending energy is a function of H and K.", "tubule");
@@ -43,7 +81,11 @@ int run(int argc, char** argv) {
     // Last, since subcommands would inherit it.
     end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {
-        app.parse(argc, argv);
+        const std::vector<const char*> arguments = arguments_of(argc, argv);
+        app.parse(static_cast<int>(arguments.size()), arguments.data());
+    } catch (const CLI::ExtrasError&) {
+        put_words(stderr, unexpected_words(app));
+        return 2;
     } catch (const CLI::ParseError& error) {  // --help, too
         std::ostringstream out, complaint;
         const bool answers = app.exit(error, out, complaint) == 0;

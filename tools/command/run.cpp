@@ -35,6 +35,7 @@
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
 #include "tools/run/model_advice.hpp"
+#include "tools/run/physics_notes.hpp"
 
 namespace tubule {
 
@@ -48,6 +49,11 @@ void check_output(const std::filesystem::path& file) {
         throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
                                     std::filesystem::path(file).replace_extension().string()));
     std::error_code error;
+    const std::filesystem::path folder = file.parent_path();
+    if (!folder.empty() && std::filesystem::status(folder, error).type() == std::filesystem::file_type::not_found)
+        throw CaseError(
+            fmt::format("{}: cannot be written: there is no folder {}; make it, or choose another file with -o",
+                        file.string(), folder.string()));
     if (std::filesystem::status(file, error).type() == std::filesystem::file_type::none)
         throw CaseError(fmt::format("{}: cannot be written: {}", file.string(), error.message()));
 }
@@ -89,15 +95,18 @@ namespace {
 class Recorder : public RunObserver {
 public:
     // `from`: the state that the run resumes from, or none.
-    Recorder(const Case& c, ResultWriter& writer, bool quiet, const Record* from)
+    Recorder(const Case& c, ResultWriter& writer, const std::vector<std::string>& series, bool quiet,
+             const Record* from)
         : case_(c),
           writer_(writer),
+          defect_column_(static_cast<std::size_t>(std::ranges::find(series, "identity_defect") - series.begin())),
           quiet_(quiet),
           keeps_state_(from && !is_of_coarser_run(*from)),
           progress_(from ? from->time : 0, c.time.end, {.quiet = quiet}) {}
     void row(std::span<const double> values) override {
         writer_.row(values);
         reached_ = values.front();
+        if (defect_column_ < values.size()) defect_ = std::max(defect_, std::abs(values[defect_column_]));
     }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
@@ -106,6 +115,7 @@ public:
     }
     void discard() override {
         keeps_state_ = false;
+        defect_ = 0;
         writer_.discard();
     }
     void next_run(int number, int of) override { progress_.next_run(number, of); }
@@ -118,10 +128,14 @@ public:
 
     // The time of the last row, of this run.
     std::optional<double> reached() const { return reached_; }
+    // The largest identity_defect until then.
+    double defect() const { return defect_; }
 
 private:
     const Case& case_;
     ResultWriter& writer_;
+    std::size_t defect_column_;
+    double defect_ = 0;
     bool quiet_;
     bool keeps_state_;  // no coarser run that is made again beside this one may replace it
     Progress progress_;
@@ -295,15 +309,19 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         return options.expect ? compare(c, file) : 0;
     }
     if (!options.quiet && !result->restart)
+        for (const std::string& note : physics_notes(c)) say(stderr, "{}\n", note);
+    if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
     if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
     watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     Ended ended;
     {
-        Recorder recorder(c, result->writer, options.quiet || c.equilibrium,
+        Recorder recorder(c, result->writer, engine->series_names(), options.quiet || c.equilibrium,
                           result->restart ? &result->restart->record : nullptr);
         ended = run_to_its_end(c, *engine, *result, recorder);
+        if (const std::string off = balance_warning(c, ended.summary, recorder.defect()); !off.empty())
+            ended.summary.warnings.push_back(off);
     }
     const RunSummary& summary = ended.summary;
     const double seconds = watch.seconds();

@@ -115,7 +115,7 @@ void add_summary(Text& out, const Result& result, const std::string& file) {
     if (!times.empty()) {
         add(out, "\nlast row\n");
         for (const std::string& name : result.series_names)
-            line("  " + name, fmt::format("{:.12g}", result.series.at(name).back()));
+            line("  " + name, fmt::format("{:.12g}", plain(result.series.at(name).back())));
     }
     add_meshes(out, result.meshes);
     add_frames(out, result.frames);

@@ -9,6 +9,7 @@
 #include "axisym/equilibrium/spectrum.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
+#include "tools/command/text.hpp"
 
 namespace tubule {
 
@@ -29,8 +30,7 @@ std::string words_of(const std::vector<Found>& found) {
     for (const auto& [model, spectrum] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words(model));
         if (spectrum.at_rest())
-            out +=
-                fmt::format("  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda + 0.0);
+            add(out, "  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
@@ -38,7 +38,7 @@ std::string words_of(const std::vector<Found>& found) {
         const axisym::ModeRates* fastest = nullptr;
         for (const axisym::ModeRates& mode : spectrum.modes) {
             out += fmt::format("{:>5}", mode.m);
-            for (const double rate : mode.rates) out += fmt::format(" {:>14.7g}", rate);
+            for (const double rate : mode.rates) add(out, " {:>14.7g}", rate);
             out += mode.stable() ? "\n" : "  grows\n";
             if (!mode.rates.empty() && (!fastest || mode.rates[0] > fastest->rates[0])) fastest = &mode;
         }
@@ -60,7 +60,7 @@ std::string csv_of(const std::vector<Found>& found) {
     for (const auto& [model, spectrum] : found)
         for (const axisym::ModeRates& mode : spectrum.modes)
             for (std::size_t i = 0; i < mode.rates.size(); ++i)
-                out += fmt::format("{},{},{},{:.17g}\n", name(model), mode.m, i, mode.rates[i]);
+                add(out, "{},{},{},{:.17g}\n", name(model), mode.m, i, mode.rates[i]);
     return out;
 }
 
@@ -75,7 +75,7 @@ std::string json_of(const std::vector<Found>& found) {
             "{}\n{{\"model\": {}, \"at_rest\": {}, \"tension\": {}, \"pressure\": {}, \"estimated_error\": {}, "
             "\"elements\": {}, \"modes\": [{}]}}",
             models.empty() ? "" : ",", json(name(model)), spectrum.at_rest() ? "true" : "false", json(spectrum.sigma),
-            json(-spectrum.lambda + 0.0), json(spectrum.estimated_error), spectrum.elements, modes);
+            json(-spectrum.lambda), json(spectrum.estimated_error), spectrum.elements, modes);
     }
     return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
 }

@@ -249,6 +249,11 @@ std::string ill_posed_words(const UniformTube& tube) {
 
 // ---- words
 
+// The time in which a wave grows or decays by the factor e; of a neutral one none.
+std::string e_fold(double rate) {
+    return rate == 0 ? "-" : fmt::format("{:.6g}", 1 / std::abs(rate));
+}
+
 void add_rows(Text& out, const ModelReport& report, double end) {
     const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.law.inertia != 0,
                factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; });
@@ -260,9 +265,9 @@ void add_rows(Text& out, const ModelReport& report, double end) {
         if (row.n) add(out, "{:>4} ", *row.n);
         add(out, "{:>12.6g} {:>14.7g}", row.q, s);
         if (swings) add(out, " {:>14.7g}", row.growth.frequency());
-        add(out, " {:>12.6g}", 1 / std::abs(s));
+        add(out, " {:>12}", e_fold(s));
         if (row.factor) add(out, " {:>14.6g}", *row.factor);
-        add(out, "{}\n", row.q == 0 && row.m == 0 ? "  the radius" : s > 0 ? "  grows" : "");
+        add(out, "{}\n", row.q == 0 && row.m == 0 ? "  the radius" : s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
     }
 }
 
@@ -272,7 +277,9 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
         theory::reduced_tension(report.tube));
     const auto grown = instabilities(report.tube, last);
     const bool ill = theory::ill_posed_along(report.tube) || theory::ill_posed_around(report.tube);
-    add(out, "  beyond the threshold of: {}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")));
+    const bool fits = std::ranges::any_of(report.rows, [](const WaveRow& row) { return row.growth.rate() > 0; });
+    add(out, "  beyond the threshold of: {}{}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")),
+        grown.empty() || fits ? "" : " (by other waves than these)");
     if (const double rate = radius_rate_of(report); rate != 0)
         add(out, "  the radius changes at the rate {:.6g}{}: growth rates hold at this instant only\n", rate,
             report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end)
@@ -289,7 +296,9 @@ void add_model(Text& out, const ModelReport& report, int last, double end) {
             report.fastest_fitting->m, report.fastest_fitting->rate);
     if (const WaveRow* row = fastest_row(report)) {
         const double s = row->growth.rate();
-        if (s <= 0) add(out, "  none of these grows; slowest to decay: {}, rate {:.7g}\n", name_of(*row), s);
+        if (s <= 0)
+            add(out, "  none of these grows; {}: {}, rate {:.7g}\n", s < 0 ? "slowest to decay" : "neutral",
+                name_of(*row), s);
     }
     for (std::size_t m = 0; m < report.fastest.size(); ++m)
         if (const auto& fastest = report.fastest[m])
@@ -486,7 +495,7 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
             } else {
                 add(out, "{:>5} {:>14.7g}", l, s);
                 if (swings) add(out, " {:>14.7g}", found.frequency());
-                add(out, " {:>12.6g}{}\n", 1 / std::abs(s), s > 0 ? "  grows" : "");
+                add(out, " {:>12}{}\n", e_fold(s), s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
             }
             list += fmt::format("{}\n  {{\"model\": {}, \"l\": {}, \"rate\": {}, \"roots\": {}}}",
                                 list.empty() ? "" : ",", json(name(model)), l, json(s), json_of(found.roots));

@@ -19,10 +19,19 @@ namespace tubule {
 
 using Text = fmt::memory_buffer;
 
-// Appends a formatted piece to a Text or a string.
+// As people read it: -0 is 0.
+inline double plain(double x) {
+    return x + 0.0;
+}
+template <class T>
+const T& plain(const T& x) {
+    return x;
+}
+
+// Appends a formatted piece to a Text or a string, numbers as above.
 template <class Out, class... Args>
 void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+    fmt::vformat_to(std::back_inserter(out), format, fmt::make_format_args(plain(args)...));
 }
 
 // The words of an error, for people: those of the standard library are none.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <stdexcept>
 
 #include "common/case/read.hpp"
@@ -11,6 +12,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
+#include "tools/run/physics_notes.hpp"
 
 namespace tubule {
 namespace {
@@ -104,7 +106,12 @@ Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
         writer = ResultWriter::create(*options.output, result.case_text, result.about, result.series_names);
     }
     Memory memory(result, options, writer);
-    const RunSummary summary = run_to_its_end(c, *engine, result, memory);
+    RunSummary summary = run_to_its_end(c, *engine, result, memory);
+    if (const auto series = result.series.find("identity_defect"); series != result.series.end()) {
+        double defect = 0;
+        for (const double one : series->second) defect = std::max(defect, std::abs(one));
+        if (std::string off = balance_warning(c, summary, defect); !off.empty()) summary.warnings.push_back(off);
+    }
     const About end = about_end(c, summary, watch.seconds());
     result.about.insert(result.about.end(), end.begin(), end.end());
     if (writer && writer->began()) writer->finish(end);

@@ -41,6 +41,32 @@ struct Worst {
     Eigen::Vector3d at = Eigen::Vector3d::Zero();
 };
 
+std::string place_of(const Eigen::Vector3d& x) {
+    return fmt::format("r = {:.4g}, z = {:.4g}", std::hypot(x.x(), x.y()), x.z());
+}
+
+// A formula that has no value somewhere says nothing about the symbol.
+std::optional<CaseError> formula_without_value(const Case& c, const surface3d::StartMesh& start) {
+    const std::string key = key_of_formula(c.energy);
+    if (key == "energy") return std::nullopt;
+    DensityDomain domain(c.energy);
+    for (int i = 0; i < start.mesh.size() && domain.restricted(); ++i)
+        domain.look(c.energy.H0, start.exact->H[i], start.exact->K[i], i);
+    const FormulaDomain::Margin margin = domain.margin();
+    if (margin.is_small())
+        return not_defined(c, margin, place_of(start.mesh.nodes[static_cast<std::size_t>(margin.place)]));
+    for (int i = 0; i < start.mesh.size(); ++i) {
+        const double H = start.exact->H[i], K = start.exact->K[i];
+        const CurvatureJet<double> f = density(c.energy, H, K);
+        if (!std::isfinite(f.f + f.H + f.K + f.HH + f.HK + f.KK))
+            return complaint(c, key,
+                             fmt::format("must be finite on the start, but at {}, where H = {:.4g} and K = {:.4g}, it "
+                                         "or a derivative of it overflows",
+                                         place_of(start.mesh.nodes[i]), H, K));
+    }
+    return std::nullopt;
+}
+
 Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
     Worst worst;
     for (int i = 0; i < start.mesh.size(); ++i) {
@@ -56,7 +82,7 @@ Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
 }  // namespace
 
 CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const std::string& why) {
-    const std::string key = key_of_ill_posed(c.energy);
+    const std::string key = key_of_ill_posed(c);
     return complaint(c, key,
                      fmt::format("makes the start ill-posed, {}: {}; bring {} nearer to 0, or make energy.k20 larger",
                                  outcome, why, key == "energy" ? "its moduli" : "it"));
@@ -69,12 +95,13 @@ std::optional<CaseError> ill_posed_start(const Case& c) {
     shape.surface = {};
     shape.surface.recovery = Recovery::exact;
     try {
-        const Worst worst = worst_of(c, surface3d::Start(shape).mesh(triangles, order));
+        const surface3d::StartMesh start = surface3d::Start(shape).mesh(triangles, order);
+        if (auto without = formula_without_value(c, start)) return without;
+        const Worst worst = worst_of(c, start);
         if (!(worst.part < -certain)) return std::nullopt;
-        return ill_posed_complaint(
-            c, "and nothing is run",
-            fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 is {:.3g} at r = {:.4g}, z = {:.4g}",
-                        worst.symbol, std::hypot(worst.at.x(), worst.at.y()), worst.at.z()));
+        return ill_posed_complaint(c, "and nothing is run",
+                                   fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 is {:.3g} at {}",
+                                               worst.symbol, place_of(worst.at)));
     } catch (const std::exception&) {  // the start cannot be meshed: its run says so
         return std::nullopt;
     }

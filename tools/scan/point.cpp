@@ -198,7 +198,6 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
 PointResult unknown_point(std::size_t point) {
     PointResult p;
     p.point = point;
-    p.measures.fill(unknown);
     return p;
 }
 
@@ -206,7 +205,6 @@ PointResult refused_point(const std::string& message) {
     PointResult p;
     p.outcome = Outcome::failed;
     p.stop = refused_word;
-    p.measures.fill(unknown);
     p.message = message;
     return p;
 }

@@ -44,9 +44,10 @@ struct PointResult {
     Outcome outcome = Outcome::not_run;
     int stop = 0;                                             // of stop_words()
     double value = std::numeric_limits<double>::quiet_NaN();  // between points of the grid: of the axis' key
-    std::array<double, n_measures> measures{};
+    std::array<double, n_measures> measures;
     std::string message;
 
+    PointResult() { measures.fill(std::numeric_limits<double>::quiet_NaN()); }
     double& operator[](Measure m) { return measures[static_cast<std::size_t>(m)]; }
     double operator[](Measure m) const { return measures[static_cast<std::size_t>(m)]; }
 };

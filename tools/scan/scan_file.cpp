@@ -351,10 +351,7 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
         points[i].message = messages[i];
     }
     for (std::size_t m = 0; m < n_measures; ++m) {
-        if (!has(group, measure_names[m])) {  // of an earlier version
-            for (PointResult& p : points) p.measures[m] = std::numeric_limits<double>::quiet_NaN();
-            continue;
-        }
+        if (!has(group, measure_names[m])) continue;  // of an earlier version
         const auto column = get_array(group, measure_names[m]).data;
         if (column.size() != count) throw std::runtime_error("/points does not have the shape of /axes");
         for (std::size_t i = 0; i < count; ++i) points[i].measures[m] = column[i];

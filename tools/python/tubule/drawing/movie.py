@@ -12,11 +12,12 @@ from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import flow, raster
 from .colours import Colours, colour_scale, curvature_colours, draw_bar
 from .command_line import Unavailable, say
-from .labels import power, symbol
+from .labels import number, power, symbol
 from .results import BadInput
 from .style import draw_scale_bar, line_colours, time_text
 from .surfaces import node_areas
@@ -142,6 +143,8 @@ class Stage:
             return
         axes = self.figure.add_axes([0.66, 0.17, 0.31, 0.68])
         axes.plot(series[key], series["energy"], color=line_colours(1)[0])
+        axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))  # few: numbers of small times are long
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         axes.set(xlabel=symbol(self.name).replace("_", " ") if parameter else "time t", ylabel="energy E")
         (self.dot,) = axes.plot([], [], "o", color="C3", markersize=6)
         self.energy = np.asarray(series[key]), np.asarray(series["energy"])
