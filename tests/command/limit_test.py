@@ -6,6 +6,7 @@ The times are those that the user asked for, with generous room for slow machine
 takes many times longer."""
 import resource
 import signal
+import subprocess
 import time
 import unittest
 
@@ -49,6 +50,24 @@ area = 14.4
 volume = 0.0024
 """
 BRANCH = CAPSULE + 'modes = 2\n[equilibrium.branch]\nvary = "energy.k42"\nto = 0.0\nstep = 0.001\n'
+
+
+# 80 triangles, and a shape without symmetry whose trial runs take seconds.
+FEW = """tier = "surface3d"
+energy.k20 = 1.0
+model.kind = "stokes"
+shape = {kind = "ellipsoid", a = 1.0, b = 0.9, c = 1.3}
+accuracy.energy = 0.1
+discretisation = {elements = 80, order = 3}
+time.end = 0.01
+"""
+ROUGH = """tier = "surface3d"
+energy.k20 = 1.0
+model.kind = "auto"
+shape = {kind = "sphere", radius = 1.0, mode = [{amplitude = 0.3, l = 4, m = 3}]}
+accuracy.energy = 0.01
+time.end = 1e6
+"""
 
 
 class TimeLimit(ProgramTest):
@@ -127,6 +146,26 @@ class CtrlC(ProgramTest):
 
 
 class Memory(ProgramTest):
+    def with_memory(self, mib, *arguments):
+        with self.start(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (mib << 20,) * 2)) as process:
+            try:
+                out, err = process.communicate(timeout=60)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
+        return process.returncode, out + err
+
+    def test_little_of_it_ends_the_program(self):
+        # OpenBLAS asks for 128 MB, forever if there are none; its threads do so before the program begins.
+        case = self.write("small.toml", FEW)
+        self.assertEqual(self.with_memory(140, "--version")[0], 0)
+        for mib in range(100, 400, 30):
+            with self.subTest(mib=mib):
+                status, words = self.with_memory(mib, "run", case, "--quiet", "--overwrite")
+                self.assertIn(status, (0, 4), words)
+                self.assertIn("memory" if status == 4 else "", words)
+        self.assertEqual(status, 0)
+
     def test_a_mesh_that_does_not_fit_is_refused(self):
         case = self.write("large.toml", SURFACE)
         resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.RLIM_INFINITY))
@@ -140,7 +179,7 @@ class Memory(ProgramTest):
 
     def test_elements_that_rounding_asks_for_are_bounded(self):
         # Waves of .1 on a radius of 2e9 are lost in rounding, which no mesh resolves: 4000 elements of a cell at most.
-        self.tubule("run", self.case, "--set", "shape.radius=2147483648", "--set", "time.limit=1", status=4)
+        self.tubule("run", self.case, "--set", "shape.radius=2147483648", "--set", "time.limit=60", status=4)
         self.assertEqual(about(self.result)["stop"], "resolution-lost")
         self.assertLessEqual(about(self.result)["elements"], 4000)
 

@@ -64,6 +64,11 @@ TEST(Pause, workThatNothingCanEndIsNotBegunWhenItWouldGoFarBeyondTheLimit) {
     EXPECT_THROW(check_pause(110), Paused);
 }
 
+TEST(Memory, whatCannotBeHadIsFoundBefore) {
+    EXPECT_TRUE(can_allocate(1 << 20));
+    EXPECT_FALSE(can_allocate(std::size_t{1} << 60));
+}
+
 TEST(Memory, saysWhatIsTooLargeAndWhatToTry) {
     EXPECT_GT(free_memory(), 0);
     EXPECT_NO_THROW(require_memory(1e6, "a vector"));
