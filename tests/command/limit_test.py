@@ -96,6 +96,13 @@ class TimeLimit(ProgramTest):
         self.assertNotEqual(process.returncode, 0)
         self.assertLess(time.monotonic() - begin, LIMIT + ROOM)
 
+    def test_in_trial_runs_that_choose_a_model(self):
+        out, err = self.tubule("run", self.write("rough.toml", ROUGH), "--set", "time.limit=0.01", status=5)
+        self.assertEqual((out + err).removeprefix(f"{self.folder}/"), "rough.toml: reached the time limit of 0.01 s (time.limit) before the first state was "
+                         "computed, in trial runs that choose the model: name it in model.kind\n")  # fmt: skip
+        self.assertIn("expected: unknown: trial runs that choose the model reach the time limit of 0.01 s (time.limit)",
+                      self.tubule("check", "rough.toml", "--set", "time.limit=0.01")[1])  # fmt: skip
+
     def test_in_a_descent_to_an_equilibrium(self):
         self.ends_in_time("equilibrium", EQUILIBRIUM)
 
@@ -111,7 +118,7 @@ class TimeLimit(ProgramTest):
 
 
 class CtrlC(ProgramTest):
-    def ends_when_interrupted(self, *command, after=1.0):
+    def ends_when_interrupted(self, *command, after=1.0, words="interrupted"):
         process = self.start(*command)
         self.addCleanup(process.kill)
         time.sleep(after)
@@ -121,7 +128,7 @@ class CtrlC(ProgramTest):
         out, err = process.communicate()
         self.assertLess(time.monotonic() - begin, ROOM)
         self.assertEqual(process.returncode, 130, out + err)
-        self.assertIn("interrupted", out + err)
+        self.assertIn(words, out + err)
 
     def test_in_an_equilibrium(self):
         self.ends_when_interrupted("equilibrium", self.write("cell.toml", EQUILIBRIUM), "--set", "equilibrium.volume=1e-9")

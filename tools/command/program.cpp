@@ -15,6 +15,7 @@
 #include "common/solve/memory.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/parallel.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/describe.hpp"
@@ -94,6 +95,9 @@ int program(int argc, char** argv) {
     } catch (const OutputError& error) {
         say(stderr, "tubule: {}\n", error.what());
         return 2;
+    } catch (const Paused& pause) {
+        say(stderr, "tubule: {}\n", name(pause.reason));
+        return exit_code(pause.reason);
     } catch (const std::exception& error) {
         say(stderr, "tubule: {}\n", explanation(error));
         return 4;

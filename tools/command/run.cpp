@@ -287,6 +287,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
             if (e.time) c.time.output.push_back(*e.time);
 
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
+    watch.discount(-chosen.seconds);
     const auto engine = engine_for(c);
     const double before = watch.seconds();
     std::optional<Opened> result = open_result(chosen, *engine, file, options.resume);
@@ -294,11 +295,11 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
+    if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
+    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
-    if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
-    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     Ended ended;
     {
         Recorder recorder(c, result->writer, options.quiet || c.equilibrium,
@@ -359,6 +360,7 @@ namespace {
 struct Job {
     ChosenCase chosen;
     std::filesystem::path file;
+    std::optional<Paused> paused;  // while its model was chosen
 };
 
 // What is bad input is found before trial runs; a result that goes on keeps its model.
@@ -383,7 +385,7 @@ Job job_of_result(const std::string& path, const std::vector<std::string>& sets,
     if (!options.output.empty())
         throw CaseError(fmt::format("-o must be absent: {} itself goes on; copy it to keep it as it is", path));
     try {
-        return {{case_of_result(read_result(path), path, sets), ""}, path};
+        return {{case_of_result(read_result(path), path, sets), ""}, path, {}};
     } catch (const CaseError&) {
         throw;
     } catch (const std::runtime_error& error) {
@@ -397,9 +399,13 @@ Job job_of(const std::string& path, const RunOptions& options) {
     if (is_hdf5(path)) return job_of_result(path, sets, options);
     const Case c = read_case(path, sets);
     const auto file = result_path(options, c);
-    ChosenCase chosen = with_model_of_run(c, file, options);
-    check_replaced(chosen.c, file, options.resume || options.overwrite);
-    return {std::move(chosen), file};
+    try {
+        ChosenCase chosen = with_model_of_run(c, file, options);
+        check_replaced(chosen.c, file, options.resume || options.overwrite);
+        return {std::move(chosen), file, {}};
+    } catch (const Paused& pause) {
+        return {{c, ""}, file, pause};
+    }
 }
 
 }  // namespace
@@ -407,6 +413,7 @@ Job job_of(const std::string& path, const RunOptions& options) {
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
         throw CaseError("-o names one result file, but there are several cases");
+    catch_interrupts();
     std::vector<Job> jobs;  // all are read before any is run: bad input leaves nothing half done
     std::set<std::filesystem::path> files;
     for (const std::string& path : options.cases) {
@@ -418,17 +425,20 @@ int run_cases(const RunOptions& options) {
         if (!files.insert(jobs.back().file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, jobs.back().file.string()));
     }
-    catch_interrupts();
     int status = 0;
-    for (const auto& [chosen, file] : jobs) {
+    for (const auto& [chosen, file, paused] : jobs) {
         const Case& c = chosen.c;
         int one = 0;
         try {
+            if (paused) throw Paused(*paused);
             one = run_case(chosen, file, options);
         } catch (const CaseError&) {
             throw;
         } catch (const Paused& pause) {  // before there was a result to write to
-            say(stderr, "{}: {}\n", c.path, paused_at_start(pause).stop.message);
+            say(stderr, "{}: {}{}\n", c.path, paused_at_start(pause).stop.message,
+                paused && pause.reason == Stop::time_limit
+                    ? ", in trial runs that choose the model: name it in model.kind"
+                    : "");
             one = exit_code(pause.reason);
         } catch (const std::exception& error) {
             say(stderr, "{}: {}\n", c.path, explanation(error));

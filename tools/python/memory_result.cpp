@@ -11,6 +11,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
+#include "tools/run/forecast.hpp"
 
 namespace tubule {
 namespace {
@@ -88,9 +89,9 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 }  // namespace
 
 Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
-    const ChosenCase chosen = with_chosen_model(given);  // trial runs do not count for time.limit
+    PauseWatch watch(given.time.limit, options.interrupted);  // for trial runs and the start, too
+    const ChosenCase chosen = with_chosen_model(given);
     const Case& c = chosen.c;
-    PauseWatch watch(c.time.limit, options.interrupted);
     const auto engine = engine_for(c);
     Result result;
     result.case_text = {c.text, c.sets};

@@ -4,10 +4,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 
-#include "common/run/run_clock.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/progress.hpp"
 #include "surface3d/run/motion_forecast.hpp"
 #include "tools/run/engine.hpp"
@@ -29,15 +30,17 @@ Forecast by_its_beginning(Case c) {
     c.time.limit = pilot_limit;
     const auto engine = engine_for(c);
     Pilot pilot;
-    const RunClock clock(c, pilot);
+    const auto begin = std::chrono::steady_clock::now();
     const std::clock_t before = std::clock();
     const RunSummary s = engine->run(pilot);
+    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    pause_if_due();
     Forecast out;
     if (s.elements > 0) out.resolution = fmt::format("{} elements", s.elements);
     out.bytes = memory_in_use();
     if (s.stop.reason == Stop::ill_posed && !pilot.moved()) out.ill_posed = s.stop.message;
     // Of a busy machine the time of the processors, else, where threads share the work, that of the clock.
-    const double seconds = std::min(clock.seconds(), static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
+    const double seconds = std::min(wall, static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
     if (s.stop.reason != Stop::time_limit) {
         out.seconds = seconds;
         if (pilot.moved()) out.steps = pilot.steps();

@@ -1,6 +1,7 @@
 // What a case is expected to take, before it runs.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "common/case/case.hpp"
@@ -9,7 +10,7 @@
 namespace tubule {
 
 // Takes a few seconds at most: of surfaces in motion a pilot run (surface3d/run/motion_forecast), of all else the first
-// seconds of the run itself. Throws as an engine and its run.
+// seconds of the run itself. Throws as an engine and its run; Paused where a PauseWatch of this thread ends it.
 Forecast forecast(const Case& c);
 
 // "about 180 triangles of order 4; about 41 steps, 5 s, 120 MB", and whether finer runs may follow
