@@ -139,6 +139,25 @@ class CtrlC(ProgramTest):
     def test_in_growth_rates(self):
         self.ends_when_interrupted("stability", self.case, "--waves", "10000", "--modes", "100", "--model", "all")
 
+    def test_in_trial_runs_that_choose_a_model(self):
+        words = "rough.toml: a signal ended the run before the first state was computed\n"
+        self.ends_when_interrupted("run", self.write("rough.toml", ROUGH), words=words)
+        self.ends_when_interrupted("check", self.write("rough.toml", ROUGH))
+
+    def test_in_values_that_extend_a_scan(self):
+        case = self.write("scanned.toml", QUICK)
+        self.tubule("scan", case, "--over", "energy.k20=0.5,0.6", "-o", "scan.hdf", "--quiet")
+        self.ends_when_interrupted("scan", "scan.hdf", "--extend", "--over", "energy.k20=1:2:500000", after=3)
+
+    def test_one_that_is_ignored_from_the_beginning_stays_ignored(self):
+        # As a shell does for background jobs of a script.
+        with self.start("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=3",
+                        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as process:  # fmt: skip
+            time.sleep(1)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate()
+        self.assertEqual(process.returncode, 5, out + err)
+
     def test_a_second_one_ends_at_once_and_leaves_a_file_that_opens(self):
         process = self.start("run", self.write("pancake.toml", PANCAKE))
         self.addCleanup(process.kill)
@@ -189,6 +208,29 @@ class Memory(ProgramTest):
         self.tubule("run", self.case, "--set", "shape.radius=2147483648", "--set", "time.limit=60", status=4)
         self.assertEqual(about(self.result)["stop"], "resolution-lost")
         self.assertLessEqual(about(self.result)["elements"], 4000)
+
+
+class Cost(ProgramTest):
+    def test_of_many_frames_is_told_by_the_first(self):
+        err = self.tubule("run", self.case, "--set", 'time.output="0:0.2:20000"', "--set", "time.limit=0.2", status=5)[1]
+        self.assertRegex(err, r"case.toml: time.output asks for 20001 frames: a result of about \d+ MB, which takes 17 s and \d+ MB of memory\n")
+
+    def test_of_many_triangles_at_rest_is_told_before(self):
+        rest = 'tier = "surface3d"\nenergy.k20 = 1.0\nshape = {kind = "sphere", radius = 1.0}\ndiscretisation.elements = 1000000\n'
+        told = r"rest.toml: expected: about 1000000 triangles of order 3; about 1:05, 11000 MB\n"
+        self.assertRegex(self.tubule("check", self.write("rest.toml", rest))[1], told)
+        with self.start("run", self.folder / "rest.toml") as process:
+            self.addCleanup(process.kill)
+            self.assertRegex(process.stderr.readline(), told)
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+            self.assertEqual(process.returncode, 130)
+
+    def test_of_a_million_waves_is_small(self):
+        began = time.monotonic()
+        out, _ = self.tubule("stability", self.case, "--waves", "10000", "--modes", "100", "--csv")
+        self.assertEqual(out.count("\n"), 101 * 10001)  # a header, but no n = 0 of m = 1, a shift
+        self.assertLess(time.monotonic() - began, 60)
 
 
 class NoEquilibrium(ProgramTest):

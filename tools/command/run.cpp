@@ -100,7 +100,11 @@ public:
         reached_ = values.front();
     }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
-    void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
+    void frame(const std::function<Record()>& make) override {
+        const Record record = make();
+        if (const std::string cost = frames_++ == 0 ? cost_of_frames(case_, record) : ""; !cost.empty()) note(cost);
+        writer_.frame(record);
+    }
     void checkpoint(const Record& state) override {
         if (!keeps_state_ || !is_of_coarser_run(state)) writer_.checkpoint(state);
     }
@@ -126,6 +130,7 @@ private:
     bool keeps_state_;  // no coarser run that is made again beside this one may replace it
     Progress progress_;
     std::optional<double> reached_;
+    int frames_ = 0;
 };
 
 bool has_rows(const std::filesystem::path& file) {

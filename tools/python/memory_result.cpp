@@ -18,8 +18,8 @@ namespace {
 
 class Memory : public RunObserver {
 public:
-    Memory(Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
-        : result_(result), options_(options), writer_(writer) {}
+    Memory(const Case& c, Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+        : case_(c), result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
         for (std::size_t i = 0; i < values.size(); ++i) result_.series.at(result_.series_names[i]).push_back(values[i]);
@@ -34,6 +34,8 @@ public:
     }
     void frame(const std::function<Record()>& make) override {
         result_.frames.push_back(make());
+        if (result_.frames.size() == 1)
+            if (const std::string cost = cost_of_frames(case_, result_.frames.back()); !cost.empty()) note(cost);
         if (writer_) writer_->frame(result_.frames.back());
     }
     void checkpoint(const Record& state) override {
@@ -57,6 +59,7 @@ public:
     }
 
 private:
+    const Case& case_;
     Result& result_;
     const MemoryRunOptions& options_;
     std::optional<ResultWriter>& writer_;
@@ -104,7 +107,7 @@ Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
         check_replaced(c, *options.output, options.overwrite);
         writer = ResultWriter::create(*options.output, result.case_text, result.about, result.series_names);
     }
-    Memory memory(result, options, writer);
+    Memory memory(c, result, options, writer);
     const RunSummary summary = run_to_its_end(c, *engine, result, memory);
     const About end = about_end(c, summary, watch.seconds());
     result.about.insert(result.about.end(), end.begin(), end.end());
