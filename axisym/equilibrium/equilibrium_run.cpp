@@ -361,7 +361,7 @@ std::string advice_for(Stop stop) {
 }
 
 // Writes the shape, or those of the branch, and says how it ended.
-StopReport find_shapes(const Task& task, Writer& write, const RunClock& clock) {
+StopReport find_shapes(const Task& task, Writer& write) {
     const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
     if (first.stop != Stop::finished || !task.set) {
         BranchPoint only;
@@ -375,7 +375,7 @@ StopReport find_shapes(const Task& task, Writer& write, const RunClock& clock) {
     BranchSettings settings = task.branch;
     settings.found = [&](const BranchPoint& point) {
         write(point);
-        clock.pause_if_due();
+        pause_if_due();
     };
     const Branch branch = follow_branch(task.problem, first, task.set, settings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
@@ -407,7 +407,7 @@ RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
     Writer write(c, task, observer);
     StopReport stop;
     try {
-        stop = find_shapes(task, write, clock);
+        stop = find_shapes(task, write);
     } catch (const Paused& pause) {
         stop = pause_report(pause, 0);
         stop.message += " before all shapes were found";

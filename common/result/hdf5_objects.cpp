@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <new>
 #include <stdexcept>
 
 #include "common/result/durable_io.hpp"
+#include "common/solve/memory.hpp"
 
 namespace tubule::h5 {
 
@@ -31,6 +33,12 @@ std::string name_of(const Name& name) {
     std::string text(static_cast<std::size_t>(length), '\0');
     name(text.data(), text.size() + 1);
     return text;
+}
+
+// For what HDF5 keeps of an open file, and so much more.
+void require_room(std::size_t bytes) {
+    constexpr std::size_t room = 16 << 20;
+    if (!can_allocate(room + bytes)) throw std::bad_alloc();
 }
 
 H5_index_t index_of(unsigned order) {
@@ -80,6 +88,7 @@ Handle space(const std::vector<std::size_t>& shape) {
 // ---- writing
 
 Handle make_image(std::size_t step) {
+    require_room(step);
     const auto access = property_list(H5P_FILE_ACCESS);
     H5Pset_fapl_core(access, step, false);
     const char* name = "image of a tubule result";  // appears nowhere
@@ -156,6 +165,7 @@ Handle open_file(const std::filesystem::path& file) {
             "is a case file, not a result: run it first (tubule run {}; tubule scan for a scan), then give its result, "
             "{}",
             file.string(), std::filesystem::path(file).filename().replace_extension(".hdf").string()));
+    require_room(0);
     while (true) {
         const durable::File looked_at(file, O_RDONLY);
         require_whole(looked_at.descriptor(), file);
@@ -173,6 +183,7 @@ Handle open_file(const std::filesystem::path& file) {
 }
 
 Handle open_image(std::span<std::byte> bytes) {
+    require_room(bytes.size());
     const auto access = property_list(H5P_FILE_ACCESS);
     H5Pset_fapl_core(access, bytes.size(), false);
     require(H5Pset_file_image(access, bytes.data(), bytes.size()) >= 0, "read", "a file in memory");

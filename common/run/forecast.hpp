@@ -8,7 +8,6 @@
 
 #include "common/case/case.hpp"
 #include "common/run/run.hpp"
-#include "common/solve/interrupt.hpp"
 
 namespace tubule {
 
@@ -23,7 +22,6 @@ struct Forecast {
 // Counts the steps of a run.
 class Pilot : public RunObserver {
 public:
-    bool interrupted() override { return tubule::interrupted(); }
     void next_run(int number, int of) override { *this = Pilot(number, of); }
     void progress(double time, double, double step) override {
         ++steps_, time_ = time;

@@ -22,10 +22,6 @@ public:
     double seconds() const { return watch_.seconds(); }
     // The run, which has come to `time`, is to pause: the time limit is used up, or the observer interrupts it.
     std::optional<StopReport> find_pause(double time) const;
-    // The same where the caller saves the state: throws Paused.
-    void pause_if_due() const {
-        if (const auto pause = watch_.due()) throw Paused(*pause);
-    }
     // What `run` returns; where it pauses with nothing to go on from, a summary that says so.
     template <class Run>
     auto pausing(Run&& run) const {

@@ -15,12 +15,19 @@ extern "C" void raise_flag(int) {
 
 void catch_interrupts() {
     flag = 0;
-    struct sigaction action {};
+    struct sigaction action {
+    }, before{};
     action.sa_handler = raise_flag;
     action.sa_flags = SA_RESETHAND | SA_RESTART;  // reset: the second signal acts as usual
     sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
+    for (const int number : {SIGINT, SIGTERM}) {
+        sigaction(number, nullptr, &before);
+        if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);
+    }
+}
+
+void set_interrupted(bool raised) {
+    flag = raised;
 }
 
 bool interrupted() {

@@ -3,9 +3,13 @@
 
 namespace tubule {
 
-// From here on the first signal sets the flag; a second one ends the process at once.
+// Lowers the flag; from here on the first signal raises it, and a second one ends the process at once. A signal that
+// the process was begun with as ignored, such as SIGINT of a script's background jobs, stays so.
 void catch_interrupts();
 
 bool interrupted();
+
+// Of a host that handles signals itself: Python.
+void set_interrupted(bool raised);
 
 }  // namespace tubule

@@ -1,6 +1,7 @@
 #include "common/solve/memory.hpp"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -30,6 +31,11 @@ double number_in(const char* file, const std::string& word = "") {
 
 }  // namespace
 
+bool limited_memory() {
+    rlimit limit{};
+    return getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+}
+
 double free_memory() {
     const double machine = 1024 * number_in("/proc/meminfo", "MemAvailable:");
     double group = number_in("/sys/fs/cgroup/memory.max");
@@ -49,6 +55,11 @@ void require_memory(double bytes, const std::string& what) {
         fmt::format("{} would take about {:.2g} GB of memory, but only {:.2g} GB are free: use fewer elements "
                     "(discretisation.elements)",
                     what, bytes / 1e9, there / 1e9));
+}
+
+bool can_allocate(std::size_t bytes) {
+    void* const there = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    return there != MAP_FAILED && munmap(there, bytes) == 0;
 }
 
 void require_factors(double bytes, double multiplications, Eigen::Index size) {

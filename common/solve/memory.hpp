@@ -1,6 +1,7 @@
 // What fits into memory, asked before it is allocated: a system that promises more than it has kills the program later.
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "common/solve/sparse.hpp"
@@ -17,6 +18,13 @@ double free_memory();
 
 // Throws TooLarge if this much is not free; `what` takes it, such as "a surface of 1000000 triangles".
 void require_memory(double bytes, const std::string& what);
+
+// Whether this process has a limit of its own (ulimit -v).
+bool limited_memory();
+
+// Whether as much can be had at once. Asked before libraries that do not live on without it: HDF5 crashes, OpenBLAS
+// asks again, forever.
+bool can_allocate(std::size_t bytes);
 
 // The factors of a matrix of this size: their memory, and the time of the multiplications, during which nothing can be
 // interrupted: also throws Paused if that would go far beyond the time limit (check_pause).

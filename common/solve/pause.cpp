@@ -16,6 +16,7 @@ PauseWatch::PauseWatch(std::optional<double> limit, std::function<bool()> interr
     : limit_(limit),
       interrupted_(std::move(interrupted)),
       outer_(std::exchange(current, this)),
+      before_(outer_ ? outer_->seconds() : 0),
       started_(outer_ ? outer_->started_ : std::chrono::steady_clock::now()) {}
 
 PauseWatch::~PauseWatch() {
@@ -31,20 +32,21 @@ void PauseWatch::discount(double seconds) {
 }
 
 std::optional<Paused> PauseWatch::due() const {
-    if (limit_ && seconds() > *limit_) return Paused{Stop::time_limit, limit_};
+    if (limit_ && seconds() - before_ > *limit_) return Paused{Stop::time_limit, limit_};
     if (interrupted_()) return Paused{Stop::interrupted, limit_};
-    return std::nullopt;
+    return outer_ ? outer_->due() : std::nullopt;
 }
 
 std::optional<Paused> PauseWatch::overdue(double ahead) {
-    const double now = seconds();
+    const double now = seconds() - before_;
     if (limit_ && now + ahead > *limit_ + std::max(patience, ahead > 0 ? 0.05 * *limit_ : 0))
         return Paused{Stop::time_limit, limit_};
-    if (!interrupted_()) return std::nullopt;
-    double never = -1;
-    interrupted_at_.compare_exchange_strong(never, now);
-    if (now + ahead <= interrupted_at_ + patience) return std::nullopt;
-    return Paused{Stop::interrupted, limit_};
+    if (interrupted_()) {
+        double never = -1;
+        interrupted_at_.compare_exchange_strong(never, now);
+        if (now + ahead > interrupted_at_ + patience) return Paused{Stop::interrupted, limit_};
+    }
+    return outer_ && !outer_->told_ ? outer_->overdue(ahead) : std::nullopt;
 }
 
 void check_pause(double ahead) {
@@ -53,6 +55,15 @@ void check_pause(double ahead) {
         current->told_ = true;
         throw Paused(*pause);
     }
+}
+
+bool pause_is_due() {
+    return current && current->due();
+}
+
+void pause_if_due() {
+    if (!current) return;
+    if (const auto pause = current->due()) throw Paused(*pause);
 }
 
 SharedPause::SharedPause() : watch_(current && !current->told_ ? current : nullptr) {}

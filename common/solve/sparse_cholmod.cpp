@@ -69,6 +69,7 @@ constexpr double bytes_per_entry = 14;  // of factors, measured
 class Cholmod : public SparseEngine {
 public:
     explicit Cholmod(Ordering ordering) : ordering_(std::move(ordering)) {
+        prepare_blas(1);
         common_.method[0].ordering = ordering_.empty() ? CHOLMOD_AMD : CHOLMOD_GIVEN;
         common_.final_ll = 1;  // LDL^T, the other choice for little fill, would go through indefinite matrices
         common_.quick_return_if_not_posdef = 1;

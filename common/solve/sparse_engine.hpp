@@ -38,4 +38,8 @@ void require_ordering(const Ordering& ordering, int size);
 // next assembly wants (docs/decisions/linear_algebra.md). A value of OPENBLAS_NUM_THREADS takes precedence.
 void use_one_blas_thread();
 
+// Before a thread calls the BLAS, in loops of so many threads: has OpenBLAS take the memory that these will need, which
+// it keeps; once there is none it would ask again and again, forever. Throws std::bad_alloc.
+void prepare_blas(int threads);
+
 }  // namespace tubule

@@ -389,6 +389,7 @@ template <class Scalar>
 SparseLdlt<Scalar>::SparseLdlt(Ordering ordering, double regularisation)
     : impl_(new Impl(std::move(ordering), regularisation)) {
     use_one_blas_thread();
+    prepare_blas(loop_threads());
 }
 template <class Scalar>
 SparseLdlt<Scalar>::SparseLdlt(SparseLdlt&&) noexcept = default;

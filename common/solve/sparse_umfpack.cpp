@@ -12,6 +12,7 @@ using Matrix = Eigen::SparseMatrix<double>;
 class Umfpack : public SparseEngine {
 public:
     explicit Umfpack(Ordering ordering) : ordering_(std::move(ordering)) {
+        prepare_blas(1);
         umfpack_di_defaults(control_);
         // By itself UMFPACK takes the zero diagonal of a saddle point for a reason to be unsymmetric, which costs.
         control_[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;

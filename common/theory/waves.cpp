@@ -105,8 +105,12 @@ int slope(double, const double* y, double* dy, void* parameters) {
         tube.radius = y[0];
         if (!(tube.radius > 0)) return GSL_EBADFUNC;
         dy[0] = radius_rate_of(motion.law, tube);
-        for (std::size_t k = 0; k < motion.waves.size(); ++k)
-            dy[k + 1] = -stiffness(tube, std::abs(motion.waves[k].m))(motion.q(motion.waves[k]));
+        Stiffness G;  // of all waves of one m, which follow each other where there are many
+        for (std::size_t k = 0; k < motion.waves.size(); ++k) {
+            const int m = std::abs(motion.waves[k].m);
+            if (k == 0 || m != std::abs(motion.waves[k - 1].m)) G = stiffness(tube, m);
+            dy[k + 1] = -G(motion.q(motion.waves[k]));
+        }
         return GSL_SUCCESS;
     }
     const double p0 = -tension(motion, y);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <ctime>
 
-#include "common/solve/interrupt.hpp"
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
@@ -56,9 +55,9 @@ struct PilotRun {
 };
 
 // On so many triangles. What the mesh loses is lost by few triangles only; another one may do.
-PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double tolerance, double until) {
+PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double tolerance) {
     Case c = asked;
-    c.time.limit = until;
+    c.time.limit = pilot_limit;
     c.time.output.clear();
     c.surface.coarsen = false;
     c.surface.scheme = time_scheme(asked);
@@ -94,18 +93,8 @@ bool is_rough(const StartMesh& start) {
     return is_rough(smoothness_of(start.mesh, motion_fields(space, start.mesh, Projection(space, start.mesh)).H));
 }
 
-}  // namespace
-
-bool may_be_long(const Case& c, const Start& start) {
-    const MotionSettings s = first_settings(c, start);
-    if (can_be_repeated(c, start) && is_rough(start.mesh(s.elements, element_order(c)))) return true;
-    const double steps = c.surface.step ? c.time.end / *c.surface.step
-                                        : usual_steps * std::max(1.0, steps_by_tolerance(c, 1e-4, s.tolerance));
-    return steps * s.elements * usual_step > 20;
-}
-
-Forecast forecast_motion(const Case& c, const Start& start) {
-    const PauseWatch watch(limit, interrupted);
+Forecast by_pilot_runs(const Case& c, const Start& start) {
+    const PauseWatch watch(limit, [] { return false; });
     Forecast out;
     try {
         const MotionSettings wanted = first_settings(c, start);
@@ -116,7 +105,7 @@ Forecast forecast_motion(const Case& c, const Start& start) {
         const double tolerance = std::max(wanted.tolerance, pilot_tolerance);
         for (int few = std::min(least_triangles, triangles); !out.steps && few <= 4 * least_triangles; few *= 2) {
             const int own = start.resizable() ? std::min(few, triangles) : triangles;
-            const PilotRun pilot = pilot_run(c, start, own, tolerance, watch.seconds() + pilot_limit);
+            const PilotRun pilot = pilot_run(c, start, own, tolerance);
             if (pilot.useful) {
                 out.steps = pilot.steps * (c.surface.step ? 1 : steps_by_tolerance(c, tolerance, wanted.tolerance));
                 const double per_step = pilot.seconds_per_step * std::pow(1.0 * triangles / own, cost_power);
@@ -128,6 +117,22 @@ Forecast forecast_motion(const Case& c, const Start& start) {
         }
     } catch (const Paused&) {  // the start alone takes long
     }
+    return out;
+}
+
+}  // namespace
+
+bool may_be_long(const Case& c, const Start& start) {
+    const MotionSettings s = first_settings(c, start);
+    if (can_be_repeated(c, start) && is_rough(start.mesh(s.elements, element_order(c)))) return true;
+    const double steps = c.surface.step ? c.time.end / *c.surface.step
+                                        : usual_steps * std::max(1.0, steps_by_tolerance(c, 1e-4, s.tolerance));
+    return steps * s.elements * usual_step > 20;
+}
+
+Forecast forecast_motion(const Case& c, const Start& start) {
+    Forecast out = by_pilot_runs(c, start);
+    pause_if_due();
     return out;
 }
 

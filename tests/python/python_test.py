@@ -200,6 +200,46 @@ print(*ends, *(r.stop for r in tubule.run_many([{TUBE!r}] * 2)))
         done = subprocess.run(["/usr/bin/python3", "-c", script], text=True, capture_output=True, timeout=200)
         self.assertEqual(done.stdout, "interrupted\nfinished\nfinished finished finished\n", done.stderr)
 
+    def test_handlers_of_signals_are_the_callers(self):
+        script = f"""
+import os, signal, sys, threading, time
+sys.path.insert(0, {sys.argv[3]!r})
+import tubule
+
+class Enough(Exception):
+    pass
+
+came = []
+def count(number, frame):
+    came.append(number)
+    if len(came) == 3:
+        raise Enough
+
+def sends(*numbers):
+    def send():
+        for number in numbers:
+            time.sleep(0.5)
+            os.kill(os.getpid(), number)
+    threading.Thread(target=send, daemon=True).start()
+
+signal.signal(signal.SIGINT, count)
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+signal.signal(signal.SIGALRM, count)
+sends(signal.SIGTERM, signal.SIGINT, signal.SIGALRM, signal.SIGALRM)
+for work in (lambda: tubule.run({LONG!r}), lambda: tubule.scan({LONG!r}, {{"energy.k20": [1, 2]}}, jobs=2, to_the_end=True)):
+    try:
+        work()
+    except Enough:
+        print([signal.Signals(number).name for number in came])
+    came.clear()
+    sends(signal.SIGINT, signal.SIGINT, signal.SIGINT)
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+sends(signal.SIGINT)
+print(tubule.run({TUBE!r}).stop)
+"""
+        done = subprocess.run(["/usr/bin/python3", "-c", script], text=True, capture_output=True, timeout=200, cwd=self.folder)
+        self.assertEqual(done.stdout, "['SIGINT', 'SIGALRM', 'SIGALRM']\n['SIGINT', 'SIGINT', 'SIGINT']\nfinished\n", done.stderr)
+
     def test_without_the_lock_of_the_interpreter(self):
         ticks, over = [], threading.Event()
 

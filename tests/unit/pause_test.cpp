@@ -36,15 +36,29 @@ TEST(Pause, aLimitIsToldOnceSoThatTheStateCanBeSaved) {
     EXPECT_TRUE(watch.due());  // between steps it still is
 }
 
-TEST(Pause, theInnermostWatchIsAskedAndTimeCountsFromTheOutermost) {
+TEST(Pause, trialRunsAreEndedByTheWatchesAroundThem) {
+    EXPECT_NO_THROW(pause_if_due());
     const PauseWatch outer(passed, never);
     {
-        const PauseWatch inner(std::nullopt, never);
-        EXPECT_NO_THROW(check_pause());
-        EXPECT_GE(inner.seconds(), 0);
-        EXPECT_NEAR(inner.seconds(), outer.seconds(), 1);
+        const PauseWatch trial(std::nullopt, never);
+        EXPECT_EQ(trial.due().value().limit, passed);
+        EXPECT_THROW(check_pause(), Paused);
+        EXPECT_NO_THROW(check_pause());  // the trial has been told
     }
-    EXPECT_THROW(check_pause(), Paused);
+    EXPECT_TRUE(pause_is_due());
+    EXPECT_THROW(pause_if_due(), Paused);
+    EXPECT_THROW(check_pause(), Paused);  // not told yet
+}
+
+TEST(Pause, aLimitCountsFromItsOwnBeginningSecondsFromTheOutermost) {
+    PauseWatch outer(1000, never);
+    outer.discount(-100);
+    EXPECT_FALSE(outer.due());
+    const PauseWatch inner(50, never);
+    EXPECT_FALSE(inner.due());
+    EXPECT_NEAR(inner.seconds(), 100, 5);
+    outer.discount(-1000);
+    EXPECT_TRUE(inner.due());
 }
 
 TEST(Pause, anInterruptLeavesAStepTheTimeToEnd) {
@@ -62,6 +76,11 @@ TEST(Pause, workThatNothingCanEndIsNotBegunWhenItWouldGoFarBeyondTheLimit) {
     EXPECT_NO_THROW(check_pause(99));
     EXPECT_NO_THROW(check_pause(104));  // 5 percent
     EXPECT_THROW(check_pause(110), Paused);
+}
+
+TEST(Memory, whatCannotBeHadIsFoundBefore) {
+    EXPECT_TRUE(can_allocate(1 << 20));
+    EXPECT_FALSE(can_allocate(std::size_t{1} << 60));
 }
 
 TEST(Memory, saysWhatIsTooLargeAndWhatToTry) {

@@ -443,6 +443,20 @@ TEST(Interrupt, setsTheFlag) {
     std::signal(SIGTERM, SIG_DFL);
 }
 
+TEST(Interrupt, whatIsIgnoredStaysIgnored) {
+    for (int signal : {SIGINT, SIGTERM}) {
+        std::signal(signal, SIG_IGN);
+        catch_interrupts();
+        std::raise(signal);
+        EXPECT_FALSE(interrupted());
+        std::signal(signal, SIG_DFL);
+    }
+    set_interrupted(true);  // by a host
+    EXPECT_TRUE(interrupted());
+    set_interrupted(false);
+    EXPECT_FALSE(interrupted());
+}
+
 TEST(Interrupt, secondSignalEnds) {
     const pid_t child = fork();
     if (child == 0) {

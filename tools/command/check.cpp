@@ -13,7 +13,9 @@
 #include "common/case/complaints.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
@@ -114,6 +116,10 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         out.complaints = error.complaints;
     } catch (const CaseError& error) {
         out.complaints = {{"", "", error.what(), ""}};
+    } catch (const Paused& pause) {
+        if (pause.reason == Stop::interrupted) throw;
+        out.unknown = fmt::format("trial runs that choose the model reach the time limit of {} s (time.limit)",
+                                  pause.limit.value());
     } catch (const std::exception& error) {
         out.unknown = explanation(error);
     }
@@ -194,6 +200,8 @@ std::string json_of(const Checked& c) {
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
 int check(const CheckOptions& options) {
+    catch_interrupts();
+    const PauseWatch watch(std::nullopt, interrupted);
     int status = 0;
     std::vector<std::string> parts;
     for (const std::string& path : options.cases) {
@@ -222,7 +230,7 @@ void add_check(CLI::App& app, int& exit_status) {
     end_help(*command,
              {"tubule check cases/peanut.toml", "tubule check cases/peanut.toml --set accuracy.energy=1e-6",
               "tubule check cases/peanut.toml --json --quick"},
-             {{0, "all cases are valid"}, {2}}, {"case_files"});
+             {{0, "all cases are valid"}, {2}, {130, "interrupted"}}, {"case_files"});
     command->callback([options, &exit_status] { exit_status = check(*options); });
 }
 

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <omp.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdlib>
 #include <exception>
 #include <sstream>
 #include <string>
@@ -14,8 +16,10 @@
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/solve/memory.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/parallel.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/describe.hpp"
@@ -102,12 +106,28 @@ int run(int argc, char** argv) {
     return status;
 }
 
+// OpenBLAS begins with a thread for each further processor, which we never use (use_one_blas_thread). Each asks for 128
+// MB, forever if there are none, and the process waits for it at its end. Where memory is limited it begins anew
+// without them.
+void do_without_blas_threads(char** argv) {
+    if (!limited_memory() || std::getenv("OPENBLAS_NUM_THREADS")) return;
+    setenv("OPENBLAS_NUM_THREADS", "1", 1);
+    execv("/proc/self/exe", argv);  // returns only where it fails
+}
+
+// Each thread has its part of the address space: a stack, a heap, what the BLAS takes.
+int threads_in_memory() {
+    constexpr double bytes = 256e6;
+    return limited_memory() ? static_cast<int>(std::clamp(free_memory() / bytes, 1.0, 1e6)) : 1'000'000;
+}
+
 }  // namespace
 
 int program(int argc, char** argv) {
+    do_without_blas_threads(argv);
     secure_streams();
     // Whatever the environment asks for: more threads than processors only wait, and too many cannot be started.
-    omp_set_num_threads(std::min(omp_get_max_threads(), omp_get_num_procs()));
+    omp_set_num_threads(std::min({omp_get_max_threads(), omp_get_num_procs(), threads_in_memory()}));
     multiply_on_one_thread();
     try {
         return run(argc, argv);
@@ -117,6 +137,9 @@ int program(int argc, char** argv) {
     } catch (const OutputError& error) {
         say(stderr, "tubule: {}\n", error.what());
         return 2;
+    } catch (const Paused& pause) {
+        say(stderr, "tubule: {}\n", name(pause.reason));
+        return exit_code(pause.reason);
     } catch (const std::exception& error) {
         say(stderr, "tubule: {}\n", explanation(error));
         return 4;

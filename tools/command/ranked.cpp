@@ -6,6 +6,7 @@
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/stop.hpp"
 #include "tools/command/text.hpp"
 
@@ -22,6 +23,9 @@ int run_ranked(const std::function<int(Ranks*)>& root, const std::function<void(
         return root(&*ranks);
     } catch (const CaseError&) {
         ranks->dismiss();  // thrown before any work was handed out
+        throw;
+    } catch (const Paused&) {  // likewise
+        ranks->dismiss();
         throw;
     } catch (const std::exception& error) {
         say(stderr, "tubule: {}\n", explanation(error));

@@ -109,7 +109,11 @@ public:
         if (defect_column_ < values.size()) defect_ = std::max(defect_, std::abs(values[defect_column_]));
     }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
-    void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
+    void frame(const std::function<Record()>& make) override {
+        const Record record = make();
+        if (const std::string cost = frames_++ == 0 ? cost_of_frames(case_, record) : ""; !cost.empty()) note(cost);
+        writer_.frame(record);
+    }
     void checkpoint(const Record& state) override {
         if (!keeps_state_ || !is_of_coarser_run(state)) writer_.checkpoint(state);
     }
@@ -140,6 +144,7 @@ private:
     bool keeps_state_;  // no coarser run that is made again beside this one may replace it
     Progress progress_;
     std::optional<double> reached_;
+    int frames_ = 0;
 };
 
 bool has_rows(const std::filesystem::path& file) {
@@ -301,6 +306,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
             if (e.time) c.time.output.push_back(*e.time);
 
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
+    watch.discount(-chosen.seconds);
     const auto engine = engine_for(c);
     const double before = watch.seconds();
     std::optional<Opened> result = open_result(chosen, *engine, file, options.resume);
@@ -308,13 +314,13 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
+    if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
+    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!options.quiet && !result->restart)
         for (const std::string& note : physics_notes(c)) say(stderr, "{}\n", note);
     if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
-    if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
-    watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     Ended ended;
     {
         Recorder recorder(c, result->writer, engine->series_names(), options.quiet || c.equilibrium,
@@ -377,6 +383,7 @@ namespace {
 struct Job {
     ChosenCase chosen;
     std::filesystem::path file;
+    std::optional<Paused> paused;  // while its model was chosen
 };
 
 // What is bad input is found before trial runs; a result that goes on keeps its model.
@@ -401,7 +408,7 @@ Job job_of_result(const std::string& path, const std::vector<std::string>& sets,
     if (!options.output.empty())
         throw CaseError(fmt::format("-o must be absent: {} itself goes on; copy it to keep it as it is", path));
     try {
-        return {{case_of_result(read_result(path), path, sets), ""}, path};
+        return {{case_of_result(read_result(path), path, sets), ""}, path, {}};
     } catch (const CaseError&) {
         throw;
     } catch (const std::runtime_error& error) {
@@ -415,9 +422,13 @@ Job job_of(const std::string& path, const RunOptions& options) {
     if (is_hdf5(path)) return job_of_result(path, sets, options);
     const Case c = read_case(path, sets);
     const auto file = result_path(options, c);
-    ChosenCase chosen = with_model_of_run(c, file, options);
-    check_replaced(chosen.c, file, options.resume || options.overwrite);
-    return {std::move(chosen), file};
+    try {
+        ChosenCase chosen = with_model_of_run(c, file, options);
+        check_replaced(chosen.c, file, options.resume || options.overwrite);
+        return {std::move(chosen), file, {}};
+    } catch (const Paused& pause) {
+        return {{c, ""}, file, pause};
+    }
 }
 
 }  // namespace
@@ -425,6 +436,7 @@ Job job_of(const std::string& path, const RunOptions& options) {
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
         throw CaseError("-o names one result file, but there are several cases");
+    catch_interrupts();
     std::vector<Job> jobs;  // all are read before any is run: bad input leaves nothing half done
     std::set<std::filesystem::path> files;
     for (const std::string& path : options.cases) {
@@ -436,17 +448,20 @@ int run_cases(const RunOptions& options) {
         if (!files.insert(jobs.back().file).second)
             throw CaseError(fmt::format("{}: two of the cases would write {}", path, jobs.back().file.string()));
     }
-    catch_interrupts();
     int status = 0;
-    for (const auto& [chosen, file] : jobs) {
+    for (const auto& [chosen, file, paused] : jobs) {
         const Case& c = chosen.c;
         int one = 0;
         try {
+            if (paused) throw Paused(*paused);
             one = run_case(chosen, file, options);
         } catch (const CaseError&) {
             throw;
         } catch (const Paused& pause) {  // before there was a result to write to
-            say(stderr, "{}: {}\n", c.path, paused_at_start(pause).stop.message);
+            say(stderr, "{}: {}{}\n", c.path, paused_at_start(pause).stop.message,
+                paused && pause.reason == Stop::time_limit
+                    ? ", in trial runs that choose the model: name it in model.kind"
+                    : "");
             one = exit_code(pause.reason);
         } catch (const std::exception& error) {
             say(stderr, "{}: {}\n", c.path, explanation(error));

@@ -14,6 +14,7 @@
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/installed.hpp"
@@ -138,7 +139,10 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
         throw CaseError("--jobs must be absent under mpirun: each rank runs one point at a time");
     const int jobs = options.jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
     if (jobs < 1) throw CaseError(fmt::format("--jobs must be 1 or more, not {}", jobs));
-    ScanWriter writer = is_scan(options.choices.file) ? grown_result(options) : new_result(options);
+    ScanWriter writer = [&] {
+        const PauseWatch watch(std::nullopt, interrupted);
+        return is_scan(options.choices.file) ? grown_result(options) : new_result(options);
+    }();
     const Scan scan = writer.result().scan;
     const auto file = scan_path(options, scan);
     if (writer.complete()) {

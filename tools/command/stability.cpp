@@ -241,9 +241,6 @@ int stability(const StabilityOptions& options) {
         return 0;
     } catch (const NoPicture& failure) {
         return failure.status;
-    } catch (const Paused& pause) {
-        say(stderr, "{}: interrupted\n", options.file);
-        return exit_code(pause.reason);
     } catch (const std::invalid_argument& error) {
         const std::string message = error.what();
         const bool named = message.find(options.file) != std::string::npos;

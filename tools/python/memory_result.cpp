@@ -12,6 +12,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
+#include "tools/run/forecast.hpp"
 #include "tools/run/physics_notes.hpp"
 
 namespace tubule {
@@ -19,8 +20,8 @@ namespace {
 
 class Memory : public RunObserver {
 public:
-    Memory(Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
-        : result_(result), options_(options), writer_(writer) {}
+    Memory(const Case& c, Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+        : case_(c), result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
         for (std::size_t i = 0; i < values.size(); ++i) result_.series.at(result_.series_names[i]).push_back(values[i]);
@@ -35,6 +36,8 @@ public:
     }
     void frame(const std::function<Record()>& make) override {
         result_.frames.push_back(make());
+        if (result_.frames.size() == 1)
+            if (const std::string cost = cost_of_frames(case_, result_.frames.back()); !cost.empty()) note(cost);
         if (writer_) writer_->frame(result_.frames.back());
     }
     void checkpoint(const Record& state) override {
@@ -58,6 +61,7 @@ public:
     }
 
 private:
+    const Case& case_;
     Result& result_;
     const MemoryRunOptions& options_;
     std::optional<ResultWriter>& writer_;
@@ -90,9 +94,9 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 }  // namespace
 
 Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
-    const ChosenCase chosen = with_chosen_model(given);  // trial runs do not count for time.limit
+    PauseWatch watch(given.time.limit, options.interrupted);  // for trial runs and the start, too
+    const ChosenCase chosen = with_chosen_model(given);
     const Case& c = chosen.c;
-    PauseWatch watch(c.time.limit, options.interrupted);
     const auto engine = engine_for(c);
     Result result;
     result.case_text = {c.text, c.sets};
@@ -105,7 +109,7 @@ Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
         check_replaced(c, *options.output, options.overwrite);
         writer = ResultWriter::create(*options.output, result.case_text, result.about, result.series_names);
     }
-    Memory memory(result, options, writer);
+    Memory memory(c, result, options, writer);
     RunSummary summary = run_to_its_end(c, *engine, result, memory);
     if (const auto series = result.series.find("identity_defect"); series != result.series.end()) {
         double defect = 0;

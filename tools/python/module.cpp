@@ -7,7 +7,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <atomic>
-#include <csignal>
+#include <chrono>
 #include <filesystem>
 #include <thread>
 
@@ -36,48 +36,60 @@ namespace py = pybind11;
 namespace tubule {
 namespace {
 
-// While it lives, Ctrl-C sets the flag that runs ask, as in the program; then Python handles it again. To be made by
-// the main thread alone: Python gives signals to no other.
-class Interruptible {
-public:
-    Interruptible() {
-        sigaction(SIGINT, nullptr, &old_interrupt_), sigaction(SIGTERM, nullptr, &old_terminate_);
-        catch_interrupts();
-    }
-    ~Interruptible() { restore(); }
-    Interruptible(const Interruptible&) = delete;
-    Interruptible& operator=(const Interruptible&) = delete;
-
-    // Raises KeyboardInterrupt if a signal came.
-    void check() {
-        if (!interrupted()) return;
-        restore();  // or the next signal would end the process
-        PyErr_SetNone(PyExc_KeyboardInterrupt);
-        throw py::error_already_set();
-    }
-
-private:
-    void restore() {
-        catch_interrupts();  // lowers the flag: runs of other threads and later ones ask it, too
-        sigaction(SIGINT, &old_interrupt_, nullptr), sigaction(SIGTERM, &old_terminate_, nullptr);
-    }
-    struct sigaction old_interrupt_ {
-    }, old_terminate_{};
-};
-
 bool is_main_thread() {
     const py::module_ threading = py::module_::import("threading");
     return threading.attr("current_thread")().is(threading.attr("main_thread")());
 }
 
+// While it lives, Python's handlers of signals are called in the midst of work, as between two statements, if this is
+// the main thread: Python gives signals to no other. What one of them raises, such as KeyboardInterrupt, ends the work.
+class Signals {
+public:
+    Signals() : main_(is_main_thread()), thread_(std::this_thread::get_id()) {}
+    ~Signals() { lower(); }
+    Signals(const Signals&) = delete;
+    Signals& operator=(const Signals&) = delete;
+
+    // Whether work is to end. To be called from any thread, without the GIL.
+    bool interrupted() {
+        if (main_ && std::this_thread::get_id() == thread_) handle();
+        return tubule::interrupted();
+    }
+    // Raises what a handler has raised.
+    void check() {
+        if (!raised_) return;
+        lower();
+        std::rethrow_exception(raised_);
+    }
+
+private:
+    void handle() {
+        const auto now = std::chrono::steady_clock::now();
+        if (raised_ || now < next_) return;
+        next_ = now + std::chrono::milliseconds(50);
+        const py::gil_scoped_acquire gil;
+        if (PyErr_CheckSignals() == 0) return;
+        raised_ = std::make_exception_ptr(py::error_already_set());
+        set_interrupted(true);  // for threads of the work
+    }
+    void lower() {
+        if (raised_) set_interrupted(false);  // runs of other threads and later ones ask it, too
+    }
+
+    bool main_;
+    std::thread::id thread_;
+    std::chrono::steady_clock::time_point next_;
+    std::exception_ptr raised_;
+};
+
 // Does the work without the GIL, with so many threads for loops over elements (0: as many as there are processors).
-// Ctrl-C ends it: KeyboardInterrupt.
+// Handlers of signals end it by what they raise: Ctrl-C by KeyboardInterrupt.
 template <class Work>
 auto without_gil(int threads, const Work& work) {
-    std::optional<Interruptible> signals;
-    if (is_main_thread()) signals.emplace();
+    Signals signals;
     const auto done = [&] {
         const py::gil_scoped_release release;
+        const PauseWatch watch(std::nullopt, [&] { return signals.interrupted(); });
         const int before = omp_get_max_threads();
         omp_set_num_threads(threads > 0 ? threads : std::min(before, omp_get_num_procs()));
         struct Reset {
@@ -94,10 +106,10 @@ auto without_gil(int threads, const Work& work) {
     };
     try {
         auto out = done();
-        if (signals) signals->check();
+        signals.check();
         return out;
     } catch (...) {
-        if (signals) signals->check();
+        signals.check();
         throw;
     }
 }
@@ -180,7 +192,7 @@ Results run(const Case& c, const py::object& progress, const py::object& output,
                 unwanted = true;
             }
         };
-    options.interrupted = [&] { return interrupted() || unwanted; };
+    options.interrupted = [&] { return unwanted.load(); };
     std::vector<std::string> notes;
     options.note = [&](const std::string& words) { notes.push_back(words); };
     if (!output.is_none()) options.output = output.cast<std::filesystem::path>();

@@ -8,7 +8,7 @@
 #include <variant>
 
 #include "common/run/run.hpp"
-#include "common/solve/interrupt.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/run/forecast.hpp"
@@ -23,7 +23,7 @@ constexpr double watch_accuracy = 1e-3;
 // Ends a run of tier "auto" that takes long, or goes on in three dimensions.
 class Brief : public RunObserver {
 public:
-    bool interrupted() override { return tubule::interrupted() || switched || std::clock() > end_; }
+    bool interrupted() override { return switched || std::clock() > end_; }
     void note(const std::string&) override { switched = true; }
     bool switched = false;
 
@@ -45,6 +45,7 @@ void choose_tier(const Case& c, const Choice& choice, const Forecast& expected, 
     watched.accuracy.energy = std::max(c.accuracy.energy, watch_accuracy);
     Brief brief;
     const RunSummary s = run_auto(watched, choice, brief, nullptr, nullptr);
+    pause_if_due();
     out.reason = reason_of(s);
     if (s.stop.reason == Stop::interrupted) {
         out.tier = "auto";

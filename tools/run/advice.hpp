@@ -18,7 +18,8 @@ struct Advice {
 };
 
 // Takes a few seconds at most: the run itself, in tier axisym, and those of simpler models. `expected` is the forecast
-// of the case as it is. None where nothing moves. Throws as an engine and its run.
+// of the case as it is. None where nothing moves. Throws as an engine and its run; Paused where a PauseWatch of this
+// thread ends one of them.
 std::optional<Advice> advice(const Case& c, const Forecast& expected);
 
 // "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ...", "tier surface3d, model stokes, 80 elements, ..."

@@ -4,14 +4,17 @@
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/run/motion_forecast.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/auto/joined_file.hpp"
+#include "tools/run/forecast.hpp"
 
 namespace tubule {
 namespace {
 
 constexpr double long_run = 60;  // seconds
+constexpr double part_of_limit = 0.1;
 
 class Axisymmetric : public Engine {
 public:
@@ -47,9 +50,16 @@ public:
         if (case_.moves()) surface3d::check_restart(case_, record);
     }
     std::optional<Forecast> forecast_if_long() const override {
-        if (!case_.moves() || !surface3d::may_be_long(case_, start_)) return std::nullopt;
-        const Forecast f = surface3d::forecast_motion(case_, start_);
-        return f.seconds.value_or(0) > long_run || f.finer_runs ? std::optional(f) : std::nullopt;
+        std::optional<double> limit = case_.time.limit;  // to which this counts, too
+        if (limit) *limit *= part_of_limit;
+        const PauseWatch watch(limit, [] { return false; });
+        try {
+            std::optional<Forecast> f = forecast_at_rest(case_);
+            if (case_.moves() && surface3d::may_be_long(case_, start_)) f = surface3d::forecast_motion(case_, start_);
+            return f && (f->seconds.value_or(0) > long_run || f->finer_runs) ? f : std::nullopt;
+        } catch (const Paused&) {  // the run itself finds why, if that is not the part
+            return std::nullopt;
+        }
     }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from

@@ -4,10 +4,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 
-#include "common/run/run_clock.hpp"
+#include "common/solve/pause.hpp"
 #include "common/solve/progress.hpp"
 #include "surface3d/run/motion_forecast.hpp"
 #include "tools/run/engine.hpp"
@@ -15,6 +16,11 @@
 namespace tubule {
 namespace {
 
+// Of a result file, measured: a frame without its arrays, and the memory that writing the file takes, over its size.
+constexpr double seconds_of_frame = 0.85e-3, bytes_of_frame = 8.5e3, memory_of_file = 4.3;
+constexpr double much = 1e8;  // bytes
+// Of surfaces at rest, measured: for each triangle, times the square of its order.
+constexpr double seconds_at_rest = 7.2e-6, bytes_at_rest = 1.25e3;
 constexpr double pilot_limit = 2;           // seconds
 constexpr double reported_by_coarser = 4;   // cost of the runs of a pair
 constexpr double most_extrapolated = 1000;  // a pilot that came to less of the run says nothing about it
@@ -29,15 +35,17 @@ Forecast by_its_beginning(Case c) {
     c.time.limit = pilot_limit;
     const auto engine = engine_for(c);
     Pilot pilot;
-    const RunClock clock(c, pilot);
+    const auto begin = std::chrono::steady_clock::now();
     const std::clock_t before = std::clock();
     const RunSummary s = engine->run(pilot);
+    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    pause_if_due();
     Forecast out;
     if (s.elements > 0) out.resolution = fmt::format("{} elements", s.elements);
     out.bytes = memory_in_use();
     if (s.stop.reason == Stop::ill_posed && !pilot.moved()) out.ill_posed = s.stop.message;
     // Of a busy machine the time of the processors, else, where threads share the work, that of the clock.
-    const double seconds = std::min(clock.seconds(), static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
+    const double seconds = std::min(wall, static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
     if (s.stop.reason != Stop::time_limit) {
         out.seconds = seconds;
         if (pilot.moved()) out.steps = pilot.steps();
@@ -58,9 +66,29 @@ std::string rounded(double value) {
 
 }  // namespace
 
+std::optional<Forecast> forecast_at_rest(const Case& c) {
+    if (c.tier != Tier::surface3d || c.moves() || c.equilibrium || !c.surface.elements) return std::nullopt;
+    const double size = std::pow(element_order(c), 2) * *c.surface.elements;
+    Forecast out;
+    out.resolution = fmt::format("about {} triangles of order {}", *c.surface.elements, element_order(c));
+    out.seconds = seconds_at_rest * size, out.bytes = bytes_at_rest * size;
+    return out;
+}
+
 Forecast forecast(const Case& c) {
+    if (const auto at_rest = forecast_at_rest(c)) return *at_rest;
     if (c.tier != Tier::surface3d || !c.moves()) return by_its_beginning(c);
     return surface3d::forecast_motion(c, surface3d::Start(c));
+}
+
+std::string cost_of_frames(const Case& c, const Record& first) {
+    double bytes = bytes_of_frame;
+    for (const Array& array : first.arrays) bytes += sizeof(double) * static_cast<double>(array.data.size());
+    const auto frames = static_cast<double>(c.time.output.size()) + 1;
+    if (frames * bytes < much) return "";
+    return fmt::format("time.output asks for {} frames: a result of about {} MB, which takes {} s and {} MB of memory",
+                       frames, rounded(frames * bytes / 1e6), rounded(frames * seconds_of_frame),
+                       rounded(frames * bytes / 1e6 * memory_of_file));
 }
 
 std::string words(const Forecast& f) {

@@ -29,7 +29,8 @@ constexpr double most_seconds = 20;
 // Of the fall of the energy, to see whether it speeds up: what grows from little is late by far more than the criterion
 // says, since its delays add up.
 constexpr double least_parts = 20, most_parts = 1000;
-constexpr double accuracy = 1e-4;  // of the pilots in tier axisym, or better if the case is
+constexpr double rounding = 1e-12;  // of an energy
+constexpr double accuracy = 1e-4;   // of the pilots in tier axisym, or better if the case is
 constexpr double accuracy_of_surface = 1e-2;
 // Measured (docs/decisions/tiers.md, tests/benchmark/model_differences.py): on a length L the viscosity damps like a
 // friction of `viscous`/(Re L^2), and slows what friction alone would drive down by the factor 1 + `slower`/(gamma Re
@@ -53,9 +54,7 @@ public:
         points.push_back({values[0], values[energy_]});
     }
     void discard() override { points.clear(); }
-    bool interrupted() override {
-        return tubule::interrupted() || switched || rows_ > most_rows_ || seconds() > most_seconds;
-    }
+    bool interrupted() override { return switched || rows_ > most_rows_ || seconds() > most_seconds; }
     // Tier "auto" tells that it goes on in three dimensions.
     void note(const std::string&) override { switched = switched || !points.empty(); }
     double seconds() const { return static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC; }
@@ -66,8 +65,12 @@ public:
     // The largest difference from the path that is slower by this factor.
     double lead(double factor) const;
 
-    // Whether the energy, falling by steps of `part`, needs less than half the time of an earlier step for one of them.
+    // Whether the energy, falling by steps of `part` > 0, needs less than half the time of an earlier step for one of
+    // them.
     bool speeds_up(double part) const;
+    double fall() const { return points.front().energy - points.back().energy; }
+    // Nothing moves: the energy falls by no more than rounding.
+    bool rests() const { return !(fall() > rounding * std::abs(points.front().energy)); }
 
     std::vector<Point> points;
     double area = 0, r_max = 0;  // at the start
@@ -104,10 +107,14 @@ double Path::lead(double factor) const {
 }
 
 bool Path::speeds_up(double part) const {
-    double level = points.front().energy - part, since = points.front().time, longest = 0;
+    const double top = points.front().energy;
+    double since = points.front().time, longest = 0;
     const Point* before = &points.front();
+    int parts = 1;
     for (const Point& p : points) {
-        for (; p.energy <= level; level -= part) {
+        // More parts than there are in the whole fall would only be counted where the energy rises again.
+        for (; parts <= 2 * most_parts && p.energy <= top - parts * part; ++parts) {
+            const double level = top - parts * part;
             const double along = (before->energy - level) / (before->energy - p.energy);
             const double time = std::lerp(before->time, p.time, along);
             if (time - since < longest / 2) return true;
@@ -146,10 +153,11 @@ std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymm
     } catch (const SolveError&) {
         return {};
     }
-    if (tubule::interrupted()) throw Paused{Stop::interrupted, {}};
+    pause_if_due();
     if ((s.stop.reason != Stop::finished && s.stop.reason != Stop::stationary) || path.points.empty()) return {};
-    const double fall = path.points.front().energy - path.points.back().energy;
-    if (path.speeds_up(std::clamp(c.accuracy.energy * s.reference_energy / 2, fall / most_parts, fall / least_parts)))
+    if (path.rests()) return SimplerModel{.kind = kind, .seconds = path.seconds(), .rests = true};
+    if (path.speeds_up(std::clamp(c.accuracy.energy * s.reference_energy / 2, path.fall() / most_parts,
+                                  path.fall() / least_parts)))
         return SimplerModel{kind, HUGE_VAL, HUGE_VAL, path.seconds()};
     const double length2 = may_have_period(c.shape) ? path.r_max * path.r_max : path.area / (4 * std::numbers::pi);
     const double viscosity = 1 / (c.model.Re * length2), gamma = motion_law(c.model).friction;
@@ -187,6 +195,7 @@ SimplerModels simpler_models(const Case& c) {
         const auto one = compared(c, kind, choice.axisymmetric);
         if (one && std::isinf(one->on_the_way)) return {{}, "the fall of the energy speeds up, as where waves grow"};
         if (one) out.models.push_back(*one);
+        if (one && one->rests) return out;
     }
     if (out.models.empty())
         out.unknown = choice.axisymmetric && c.tier != Tier::axisym
@@ -202,10 +211,11 @@ ModelChoice choose_model(const Case& c) {
     if (!simpler.unknown.empty())
         return {full.model.kind, "whether a simpler model does is unknown: " + simpler.unknown, true};
     for (const SimplerModel& m : simpler.models)
-        if (m.on_the_way <= c.accuracy.energy)
+        if (m.rests || m.on_the_way <= c.accuracy.energy)
             return {m.kind,
-                    fmt::format("the path of \"{}\" differs by about {} of E_ref from that of \"{}\"",
-                                model_entry(m.kind).name, two_digits(m.on_the_way), name(full.model)),
+                    m.rests ? fmt::format("nothing moves in a trial run of \"{}\"", model_entry(m.kind).name)
+                            : fmt::format("the path of \"{}\" differs by about {} of E_ref from that of \"{}\"",
+                                          model_entry(m.kind).name, two_digits(m.on_the_way), name(full.model)),
                     false, m.seconds};
     const SimplerModel& best = *std::ranges::min_element(simpler.models, {}, &SimplerModel::on_the_way);
     return {full.model.kind,
@@ -216,11 +226,16 @@ ModelChoice choose_model(const Case& c) {
 ChosenCase with_model(const Case& c, const ModelChoice& choice) {
     std::vector<std::string> sets = c.sets;
     sets.push_back(fmt::format("model.chosen={}", model_entry(choice.kind).name));
-    return {parse_case(c.text, sets, c.path), choice.reason};
+    return {parse_case(c.text, sets, c.path), choice.reason, 0};
 }
 
 ChosenCase with_chosen_model(const Case& c) {
-    return c.model.kind == ModelKind::automatic ? with_model(c, choose_model(c)) : ChosenCase{c, ""};
+    if (c.model.kind != ModelKind::automatic) return {c, "", 0};
+    const PauseWatch watch(c.time.limit, interrupted);
+    const double before = watch.seconds();
+    ChosenCase out = with_model(c, choose_model(c));
+    out.seconds = watch.seconds() - before;
+    return out;
 }
 
 std::string words_of_choice(const ChosenCase& chosen) {

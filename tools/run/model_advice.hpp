@@ -1,5 +1,5 @@
-// Whether a simpler model shows what a case with inertia or viscosity does, as far as its own path tells, and the choice
-// of model.kind = "auto": docs/choosing.md.
+// Whether a simpler model shows what a case with inertia or viscosity does, as far as its own path tells, and the
+// choice of model.kind = "auto": docs/choosing.md.
 #pragma once
 
 #include <string>
@@ -16,16 +16,17 @@ struct SimplerModel {
     // docs/model_differences.csv 0.9 to 6.6 times the measured ones.
     double on_the_way = 0, at_end = 0;
     double seconds = 0;  // that its trial run took: in tier axisym what it takes
+    bool rests = false;  // nothing moves
 };
 struct SimplerModels {
     std::vector<SimplerModel> models;
     std::string unknown;  // why there are none, in words
 };
 
-// By trial runs of these models: of an axisymmetric start in tier axisym, while no wave around the axis grows if the case
-// has another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a start
-// brings its own triangles, or a trial run does not come to its end. Throws as an engine and its run; Paused if a signal
-// ends a trial run.
+// By trial runs of these models: of an axisymmetric start in tier axisym, while no wave around the axis grows if the
+// case has another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a
+// start brings its own triangles, or a trial run does not come to its end. Where nothing moves the simplest is the only
+// one. Throws as an engine and its run; Paused where a PauseWatch of this thread ends a trial run.
 SimplerModels simpler_models(const Case& c);
 
 struct ModelChoice {
@@ -44,8 +45,10 @@ ModelChoice choose_model(const Case& c);
 struct ChosenCase {
     Case c;
     std::string reason;  // empty where nothing was to be chosen
+    double seconds = 0;  // of wall time, that the choice took: they count for time.limit
 };
 ChosenCase with_model(const Case& c, const ModelChoice& choice);
+// Throws Paused, too, where time.limit passes or a signal comes.
 ChosenCase with_chosen_model(const Case& c);
 
 // "model overdamped: ...", with the reason of a choice.

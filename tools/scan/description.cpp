@@ -12,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/scan/starts.hpp"
 
 namespace tubule {
@@ -201,6 +202,7 @@ void check_points(const Scan& scan) {
     for (const Axis& axis : scan.axes) {
         stride /= axis.size();
         for (std::size_t i = 0; i < axis.size(); ++i) {
+            check_pause();
             const Case c = scan.case_of(i * stride);
             if (c.equilibrium && c.equilibrium->branch.parameter)
                 throw CaseError(

@@ -10,6 +10,7 @@
 
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule {
 namespace {
@@ -26,7 +27,7 @@ Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
 Dispatcher::Answer Dispatcher::take(Work& work, bool may_wait) {
     std::unique_lock lock(mutex_);
     while (true) {
-        if (error_ || interrupted()) return Answer::over;
+        if (error_ || interrupted() || pause_is_due()) return Answer::over;
         if (const auto next = plan_.next()) {
             work = *next;
             ++running_;

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "common/case/read.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/scan/scan_plan.hpp"
 
@@ -28,15 +30,20 @@ const Axis* axis_of(const Scan& scan, const std::vector<std::string>& keys) {
 }
 
 // Words are compared as such, numbers by their value.
-bool same_value(const std::string& a, const std::string& b) {
-    const auto x = number_of(a), y = number_of(b);
-    return x && y ? *x == *y : a == b;
+std::vector<std::string> comparable(std::vector<std::string> setting) {
+    for (std::string& text : setting)
+        if (const auto x = number_of(text)) text = fmt::format("{}", *x + 0.0);  // -0 is 0
+    return setting;
 }
 
-std::optional<std::size_t> index_of(const Axis& axis, const std::vector<std::string>& setting) {
-    for (std::size_t i = 0; i < axis.size(); ++i)
-        if (std::ranges::equal(axis.values[i], setting, same_value)) return i;
-    return std::nullopt;
+// The first place of each setting of an axis.
+std::map<std::vector<std::string>, std::size_t> places_on(const Axis& axis) {
+    std::map<std::vector<std::string>, std::size_t> out;
+    for (std::size_t i = 0; i < axis.size(); ++i) {
+        check_pause();
+        out.emplace(comparable(axis.values[i]), i);
+    }
+    return out;
 }
 
 bool increases(const Axis& axis) {
@@ -51,8 +58,11 @@ bool increases(const Axis& axis) {
 
 Axis joined(const Axis& a, const Axis& b) {
     Axis out = a;
-    for (const auto& setting : b.values)
-        if (!index_of(out, setting)) out.values.push_back(setting);
+    auto places = places_on(a);
+    for (const auto& setting : b.values) {
+        check_pause();
+        if (places.emplace(comparable(setting), out.size()).second) out.values.push_back(setting);
+    }
     const auto value = [](const auto& setting) { return number_of(setting.front()).value(); };
     if (increases(a) && increases(b)) std::ranges::sort(out.values, {}, value);
     out.logarithmic = a.logarithmic && b.logarithmic;
@@ -88,7 +98,8 @@ Source source_of(const Axis& axis, const Scan& scan) {
     const Axis* own = axis_of(scan, axis.keys);
     const Axis fixed{.keys = axis.keys, .values = {{own ? "" : value_in(scan, axis.keys.front())}}};
     if (own) out.axis = static_cast<std::size_t>(own - scan.axes.data());
-    for (const auto& setting : (own ? *own : fixed).values) out.places.push_back(index_of(axis, setting).value());
+    const auto places = places_on(axis);
+    for (const auto& setting : (own ? *own : fixed).values) out.places.push_back(places.at(comparable(setting)));
     return out;
 }
 
