@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include "axisym/curve/curve_samples.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
+#include "common/result/start_frame.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -56,23 +56,6 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
-Result read_start(const Case& c, const ResultFrame& from) {
-    try {
-        return read_result(std::filesystem::path(c.path).parent_path() / from.path);
-    } catch (const std::runtime_error& error) {
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
-    }
-}
-
-Record start_frame(const Case& c, const ResultFrame& from) {
-    const Result result = read_start(c, from);
-    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
-    if (number < 0 || number >= count)
-        throw complaint(c, "shape.frame",
-                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
-    return result.frames[number];
-}
-
 struct MakeMeridian {
     const Case& c;
     template <class Exact>
@@ -81,9 +64,9 @@ struct MakeMeridian {
     }
     Meridian operator()(const ProfileFile& file) const { return meridian(start_profile(c, file)); }
     Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
-    Meridian operator()(const ResultFrame& from) const {
+    Meridian operator()(const ResultFrame&) const {
         try {
-            return frame_meridian(start_frame(c, from));
+            return frame_meridian(start_frame(c).record);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }
@@ -135,21 +118,9 @@ Meridian frame_meridian(const Record& frame) {
     return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
 }
 
-SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
-    const std::filesystem::path path = std::filesystem::path(c.path).parent_path() / file.path;
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
-    try {
-        return read_profile(path, file);
-    } catch (const ProfileError& error) {
-        throw CaseError(error.what());
-    }
-}
-
 std::optional<StartVelocity> start_velocity(const Case& c) {
     if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
-    const Record frame = start_frame(c, std::get<ResultFrame>(c.shape));
+    const Record frame = start_frame(c).record;
     const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
                 *around = find_array(frame, "u_theta");
     if (!normal || !along || kind_of(frame) != RecordKind::curve)

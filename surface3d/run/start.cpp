@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -13,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/shapes/profile_curve.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
@@ -179,10 +179,6 @@ Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
     };
 }
 
-std::filesystem::path beside(const Case& c, const std::string& path) {
-    return std::filesystem::path(c.path).parent_path() / path;
-}
-
 // What `make` makes of a mesh of the case, which may turn out to be unusable: the complaint then begins with `blame`.
 template <class MakeOne>
 auto usable(const std::string& blame, const MakeOne& make) {
@@ -193,17 +189,8 @@ auto usable(const std::string& blame, const MakeOne& make) {
     }
 }
 
-Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
-    try {
-        result = read_result(beside(c, from.path));
-    } catch (const std::runtime_error& error) {
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
-    }
-    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
-    if (number < 0 || number >= count)
-        throw complaint(c, "shape.frame",
-                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
-    return result.frames[number];
+const std::string* given_bytes(const Case& c) {
+    return c.input && !c.input->bytes.empty() ? &c.input->bytes : nullptr;
 }
 
 // The meshes of a start; what else there is to say of them.
@@ -255,22 +242,14 @@ struct Prepare {
         return on(UnitSphere{}, map);
     }
     Prepared operator()(const ProfileFile& file) const {
-        const std::filesystem::path path = beside(c, file.path);
-        std::error_code error;
-        if (!std::filesystem::is_regular_file(path, error))
-            throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
-        try {
-            const SmoothProfile profile = read_profile(path, file);
-            const WavedProfile surface{profile_curve(profile), {}, {}};
-            const auto with_H0 = [&](const Torus& torus) {
-                return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
-            };
-            Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
-            out.notes.push_back(profile.note());
-            return out;
-        } catch (const ProfileError& error) {
-            throw CaseError(error.what());
-        }
+        const SmoothProfile profile = start_profile(c, file);
+        const WavedProfile surface{profile_curve(profile), {}, {}};
+        const auto with_H0 = [&](const Torus& torus) {
+            return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
+        };
+        Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
+        out.notes.push_back(profile.note());
+        return out;
     }
     // New triangles of it; of other orders, what interpolates them.
     Prepared remeshed(const MeshFile& file, const std::string& blame) const {
@@ -279,7 +258,8 @@ struct Prepare {
                             "needs a build with CGAL: install libcgal-dev (Debian, Ubuntu) or CGAL 5.5 or newer, then "
                             "run cmake --preset release && cmake --build --preset release");
         const RemeshedStart start = usable(blame, [&] {
-            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true), file, element_order(c));
+            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true, given_bytes(c)), file,
+                                  element_order(c));
         });
         return {[start](int, int order) { return StartMesh{start.of_order(order), {}, {}}; }, false, start.notes};
     }
@@ -288,7 +268,7 @@ struct Prepare {
         const std::string blame = complaint(c, "shape.path", "cannot be used").what();
         if (file.remesh) return remeshed(file, blame);
         const auto imported = std::make_shared<ImportedMesh>(usable(blame, [&] {
-            ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld);
+            ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld, false, given_bytes(c));
             close_mesh(mesh);
             return mesh;
         }));
@@ -304,11 +284,10 @@ struct Prepare {
         return {[=](int, int order) { return StartMesh{fit(order).surface, {}, {}}; }, false, notes};
     }
     Prepared operator()(const ResultFrame& from) const {
-        Result result;
-        const Record frame = frame_of(c, from, result);
-        if (frame.mesh) {
+        const auto [frame, cells] = start_frame(c);
+        if (cells) {
             refuse_what_needs_a_shape();
-            const CurvedMesh mesh = frame_surface(frame, result.meshes.at(*frame.mesh));
+            const CurvedMesh mesh = frame_surface(frame, *cells);
             return {[mesh, moves = velocities(frame, mesh)](int, int order) {
                         if (mesh.order == order) return StartMesh{mesh, {}, moves ? columns(*moves) : VectorField()};
                         return StartMesh{

@@ -19,6 +19,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/record.hpp"
 #include "common/result/result.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/run/run_pairs.hpp"
 #include "common/solve/interrupt.hpp"
@@ -38,9 +39,9 @@
 
 namespace tubule {
 
-std::filesystem::path result_path(const RunOptions& options, const Case& c) {
+std::filesystem::path result_path(const RunOptions& options, const std::filesystem::path& case_path) {
     if (!options.output.empty()) return options.output;
-    return std::filesystem::path(c.path).filename().replace_extension(".hdf");
+    return std::filesystem::path(case_path).filename().replace_extension(".hdf");
 }
 
 void check_output(const std::filesystem::path& file) {
@@ -209,7 +210,7 @@ Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesys
     About about = about_start();
     add_choice(about, chosen);
     about.emplace_back("case_path", valid_utf8(std::filesystem::absolute(c.path).string()));
-    return {ResultWriter::create(file, {c.text, c.sets}, about, engine.series_names()), std::nullopt, std::nullopt};
+    return {ResultWriter::create(file, kept_case(c), about, engine.series_names()), std::nullopt, std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
@@ -221,7 +222,7 @@ std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, con
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
     ResultWriter writer = ResultWriter::resume(
-        file, [&](const Record& record) { engine.check_restart(record); }, CaseText{c.text, c.sets});
+        file, [&](const Record& record) { engine.check_restart(record); }, kept_case(c));
     const Record& record = writer.restart_record();
     Restart restart{record};
     if (record.mesh) restart.cells = old.meshes.at(*record.mesh);
@@ -286,6 +287,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         for (const Expectation& e : c.expect.values)
             if (e.time) c.time.output.push_back(*e.time);
 
+    if (!c.input) c.input = current_input(c);
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
     const auto engine = engine_for(c);
     const double before = watch.seconds();
@@ -395,8 +397,8 @@ Job job_of(const std::string& path, const RunOptions& options) {
     std::vector<std::string> sets = options.sets;
     if (options.until) sets.push_back(fmt::format("time.end={}", *options.until));
     if (is_hdf5(path)) return job_of_result(path, sets, options);
-    const Case c = read_case(path, sets);
-    const auto file = result_path(options, c);
+    const auto file = result_path(options, path);
+    const Case c = read_case(path, sets, options.resume ? inputs_to_resume(file) : CaseInputs{});
     ChosenCase chosen = with_model_of_run(c, file, options);
     check_replaced(chosen.c, file, options.resume || options.overwrite);
     return {std::move(chosen), file};

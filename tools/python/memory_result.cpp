@@ -1,11 +1,14 @@
 #include "tools/python/memory_result.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
 #include "common/case/read.hpp"
 #include "common/result/durable_io.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/command/commands.hpp"
@@ -88,12 +91,16 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 }  // namespace
 
 Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
-    const ChosenCase chosen = with_chosen_model(given);  // trial runs do not count for time.limit
+    ChosenCase chosen = with_chosen_model(given);  // trial runs do not count for time.limit
+    if (const std::string changed = changed_input(chosen.c, inputs_of(chosen.c)); !changed.empty())
+        throw CaseError(fmt::format("{}: {}: bring back the file that its result began with, or read the case itself",
+                                    chosen.c.path, changed));
+    if (!chosen.c.input) chosen.c.input = current_input(chosen.c);
     const Case& c = chosen.c;
     PauseWatch watch(c.time.limit, options.interrupted);
     const auto engine = engine_for(c);
     Result result;
-    result.case_text = {c.text, c.sets};
+    result.case_text = kept_case(c);
     result.about = about_start();
     add_choice(result.about, chosen);
     result.series_names = engine->series_names();
