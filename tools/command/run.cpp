@@ -217,7 +217,10 @@ Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesys
 std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
     const Case& c = chosen.c;
     Result old = read_result(file);
-    if (!goes_on(c, old, file)) return std::nullopt;
+    if (!goes_on(c, old, file)) {
+        repair_result(file);  // a kill may have left its journal
+        return std::nullopt;
+    }
     if (c.equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
@@ -333,16 +336,26 @@ void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& fil
                         c.path, file.string()));
 }
 
-// A result of another case may be needed: only --overwrite replaces it.
+bool can_be_resumed(const Case& c, const Result& result) {
+    const auto stop = stop_of(result);
+    return !c.equilibrium && (!stop || can_go_on(*stop)) && (!result.frames.empty() || result.checkpoint);
+}
+
+// A result of another case may be needed, and so may the hours of a run that can go on: only --overwrite replaces them.
 void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& file) {
     if (!is_hdf5(file)) return;
     std::string other;
     try {
         other = other_case(c, read_case_text(file));
-        if (other.empty() || !has_rows(file)) return;
+        if (!has_rows(file)) return;
+        if (other.empty() && !can_be_resumed(c, read_result(file))) return;
     } catch (const std::runtime_error&) {
         return;  // no result, or a damaged one: the writer decides
     }
+    if (other.empty())
+        throw CaseError(
+            fmt::format("{}: holds an unfinished run of {}\n--resume goes on with it, --overwrite begins again",
+                        file.string(), c.path));
     throw CaseError(
         fmt::format("{}: holds the result of another case than {}: {}\n--overwrite replaces it, -o FILE keeps both",
                     file.string(), c.path, other));
@@ -456,7 +469,8 @@ void add_run(CLI::App& app, int& exit_status) {
         "continue a result that was interrupted, killed or out of time, or extend it to a later time.end");
     command->add_option("--until", o->until, "the time at which the run ends, as --set time.end=T")
         ->check(CLI::Validator(refuse_infinite, ""));
-    command->add_flag("--overwrite", o->overwrite, "replace the result of another case");
+    command->add_flag("--overwrite", o->overwrite,
+                      "replace the result of another case, or one that --resume would go on with");
     command->add_flag("--quiet", o->quiet, "no progress; output only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,
