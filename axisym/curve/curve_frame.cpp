@@ -56,6 +56,24 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
+// A curve through so many points that the spline between them is not what limits the accuracy.
+Meridian sampled(const WavedProfile& surface, const ResultFrame& from) {
+    int waves = 0;
+    for (const FrameMode& mode : from.modes) waves = std::max(waves, mode.l ? *mode.l : *mode.n);
+    const int n = 600 + 40 * waves;
+    const bool cell = surface.curve.kind == ProfileCurve::Kind::cell;
+    std::vector<std::array<double, 2>> points;
+    for (int i = 0; i <= n; ++i) {
+        const Eigen::Vector3d x = position(surface, Torus{2, 1}, base_point(surface.curve, double(i) / n, 0));
+        points.push_back({x[0], x[2]});
+    }
+    if (cell)
+        points.front()[0] = points.back()[0] = 0;
+    else
+        points.back() = {points[0][0], points[0][1] + surface.curve.length};
+    return meridian(points, cell ? Topology::cell : Topology::tube, surface.curve.length);
+}
+
 struct MakeMeridian {
     const Case& c;
     template <class Exact>
@@ -64,9 +82,10 @@ struct MakeMeridian {
     }
     Meridian operator()(const ProfileFile& file) const { return meridian(start_profile(c, file)); }
     Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
-    Meridian operator()(const ResultFrame&) const {
+    Meridian operator()(const ResultFrame& from) const {
         try {
-            return frame_meridian(start_frame(c).record);
+            const Record frame = start_frame(c).record;
+            return from.modes.empty() ? frame_meridian(frame) : sampled(disturbed_profile(c, frame), from);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }

@@ -8,7 +8,7 @@
 #include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
 #include "common/result/checksums.hpp"
-#include "common/result/record.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/result/record_bytes.hpp"
 
 namespace tubule {
@@ -58,6 +58,18 @@ StartFrame from_bytes(const std::string& bytes) {
 StartFrame start_frame(const Case& c) {
     if (c.input && !c.input->bytes.empty()) return from_bytes(c.input->bytes);
     return read_frame(c, std::get<ResultFrame>(c.shape));
+}
+
+WavedProfile disturbed_profile(const Case& c, const Record& frame) {
+    const auto profile = profile_of(frame);
+    const auto* graph = std::get_if<Revolution>(&profile);
+    const auto [r, z, length] = graph ? points_of(*graph) : std::get<ProfilePoints>(profile);
+    const WavedProfile surface{profile_curve(r, z, length), {}, {}};
+    try {
+        return disturbed(surface, std::get<ResultFrame>(c.shape));
+    } catch (const std::invalid_argument& error) {
+        throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
+    }
 }
 
 std::shared_ptr<const CaseInput> current_input(const Case& c) {

@@ -17,6 +17,10 @@ struct StartFrame {
 // The frame of a case whose shape is a ResultFrame. Throws CaseError that names the key to blame.
 StartFrame start_frame(const Case& c);
 
+// The profile of its frame with the modes of its shape. Throws CaseError for modes that it cannot have,
+// std::invalid_argument for a frame that has no profile.
+WavedProfile disturbed_profile(const Case& c, const Record& frame);
+
 // What the case reads, as it is now: with its bytes if they are few. Nothing where it reads nothing, or what cannot be
 // read.
 std::shared_ptr<const CaseInput> current_input(const Case& c);

@@ -299,6 +299,8 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
+    if (const std::string warning = engine->warning(); !warning.empty() && !options.quiet)
+        say(stderr, "{}: warning: {}\n", c.path, warning);
     if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));

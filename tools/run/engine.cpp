@@ -51,6 +51,7 @@ public:
         const Forecast f = surface3d::forecast_motion(case_, start_);
         return f.seconds.value_or(0) > long_run || f.finer_runs ? std::optional(f) : std::nullopt;
     }
+    std::string warning() const override { return start_.time_scale(); }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from
         return surface3d::run(case_, start_, observer, restart);
@@ -71,6 +72,7 @@ public:
         else
             axisym::check_restart(record);
     }
+    std::string warning() const override { return choice_.start ? choice_.start->time_scale() : ""; }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result* unfinished) const override {
         return run_auto(case_, choice_, observer, restart, unfinished);
     }
