@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Starts that a case brings along, run in both tiers: they equal the built-in shapes; a fluid goes on with the velocity of a
 result; what is refused. Argument: the program."""
+import re
 import unittest
 
 import h5py
@@ -256,6 +257,24 @@ class DisturbedTest(Starts):
         self.assertRegex(self.tubule("run", small, "--set", "time.limit=0.5", status=5)[1], words)
         fits = self.write("fits.toml", case('kind = "file"\npath = "mesh.off"\n', more, "surface3d"))
         self.assertNotIn("warning", self.tubule("check", fits, "--quick")[1])
+
+    def test_advice_for_a_mesh_names_keys_that_it_has(self):
+        """A mesh that folds at once, at rest and in motion, and a frame of it."""
+        self.write("mesh.off", octahedron(0))
+        moves = "[accuracy]\nenergy = 0.1\nestimate = false\n[time]\nend = 1e-3\n"
+        for more in (AT_REST.replace("elements = 180\n", ""), moves):
+            text = case('kind = "file"\npath = "mesh.off"\n' + mode(amplitude=0.8, l=9, m=5), more, "surface3d")
+            path = self.write("case.toml", text)
+            out, _ = self.tubule("run", path, "-o", self.result, "--overwrite", status=4)
+            self.assertIn("mesh-lost", out)
+            self.assertIn("set shape.remesh, or give the file more triangles", out)
+            self.assertNotIn("E_ref", self.tubule("show", self.result)[0])
+            said = about(self.result)
+            self.assertNotIn("estimated_error", said)
+            for key in re.findall(r"\b(?:shape|discretisation|accuracy|time)\.\w+", said["advice"]):
+                value = {"shape.remesh": "500"}.get(key, "1")
+                answer = self.start("check", path, "--quick", "--set", f"{key}={value}").communicate()[1]
+                self.assertNotIn(f"{key} must be absent", answer)
 
 
 if __name__ == "__main__":

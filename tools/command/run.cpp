@@ -75,10 +75,10 @@ About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
                 {"stop_time", s.stop.time},
                 {"stop_message", s.stop.message},
                 {"advice", s.stop.advice},
-                {"asked_accuracy", c.accuracy.energy},
-                {"estimated_error", s.estimated_error},
-                {"E_ref", s.reference_energy},
-                {"wall_seconds", wall_seconds}};
+                {"asked_accuracy", c.accuracy.energy}};
+    if (s.reference_energy > 0)  // else no energy was found
+        about.insert(about.end(), {{"estimated_error", s.estimated_error}, {"E_ref", s.reference_energy}});
+    about.emplace_back("wall_seconds", wall_seconds);
     about.insert(about.end(), s.details.begin(), s.details.end());
     about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
     return about;
