@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include "axisym/curve/curve_samples.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
+#include "common/result/start_frame.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -56,21 +56,22 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
-Result read_start(const Case& c, const ResultFrame& from) {
-    try {
-        return read_result(std::filesystem::path(c.path).parent_path() / from.path);
-    } catch (const std::runtime_error& error) {
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
+// A curve through so many points that the spline between them is not what limits the accuracy.
+Meridian sampled(const WavedProfile& surface, const ResultFrame& from) {
+    int waves = 0;
+    for (const FrameMode& mode : from.modes) waves = std::max(waves, mode.l ? *mode.l : *mode.n);
+    const int n = 600 + 40 * waves;
+    const bool cell = surface.curve.kind == ProfileCurve::Kind::cell;
+    std::vector<std::array<double, 2>> points;
+    for (int i = 0; i <= n; ++i) {
+        const Eigen::Vector3d x = position(surface, Torus{2, 1}, base_point(surface.curve, double(i) / n, 0));
+        points.push_back({x[0], x[2]});
     }
-}
-
-Record start_frame(const Case& c, const ResultFrame& from) {
-    const Result result = read_start(c, from);
-    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
-    if (number < 0 || number >= count)
-        throw complaint(c, "shape.frame",
-                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
-    return result.frames[number];
+    if (cell)
+        points.front()[0] = points.back()[0] = 0;
+    else
+        points.back() = {points[0][0], points[0][1] + surface.curve.length};
+    return meridian(points, cell ? Topology::cell : Topology::tube, surface.curve.length);
 }
 
 struct MakeMeridian {
@@ -83,7 +84,8 @@ struct MakeMeridian {
     Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
     Meridian operator()(const ResultFrame& from) const {
         try {
-            return frame_meridian(start_frame(c, from));
+            const Record frame = start_frame(c).record;
+            return from.modes.empty() ? frame_meridian(frame) : sampled(disturbed_profile(c, frame), from);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }
@@ -135,21 +137,9 @@ Meridian frame_meridian(const Record& frame) {
     return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
 }
 
-SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
-    const std::filesystem::path path = std::filesystem::path(c.path).parent_path() / file.path;
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
-    try {
-        return read_profile(path, file);
-    } catch (const ProfileError& error) {
-        throw CaseError(error.what());
-    }
-}
-
 std::optional<StartVelocity> start_velocity(const Case& c) {
     if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
-    const Record frame = start_frame(c, std::get<ResultFrame>(c.shape));
+    const Record frame = start_frame(c).record;
     const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
                 *around = find_array(frame, "u_theta");
     if (!normal || !along || kind_of(frame) != RecordKind::curve)

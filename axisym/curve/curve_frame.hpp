@@ -35,9 +35,6 @@ Meridian frame_meridian(const Record& frame);
 // Where a case begins. Throws CaseError for a result without a frame of this tier.
 Meridian start_meridian(const Case& c);
 
-// The smooth curve through the points of a file. Throws CaseError.
-SmoothProfile start_profile(const Case& c, const ProfileFile& file);
-
 // The velocity of the frame that a case begins with, by the fraction of the arc length, where the case asks for it.
 // Throws CaseError where the frame has none.
 struct StartVelocity {

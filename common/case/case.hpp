@@ -2,11 +2,13 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "common/case/case_input.hpp"
 #include "common/case/equilibrium_choices.hpp"
 #include "common/case/surface_choices.hpp"
 #include "common/energy/bending.hpp"
@@ -139,6 +141,7 @@ struct Case {
     std::string text;                           // the file, verbatim
     std::vector<std::string> sets;              // --set key=value overrides, in order
     std::map<std::string, std::string> places;  // of the keys, "file:line:column" or "--set ...": see complaint()
+    std::shared_ptr<const CaseInput> input;     // of the file of the shape, where it has been read or a result has it
 
     Tier tier = Tier::axisym;
     std::string title, source;

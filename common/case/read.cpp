@@ -12,6 +12,8 @@
 namespace tubule {
 namespace {
 
+constexpr std::size_t most_of_profile = 32 * megabyte;
+
 void note_places(const toml::node& node, const std::string& path, std::map<std::string, std::string>& places) {
     if (!path.empty()) places[path] = place(node.source());
     const std::string prefix = path.empty() ? "" : path + ".";
@@ -51,33 +53,39 @@ Case read_keys(const toml::table& root, const std::vector<std::string>& sets, co
     throw CaseErrors(std::move(complaints.found));
 }
 
-// That of the points of a profile, if its file has it; where the file cannot be read, the start says so.
-std::shared_ptr<const Formula> H0_of_points(const Case& c, const toml::table& root, const std::string& case_path) {
+// That of the points of a profile, if its file has it; where the file cannot be read, the run says so.
+std::shared_ptr<const Formula> H0_of_points(const Case& c, const toml::table& root) {
     const auto* file = std::get_if<ProfileFile>(&c.shape);
     if (!file) return nullptr;
-    const std::filesystem::path path = std::filesystem::path(case_path).parent_path() / file->path;
-    const std::string column = place_of_H0(path);
+    std::string column;
+    try {
+        column = place_of_H0(beside(c, file->path), shape_bytes(c, file->path, most_of_profile));
+    } catch (const CaseError&) {
+    }
     if (column.empty()) return nullptr;
     if (const toml::node_view given = root.at_path("energy.H0"))
         throw CaseErrors(
             {{place(given.node()->source()), "energy.H0",
               fmt::format("energy.H0 must be absent: {} has H0 in a column; or take that out", column), ""}});
-    try {
-        return read_profile(path, *file).H0;
-    } catch (const ProfileError& error) {
-        throw CaseError(error.what());
-    }
+    return start_profile(c, *file).H0;
 }
 
 }  // namespace
 
-Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path) {
+Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path,
+                const CaseInputs& inputs) {
     toml::table root = parse_toml(text, path);
     for (const std::string& set : sets) apply_override(root, set);
 
     Case c = read_keys(root, sets, path, nullptr);
-    if (auto H0 = H0_of_points(c, root, path)) c = read_keys(root, sets, path, std::move(H0));  // other conditions hold
-    c.path = path;
+    const auto place = [&] {
+        c.path = path;
+        for (const auto& input : inputs)
+            if (input->name == input_name(c.shape)) c.input = input;
+    };
+    place();
+    if (auto H0 = H0_of_points(c, root))
+        c = read_keys(root, sets, path, std::move(H0)), place();  // other conditions hold
     c.text = text;
     c.sets = sets;
     note_places(root, "", c.places);
@@ -98,8 +106,40 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
     return c;
 }
 
-Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets) {
-    return parse_case(read_input(path, megabyte), sets, path.string());
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets, const CaseInputs& inputs) {
+    return parse_case(read_input(path, megabyte), sets, path.string(), inputs);
+}
+
+CaseInputs inputs_of(const Case& c) {
+    return c.input ? CaseInputs{c.input} : CaseInputs{};
+}
+
+std::string input_name(const Shape& shape) {
+    if (const auto* result = std::get_if<ResultFrame>(&shape))
+        return fmt::format("{}, frame {}", result->path, result->frame);
+    if (const auto* profile = std::get_if<ProfileFile>(&shape)) return profile->path;
+    if (const auto* mesh = std::get_if<MeshFile>(&shape)) return mesh->path;
+    return {};
+}
+
+std::filesystem::path beside(const Case& c, const std::string& path) {
+    return std::filesystem::path(c.path).parent_path() / path;
+}
+
+std::string shape_bytes(const Case& c, const std::string& path, std::size_t most) {
+    return c.input && !c.input->bytes.empty() ? c.input->bytes : read_input(beside(c, path), most);
+}
+
+SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
+    const std::filesystem::path path = beside(c, file.path);
+    std::error_code error;
+    if (!(c.input && !c.input->bytes.empty()) && !std::filesystem::is_regular_file(path, error))
+        throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
+    try {
+        return read_profile(path, shape_bytes(c, file.path, most_of_profile), file);
+    } catch (const ProfileError& error) {
+        throw CaseError(error.what());
+    }
 }
 
 CaseError complaint(const Case& c, const std::string& key, const std::string& what) {

@@ -17,10 +17,22 @@ struct CaseError : std::runtime_error {
 };
 
 // Reads and validates a case; `sets` are overrides "a.b=value" applied to it first. Throws CaseError.
-Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets = {});
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& sets = {},
+               const CaseInputs& inputs = {});
 
-// The same for a text in memory; `path` names it in messages.
-Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path);
+// The same for a text in memory; `path` names it in messages. Of `inputs` it takes that of its shape, and reads the
+// bytes there instead of the file.
+Case parse_case(const std::string& text, const std::vector<std::string>& sets, const std::string& path,
+                const CaseInputs& inputs = {});
+CaseInputs inputs_of(const Case& c);
+
+// The name under which the file of a shape is kept; empty if it has none.
+std::string input_name(const Shape& shape);
+// Of a shape: where its file is, and its bytes, at most so many. Throws CaseError.
+std::filesystem::path beside(const Case& c, const std::string& path);
+std::string shape_bytes(const Case& c, const std::string& path, std::size_t most);
+// The smooth curve through the points of a file. Throws CaseError.
+SmoothProfile start_profile(const Case& c, const ProfileFile& file);
 
 // What is wrong with a key, "shape.path" say, that only a later stage can find out, with its place or, where it is
 // absent, that of its table.

@@ -42,6 +42,16 @@ ProfilePoints profile_points(const Record& frame) {
     return out;
 }
 
+ProfilePoints points_of(const Revolution& graph) {
+    constexpr int n = 1000;
+    ProfilePoints out{.r = {}, .z = {}, .length = graph.length};
+    for (int i = 0; i <= n; ++i) {
+        out.z.push_back(graph.length * i / n);
+        out.r.push_back(radius_at(graph, i < n ? out.z.back() : 0.0));
+    }
+    return out;
+}
+
 std::variant<Revolution, ProfilePoints> profile_of(const Record& frame) {
     if (kind_of(frame) == RecordKind::graph) return spline_of(frame);
     return profile_points(frame);

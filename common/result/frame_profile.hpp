@@ -15,10 +15,11 @@ struct ProfilePoints {
     double length = 0;
 };
 
-// All of these throw std::invalid_argument, worded to follow the name of the frame or its file, for a frame that holds no
-// profile or a damaged one.
+// All of these throw std::invalid_argument, worded to follow the name of the frame or its file, for a frame that holds
+// no profile or a damaged one.
 ProfilePoints profile_points(const Record& frame);
 // The spline of a graph; of other kinds the points.
 std::variant<Revolution, ProfilePoints> profile_of(const Record& frame);
+ProfilePoints points_of(const Revolution& graph);
 
 }  // namespace tubule

@@ -153,7 +153,7 @@ void require_parts(hid_t file) {
 
 CaseText get_case(hid_t file) {
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
-    return {get_case_text(text), get_texts(open_attribute(text, "set"), "set")};
+    return {get_case_text(text), get_texts(open_attribute(text, "set"), "set"), get_inputs(file)};
 }
 
 Contents get_contents(hid_t file) {
@@ -210,6 +210,7 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     put_attribute(file, "about_begun", contents.about_begun);
     const char* text = contents.case_text.text.c_str();
     put_attribute(put_dataset(file, "case", text_type(), scalar(), &text), "set", contents.case_text.sets);
+    put_inputs(file, contents.case_text.inputs);
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);

@@ -157,6 +157,19 @@ Handle make_group(hid_t parent, const std::string& name) {
     return {H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, how, H5P_DEFAULT), H5Gclose, "make", name};
 }
 
+void put_inputs(hid_t file, const CaseInputs& inputs) {
+    if (inputs.empty()) return;
+    const auto group = make_group(file, "inputs");
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+        const CaseInput& input = *inputs[i];
+        const auto data =
+            put_dataset(group, std::to_string(i), H5T_NATIVE_UINT8, space({input.bytes.size()}), input.bytes.data());
+        put_attribute(data, "name", input.name);
+        put_attribute(data, "size", input.size);
+        put_attribute(data, "crc32", std::uint64_t{input.crc});
+    }
+}
+
 // ---- reading
 
 Handle open_file(const std::filesystem::path& file) {
@@ -271,6 +284,23 @@ std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name) {
     std::vector<std::int64_t> values(opened.size());
     opened.read(H5T_NATIVE_INT64, values.data(), name);
     return values;
+}
+
+CaseInputs get_inputs(hid_t file) {
+    if (!has(file, "inputs")) return {};
+    const auto group = open_group(file, "inputs");
+    CaseInputs out;
+    for (const std::string& name : member_names(group)) {
+        const Opened opened(group, name);
+        CaseInput input;
+        input.bytes.resize(opened.size());
+        opened.read(H5T_NATIVE_UINT8, input.bytes.data(), name);
+        input.name = get_texts(open_attribute(opened.dataset, "name"), "name").at(0);
+        input.size = get_attribute<std::uint64_t>(open_attribute(opened.dataset, "size"), H5T_NATIVE_UINT64, "size");
+        input.crc = get_attribute<std::uint32_t>(open_attribute(opened.dataset, "crc32"), H5T_NATIVE_UINT32, "crc32");
+        out.push_back(std::make_shared<const CaseInput>(std::move(input)));
+    }
+    return out;
 }
 
 }  // namespace tubule::h5

@@ -80,6 +80,9 @@ Extent extent_of(hid_t dataset, std::span<const std::byte> data);
 // A group that remembers the order in which its attributes and members were made.
 Handle make_group(hid_t parent, const std::string& name);
 
+// As /inputs, if there are any.
+void put_inputs(hid_t file, const CaseInputs& inputs);
+
 // ---- reading
 
 // Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged.
@@ -108,5 +111,6 @@ std::vector<std::string> member_names(hid_t group);
 
 Array get_array(hid_t parent, const std::string& name);
 std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name);
+CaseInputs get_inputs(hid_t file);
 
 }  // namespace tubule::h5

@@ -70,4 +70,26 @@ SurfaceCells get_mesh(Payload& in) {
     return mesh;
 }
 
+void put(Bytes& out, const CaseInputs& inputs) {
+    put(out, std::uint64_t{inputs.size()});
+    for (const auto& input : inputs) {
+        put(out, input->name);
+        put(out, input->size);
+        put(out, std::uint64_t{input->crc});
+        put(out, input->bytes);
+    }
+}
+
+CaseInputs get_inputs(Payload& in) {
+    CaseInputs out;
+    for (auto n = in.get<std::uint64_t>(); n > 0; --n) {
+        CaseInput input;
+        input.name = in.text();
+        input.size = in.get<std::uint64_t>(), input.crc = static_cast<std::uint32_t>(in.get<std::uint64_t>());
+        input.bytes = in.text();
+        out.push_back(std::make_shared<const CaseInput>(std::move(input)));
+    }
+    return out;
+}
+
 }  // namespace tubule

@@ -8,9 +8,11 @@ namespace tubule {
 
 void put(Bytes& out, const Record& record);
 void put(Bytes& out, const SurfaceCells& mesh);
+void put(Bytes& out, const CaseInputs& inputs);
 
 // Throw as Payload.
 Record get_record(Payload& in);
 SurfaceCells get_mesh(Payload& in);
+CaseInputs get_inputs(Payload& in);
 
 }  // namespace tubule

@@ -14,6 +14,8 @@
 #include <variant>
 #include <vector>
 
+#include "common/case/case_input.hpp"
+
 namespace tubule {
 
 struct Array {
@@ -61,6 +63,7 @@ using About = std::vector<std::pair<std::string, Value>>;
 struct CaseText {
     std::string text;               // verbatim
     std::vector<std::string> sets;  // overrides "key=value"
+    CaseInputs inputs = {};         // what it reads besides
 };
 
 // Writes a result such that every row and frame passed to it survives a kill at any later moment:

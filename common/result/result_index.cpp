@@ -177,8 +177,8 @@ void drop_rows(Contents& contents, std::vector<std::string>& words) {
     contents.rows = std::move(good);
 }
 
-// Series that lack more than half of their numbers: to drop them costs less than to drop the rows that lack them. Without
-// its times a row means nothing, and without all series no run goes on.
+// Series that lack more than half of their numbers: to drop them costs less than to drop the rows that lack them.
+// Without its times a row means nothing, and without all series no run goes on.
 void drop_series(Contents& contents, std::vector<std::string>& words) {
     const std::size_t width = contents.series.size(), rows = contents.rows.size() / width;
     std::vector<std::size_t> kept;
@@ -241,6 +241,7 @@ Bytes index_of(const Contents& contents, const std::vector<Extent>& extents) {
         put(out, extent.size);
         put_list(out, extent.crcs);
     }
+    if (!contents.case_text.inputs.empty()) put(out, contents.case_text.inputs);  // last: earlier versions lack them
     return out;
 }
 
@@ -271,6 +272,7 @@ Contents contents_by_index(std::span<const std::byte> index, std::span<const std
     for (SurfaceCells& mesh : contents.meshes) fill(mesh, datasets);
     for (Record& frame : contents.frames) fill(frame, datasets);
     if (contents.checkpoint) fill(*contents.checkpoint, datasets);
+    if (!in.empty()) contents.case_text.inputs = get_inputs(in);
     return contents;
 }
 

@@ -4,8 +4,10 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/shapes/meridian.hpp"
+#include "common/shapes/sphere.hpp"
 
 namespace tubule {
 
@@ -18,7 +20,13 @@ struct MeshFile {
     std::optional<double> smoothing_length = {};  // then: waves of this length keep half of their height
     bool fill_holes = false;
     std::optional<double> wrap = {};  // put a new surface around all triangles that closes gaps narrower than this
+    std::optional<double> scale = {}, area = {};  // of the finished surface: a factor, or the area that it gets
+    std::vector<SphereMode> modes = {};           // waves along the normal, then
+    std::vector<ShapeNoise> noise = {};           // becomes modes once the case is read
 };
+
+// Adds the modes of the noise to the others, and forgets the noise.
+void make_noise(MeshFile& file);
 
 inline Asymmetry asymmetry(const MeshFile&) {
     return {"shape.kind", "must not be \"file\": meshes need tier = \"surface3d\""};
@@ -27,6 +35,12 @@ inline Asymmetry asymmetry(const MeshFile&) {
 template <class Keys>
 void keys(Keys& k, MeshFile& file) {
     k.text("path", file.path, k.required);
+    k.number("area", file.area, {.above = 0});
+    if (file.area)
+        k.absent("scale", "must be absent: area says how large the surface is");
+    else
+        k.number("scale", file.scale, {.above = 0});
+    harmonic_keys(k, file);
     k.number("weld", file.weld, {.from = 0});
     k.integer("remesh", file.remesh, {.from = 100, .to = 20000});
     if (!file.remesh) {

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/shapes/mesh_file.hpp"
+#include "common/shapes/result_frame.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/tube.hpp"
 
@@ -53,8 +55,11 @@ void make_noise(Tube& tube) {
     }
 }
 
+namespace {
+
 // Neither the mean radius changes (l = 0) nor does the sphere shift (l = 1).
-void make_noise(Sphere& sphere) {
+template <class Shape>
+void make_harmonics(Shape& sphere) {
     for (const ShapeNoise& noise : std::exchange(sphere.noise, {})) {
         Random random(noise.seed);
         std::vector<SphereMode> modes;
@@ -64,6 +69,31 @@ void make_noise(Sphere& sphere) {
         scale(modes, noise.amplitude,
               [](const SphereMode& mode) { return (mode.m == 0 ? 1 : 0.5) / (4 * std::numbers::pi); });
         sphere.modes.insert(sphere.modes.end(), modes.begin(), modes.end());
+    }
+}
+
+}  // namespace
+
+void make_noise(Sphere& sphere) {
+    make_harmonics(sphere);
+}
+void make_noise(MeshFile& file) {
+    make_harmonics(file);
+}
+
+void make_noise(ResultFrame& result) {
+    for (const FrameNoise& noise : std::exchange(result.noise, {})) {
+        const ShapeNoise one{noise.amplitude, noise.l ? *noise.l : *noise.n, noise.around, noise.seed};
+        Sphere sphere{1, {}, {one}};
+        Tube tube{1, 1, {}, {one}};
+        if (noise.l) {
+            make_noise(sphere);
+            for (const auto& [amplitude, l, m] : sphere.modes) result.modes.push_back({amplitude, l, {}, m, 0});
+        } else {
+            make_noise(tube);
+            for (const auto& [amplitude, n, m, phase] : tube.modes)
+                result.modes.push_back({amplitude, {}, n, m, phase});
+        }
     }
 }
 

@@ -7,8 +7,8 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numeric>
+#include <sstream>
 
 #include "common/geometry/profile_point.hpp"
 
@@ -77,7 +77,7 @@ std::optional<double> number_in(const std::string& cell) {
 // The rows of a file: what is neither empty nor a comment.
 class Rows {
 public:
-    explicit Rows(const std::filesystem::path& path) : file_(path) {}
+    explicit Rows(const std::string& text) : file_(text) {}
     // The next row; false at the end.
     bool next() {
         for (std::string text; std::getline(file_, text);) {
@@ -95,7 +95,7 @@ public:
     std::vector<Cell> row;
 
 private:
-    std::ifstream file_;
+    std::istringstream file_;
 };
 
 // Which column holds what; those of other names are ignored.
@@ -159,8 +159,8 @@ struct Points {
     bool have_H0 = false;
 };
 
-Points read_points(const std::filesystem::path& path) {
-    Rows rows(path);
+Points read_points(const std::filesystem::path& path, const std::string& text) {
+    Rows rows(text);
     Points out;
     Columns columns;
     for (bool first = true; rows.next(); first = false) {
@@ -419,9 +419,8 @@ std::array<double, 4> point_at(const SmoothProfile& profile, double s) {
     return {r[0], r[1], z[0] + profile.length * s, z[1] + profile.length};
 }
 
-SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile& file) {
-    if (!std::filesystem::is_regular_file(path) || !std::ifstream(path)) refuse(path, "cannot be read");
-    auto [points, have_H0] = read_points(path);
+SmoothProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file) {
+    auto [points, have_H0] = read_points(path, text);
     const double tolerance = file.tolerance.value_or(default_tolerance * extent(points));
     const Kind kind = put_in_order(path, points, file, tolerance);
     std::vector<double> s{0};
@@ -451,9 +450,8 @@ SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile&
     return best;
 }
 
-std::string place_of_H0(const std::filesystem::path& path) {
-    if (std::error_code error; !std::filesystem::is_regular_file(path, error)) return {};
-    Rows rows(path);
+std::string place_of_H0(const std::filesystem::path& path, const std::string& text) {
+    Rows rows(text);
     if (!rows.next() || number_in(rows.row[0].text)) return {};
     const auto column = column_of(rows.row, "H0");
     return column ? fmt::format("{}:{}:{}", path.string(), rows.line, rows.row[*column].column) : "";

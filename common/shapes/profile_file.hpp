@@ -54,10 +54,10 @@ struct SmoothProfile {
     std::string note() const;  // the report of the fit, a sentence
 };
 
-// Where the file has a column H0: "FILE:LINE:COLUMN" of its heading; else, and where it cannot be read, empty.
-std::string place_of_H0(const std::filesystem::path& path);
-// Throws ProfileError.
-SmoothProfile read_profile(const std::filesystem::path& path, const ProfileFile& file);
+// Where this text of a file has a column H0: "FILE:LINE:COLUMN" of its heading; else empty.
+std::string place_of_H0(const std::filesystem::path& path, const std::string& text);
+// Throws ProfileError, with the path as the name of the text.
+SmoothProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file);
 
 // r, dr/ds, z, dz/ds
 std::array<double, 4> point_at(const SmoothProfile& profile, double s);

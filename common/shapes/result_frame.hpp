@@ -1,22 +1,84 @@
-// Shape "result": a frame of a result of either tier.
+// Shape "result": a frame of a result of either tier, which waves along its normal may disturb.
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
+#include <vector>
+
+#include "common/shapes/meridian.hpp"
 
 namespace tubule {
+
+// Of a closed surface l, of a tube or ring n: which of them it is only reading the frame tells.
+struct FrameMode {
+    double amplitude = 0;
+    std::optional<int> l, n;
+    int m = 0;
+    double phase = 0;  // of n
+};
+struct FrameNoise {
+    double amplitude = 0;
+    std::optional<int> l, n;
+    int around = 0, seed = 1;
+};
 
 struct ResultFrame {
     static constexpr const char* kind = "result";
     std::string path;  // relative to the case file
     int frame = -1;    // from 0; negative: from the end
+    std::vector<FrameMode> modes = {};
+    std::vector<FrameNoise> noise = {};  // becomes modes once the case is read
+
+    bool closed() const { return !modes.empty() && modes.front().l.has_value(); }  // what its modes take it for
 };
+
+// Adds the modes of the noise to the others, and forgets the noise.
+void make_noise(ResultFrame& result);
+
+inline Asymmetry asymmetry(const ResultFrame& result) {
+    const Asymmetry noise = noise_around(result.noise);
+    return noise.first.empty() ? wave_around(result.modes) : noise;
+}
+
+// One of l and n, and of all the same.
+template <class Keys, class Waves>
+void check_waves(Keys& k, const char* key, const Waves& waves, bool closed) {
+    for (std::size_t i = 0; i < waves.size(); ++i)
+        k.check(fmt::format("{}.{}", key, i), [&]() -> std::string {
+            if (waves[i].l.has_value() == waves[i].n.has_value())
+                return "needs l, if the frame is a closed surface, or n, if it is a tube or a ring; one of the two";
+            return waves[i].l.has_value() == closed ? "" : "must have the same of l and n as the others";
+        });
+}
 
 template <class Keys>
 void keys(Keys& k, ResultFrame& result) {
     constexpr double most = std::numeric_limits<int>::max();
     k.text("path", result.path, k.required);
     k.integer("frame", result.frame, {.from = -most, .to = most});
+    k.tables("mode", result.modes, [](auto& k, FrameMode& mode) {
+        k.number("amplitude", mode.amplitude, {}, k.required);
+        k.integer("l", mode.l, {.from = 0, .to = 1000});
+        k.integer("n", mode.n, {.from = 0, .to = 10000});
+        if (mode.l) {
+            k.integer("m", mode.m, {.from = 0, .to = static_cast<double>(*mode.l), .note = "l"});
+            k.absent("phase", "must be absent: only valid with n");
+        } else {
+            k.integer("m", mode.m, {.from = -10000, .to = 10000});
+            k.number("phase", mode.phase);
+        }
+    });
+    k.tables("noise", result.noise, [](auto& k, FrameNoise& noise) {
+        k.number("amplitude", noise.amplitude, {.from = 0}, k.required);
+        k.integer("l", noise.l, {.from = 2, .to = 100});
+        k.integer("n", noise.n, {.from = 1, .to = 100});
+        k.integer("m", noise.around, {.from = 0, .to = 100});
+        k.integer("seed", noise.seed, {.from = 0, .to = 1e9});
+    });
+    const bool closed = result.modes.empty() ? !result.noise.empty() && result.noise.front().l : result.closed();
+    check_waves(k, "mode", result.modes, closed);
+    check_waves(k, "noise", result.noise, closed);
 }
 
 }  // namespace tubule

@@ -68,15 +68,21 @@ inline Meridian meridian(const Sphere& sphere) {
 // Why this is no surface, worded to follow "shape"; empty when it is one.
 std::string complaint(const Sphere& sphere);
 
-template <class Keys>
-void keys(Keys& k, Sphere& sphere) {
-    k.number("radius", sphere.radius, {.above = 0}, k.required);
-    k.tables("mode", sphere.modes, [](auto& k, SphereMode& mode) {
+// The keys of spherical harmonics, of any shape that has them.
+template <class Keys, class Shape>
+void harmonic_keys(Keys& k, Shape& shape) {
+    k.tables("mode", shape.modes, [](auto& k, SphereMode& mode) {
         k.number("amplitude", mode.amplitude, {}, k.required);
         k.integer("l", mode.l, {.from = 0, .to = 1000}, k.required);
         k.integer("m", mode.m, {.from = 0, .to = static_cast<double>(mode.l), .note = "l"});
     });
-    k.tables("noise", sphere.noise, [](auto& k, ShapeNoise& noise) { keys(k, noise, "l", 2); });
+    k.tables("noise", shape.noise, [](auto& k, ShapeNoise& noise) { keys(k, noise, "l", 2); });
+}
+
+template <class Keys>
+void keys(Keys& k, Sphere& sphere) {
+    k.number("radius", sphere.radius, {.above = 0}, k.required);
+    harmonic_keys(k, sphere);
     k.check("", [&] { return complaint(sphere); });
 }
 

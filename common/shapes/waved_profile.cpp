@@ -1,5 +1,7 @@
 #include "common/shapes/waved_profile.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <cmath>
 #include <stdexcept>
@@ -52,6 +54,42 @@ ProfileWave normal_wave(const ProfileCurve& curve, int m, const std::vector<doub
         radial.push_back(w[i] * t_z), axial.push_back(-w[i] * t_r);
     }
     return {m, fitted(curve, s, radial, m + 1), fitted(curve, s, axial, m)};
+}
+
+namespace {
+
+// The surface as it is disturbed must keep off the axis but at poles.
+void require_radius(const WavedProfile& surface) {
+    constexpr int along = 400, around = 32;
+    const bool cell = is_cell(surface.curve);
+    for (int i = cell ? 1 : 0; i < along; ++i)
+        for (int j = 0; j < around; ++j) {
+            const double s = double(i) / along, phi = 2 * pi * j / around;
+            const Eigen::Vector3d x = position(surface, Torus{2, 1}, base_point(surface.curve, s, phi));
+            if (!(x[0] * std::cos(phi) + x[1] * std::sin(phi) > 0))
+                throw std::invalid_argument(fmt::format("moves the surface across its axis at z = {:.4g}", x[2]));
+        }
+}
+
+}  // namespace
+
+Vector3<double> base_point(const ProfileCurve& curve, double s, double phi) {
+    const double x = std::cos(phi), y = std::sin(phi), angle = 2 * pi * s;
+    if (is_cell(curve)) return {x * std::sin(pi * s), y * std::sin(pi * s), -std::cos(pi * s)};
+    if (curve.kind == ProfileCurve::Kind::tube) return {x, y, curve.length * s};
+    return {x * (2 + std::cos(angle)), y * (2 + std::cos(angle)), std::sin(angle)};
+}
+
+WavedProfile disturbed(WavedProfile surface, const ResultFrame& frame) {
+    const ProfileCurve& curve = surface.curve;
+    const double radius = is_cell(curve) ? std::sqrt(curve.mean_radius * curve.arc_length / 2) : curve.mean_radius;
+    const bool tube = curve.kind == ProfileCurve::Kind::tube;
+    const std::vector<double>& x = curve.functions.x;
+    const VelocityAtPoints outward{std::vector<double>(x.size(), 1), std::vector<double>(x.size(), 0), {}};
+    surface.modes = NormalModes{disturbed_shape(frame, is_cell(curve), radius, tube ? curve.length : 1),
+                                profile_velocity(curve, outward).meridional};
+    require_radius(surface);
+    return surface;
 }
 
 ProfileVelocity profile_velocity(const ProfileCurve& curve, const VelocityAtPoints& points) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/shapes/disturbed_shape.hpp"
 #include "common/shapes/profile_curve.hpp"
 
 namespace tubule {
@@ -24,11 +25,24 @@ struct ProfileVelocity {
     BlendedCurve meridional, around;  // (e_r, e_z), (e_phi, nothing)
 };
 
+// Waves along the normal, which is a function of the profile as `functions` of ProfileCurve.
+struct NormalModes {
+    DisturbedShape shape;
+    BlendedCurve normal;
+};
+
 struct WavedProfile {
     ProfileCurve curve;
     std::vector<ProfileWave> waves;
     std::optional<ProfileVelocity> velocity;
+    std::optional<NormalModes> modes = {};
 };
+
+// With the modes of a frame. Of a cell their direction is that on the base sphere, where the polar angle is in
+// proportion to the arc length, and their radius that of the sphere of its area; along a tube n counts waves in z,
+// along a ring waves of the arc length. Throws std::invalid_argument for modes of another kind of surface, and where
+// the surface would meet the axis.
+WavedProfile disturbed(WavedProfile surface, const ResultFrame& frame);
 
 // The normal displacement w(s) cos(m phi) of the curve; w at equally spaced s, both ends included. Throws
 // std::invalid_argument for m < 1 or fewer values than terms.
@@ -85,8 +99,16 @@ std::array<S, ProfileWave::terms> wave_functions(ProfileCurve::Kind kind, const 
 template <class S>
 Vector3<S> position(const WavedProfile& surface, const Torus& base, const Vector3<S>& p) {
     Vector3<S> out = position(surface.curve, base, p);
-    if (surface.waves.empty()) return out;
+    if (surface.waves.empty() && !surface.modes) return out;
     const ProfilePlace<S> at = place_of(surface.curve, base, p);
+    if (surface.modes) {
+        const Vector3<S> on_base(at.x, at.y, at.along);
+        const S height =
+            height_at(surface.modes->shape, surface.curve.kind == ProfileCurve::Kind::tube ? out : on_base);
+        const auto [radial, axial] = value_at(surface.modes->normal, at.along);
+        out += Vector3<S>(height * radial * at.x, height * radial * at.y, height * axial);
+    }
+    if (surface.waves.empty()) return out;
     const auto functions = wave_functions(surface.curve.kind, at.along);
     for (const ProfileWave& wave : surface.waves) {
         S cosine = at.x, sine = at.y;  // of m phi
@@ -107,6 +129,9 @@ Vector3<S> position(const WavedProfile& surface, const Torus& base, const Vector
     }
     return out;
 }
+
+// The point of the base surface at the fraction s of the profile and the angle phi; of a ring on Torus{2, 1}.
+Vector3<double> base_point(const ProfileCurve& curve, double s, double phi);
 
 // The velocity there; the surface must have one. Waves do not change it.
 Vector3<double> velocity(const WavedProfile& surface, const Torus& base, const Vector3<double>& p);

@@ -32,7 +32,7 @@ std::string contents(const std::filesystem::path& path) {
     return data;
 }
 
-FileMesh read_file(const std::filesystem::path& path) {
+FileMesh read_file(const std::filesystem::path& path, const std::string* bytes) {
     const std::string extension = path.extension().string(), name = path.string();
     const auto reader = is_keyword(extension, ".obj")   ? read_obj
                         : is_keyword(extension, ".off") ? read_off
@@ -40,7 +40,7 @@ FileMesh read_file(const std::filesystem::path& path) {
                         : is_keyword(extension, ".stl") ? read_stl
                                                         : nullptr;
     if (!reader) throw MeshError(fmt::format("{}: the extension must be .obj, .off, .ply or .stl", name));
-    return reader(name, contents(path));
+    return reader(name, bytes ? *bytes : contents(path));
 }
 
 // Checks the vertices of each face and triangulates those with more than three.
@@ -198,10 +198,10 @@ void refuse(const ImportedMesh& mesh, const std::string& message) {
     throw MeshError(mesh.names.file + ": " + message);
 }
 
-ImportedMesh read_mesh(const std::filesystem::path& path, double weld, bool drop_degenerate) {
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld, bool drop_degenerate, const std::string* bytes) {
     if (!(weld >= 0) || !std::isfinite(weld))
         throw MeshError(fmt::format("{}: weld must be a number >= 0, not {}", path.string(), weld));
-    const FileMesh file = read_file(path);
+    const FileMesh file = read_file(path, bytes);
     if (file.faces.empty()) throw MeshError(path.string() + ": the file contains no faces");
     if (file.points.empty()) throw MeshError(path.string() + ": the file contains no vertices");
     double size = 0;

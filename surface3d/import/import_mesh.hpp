@@ -48,7 +48,8 @@ std::string vertex_name(const ImportedMesh& mesh, int vertex);
 // The triangles of a file; the extension gives the format (.obj .off .ply .stl, in either case). Polygons become
 // triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and
 // triangles that collapse are dropped, with a note. Faces with a vertex twice are errors unless `drop_degenerate`.
-// Throws MeshError; never returns part of a file.
-ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0, bool drop_degenerate = false);
+// `bytes`: of the file, if they have been read. Throws MeshError; never returns part of a file.
+ImportedMesh read_mesh(const std::filesystem::path& path, double weld = 0, bool drop_degenerate = false,
+                       const std::string* bytes = nullptr);
 
 }  // namespace tubule::surface3d

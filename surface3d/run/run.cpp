@@ -274,7 +274,21 @@ RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
     return run(c, Start(c), observer, restart);
 }
 
-RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+namespace {
+
+// Of a surface that brings its own triangles, in terms of the keys that it has.
+void advise_given_triangles(const Case& c, std::string& advice) {
+    const auto* file = std::get_if<MeshFile>(&c.shape);
+    const std::string more = !file          ? "begin with a frame of more triangles"
+                             : file->remesh ? "set a larger shape.remesh"
+                                            : "set shape.remesh, or give the file more triangles";
+    for (const auto& [words, instead] : {std::pair<std::string, std::string>{"use more elements", more},
+                                         {"try another discretisation.elements or", "try another"},
+                                         {", or discretisation.mesh = \"graded\"", ""}})
+        if (const auto at = advice.find(words); at != advice.npos) advice.replace(at, words.size(), instead);
+}
+
+RunSummary run_any(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
     if (c.moves()) return run_motion(c, start, observer, restart);
     const RunClock clock(c, observer);
     const auto meshes = meshes_of(c, start);
@@ -285,6 +299,14 @@ RunSummary run(const Case& c, const Start& start, RunObserver& observer, const R
         observer.row(rest_series(c).values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });
+    return s;
+}
+
+}  // namespace
+
+RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+    RunSummary s = run_any(c, start, observer, restart);
+    if (!start.resizable()) advise_given_triangles(c, s.stop.advice);
     return s;
 }
 

@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -13,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/shapes/profile_curve.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
@@ -21,6 +21,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
 #include "surface3d/motion/surface_law.hpp"
+#include "surface3d/run/given_surface.hpp"
 #include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/remeshed_start.hpp"
 
@@ -179,10 +180,6 @@ Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
     };
 }
 
-std::filesystem::path beside(const Case& c, const std::string& path) {
-    return std::filesystem::path(c.path).parent_path() / path;
-}
-
 // What `make` makes of a mesh of the case, which may turn out to be unusable: the complaint then begins with `blame`.
 template <class MakeOne>
 auto usable(const std::string& blame, const MakeOne& make) {
@@ -193,17 +190,8 @@ auto usable(const std::string& blame, const MakeOne& make) {
     }
 }
 
-Record frame_of(const Case& c, const ResultFrame& from, Result& result) {
-    try {
-        result = read_result(beside(c, from.path));
-    } catch (const std::runtime_error& error) {
-        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
-    }
-    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
-    if (number < 0 || number >= count)
-        throw complaint(c, "shape.frame",
-                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
-    return result.frames[number];
+const std::string* given_bytes(const Case& c) {
+    return c.input && !c.input->bytes.empty() ? &c.input->bytes : nullptr;
 }
 
 // The meshes of a start; what else there is to say of them.
@@ -212,6 +200,39 @@ struct Prepared {
     bool resizable = true;
     std::vector<std::string> notes = {};
 };
+
+// The same, scaled and then disturbed.
+Prepared as_asked(Prepared given, const MeshFile& file, int order) {
+    const double factor =
+        file.area ? std::sqrt(*file.area / area_of(given.make(0, order).mesh)) : file.scale.value_or(1);
+    if (factor == 1 && file.modes.empty()) return given;
+    given.make = [make = given.make, factor, modes = file.modes](int triangles, int order) {
+        StartMesh start = make(triangles, order);
+        start.mesh = scaled(start.mesh, factor);
+        const double radius = std::sqrt(area_of(start.mesh) / (4 * pi));
+        if (!modes.empty()) start.mesh = displaced(start.mesh, Sphere{radius, modes});
+        return start;
+    };
+    return given;
+}
+
+// Users of a mesh may not know how large it is. Bending forces change it in R^4/kappa times the friction, as far as
+// viscosity or inertia do not take longer.
+std::string far_off(const Case& c, double area) {
+    constexpr double latest = 100, earliest = 1e-4;
+    const double kappa = 2 * c.energy.k[term_number("k20")], radius = std::sqrt(area / (4 * pi));
+    if (!(kappa > 0)) return {};
+    const MotionLaw law = motion_law(c.model);
+    const double size = radius * radius, time = std::max({law.friction * size * size, law.viscosity * size,
+                                                          std::sqrt(law.inertia * kappa) * size}) /
+                                                kappa;
+    if (!(time > 0) || (c.time.end <= latest * time && c.time.end >= earliest * time)) return {};
+    return fmt::format(
+        "time.end = {:.4g} is {:.2g} times the {:.2g} in which bending moves a surface of this size (R^4/kappa at a "
+        "friction of 1: kappa = 2 k20, R = {:.3g} from the area); set time.end to {:.1g} or so, or give the surface "
+        "another size by shape.area or shape.scale",
+        c.time.end, c.time.end / time, time, radius, time);
+}
 
 struct Prepare {
     const Case& c;
@@ -255,22 +276,14 @@ struct Prepare {
         return on(UnitSphere{}, map);
     }
     Prepared operator()(const ProfileFile& file) const {
-        const std::filesystem::path path = beside(c, file.path);
-        std::error_code error;
-        if (!std::filesystem::is_regular_file(path, error))
-            throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
-        try {
-            const SmoothProfile profile = read_profile(path, file);
-            const WavedProfile surface{profile_curve(profile), {}, {}};
-            const auto with_H0 = [&](const Torus& torus) {
-                return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
-            };
-            Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
-            out.notes.push_back(profile.note());
-            return out;
-        } catch (const ProfileError& error) {
-            throw CaseError(error.what());
-        }
+        const SmoothProfile profile = start_profile(c, file);
+        const WavedProfile surface{profile_curve(profile), {}, {}};
+        const auto with_H0 = [&](const Torus& torus) {
+            return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
+        };
+        Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
+        out.notes.push_back(profile.note());
+        return out;
     }
     // New triangles of it; of other orders, what interpolates them.
     Prepared remeshed(const MeshFile& file, const std::string& blame) const {
@@ -279,16 +292,17 @@ struct Prepare {
                             "needs a build with CGAL: install libcgal-dev (Debian, Ubuntu) or CGAL 5.5 or newer, then "
                             "run cmake --preset release && cmake --build --preset release");
         const RemeshedStart start = usable(blame, [&] {
-            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true), file, element_order(c));
+            return remeshed_start(read_mesh(beside(c, file.path), file.weld, true, given_bytes(c)), file,
+                                  element_order(c));
         });
         return {[start](int, int order) { return StartMesh{start.of_order(order), {}, {}}; }, false, start.notes};
     }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
         const std::string blame = complaint(c, "shape.path", "cannot be used").what();
-        if (file.remesh) return remeshed(file, blame);
+        if (file.remesh) return as_asked(remeshed(file, blame), file, element_order(c));
         const auto imported = std::make_shared<ImportedMesh>(usable(blame, [&] {
-            ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld);
+            ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld, false, given_bytes(c));
             close_mesh(mesh);
             return mesh;
         }));
@@ -301,14 +315,17 @@ struct Prepare {
         std::vector<std::string> notes = imported->notes;
         const std::vector<std::string>& more = fit(element_order(c)).report.notes;
         notes.insert(notes.end(), more.begin(), more.end());
-        return {[=](int, int order) { return StartMesh{fit(order).surface, {}, {}}; }, false, notes};
+        return as_asked({[=](int, int order) {
+                             return StartMesh{fit(order).surface, {}, {}};
+                         },
+                         false, notes},
+                        file, element_order(c));
     }
     Prepared operator()(const ResultFrame& from) const {
-        Result result;
-        const Record frame = frame_of(c, from, result);
-        if (frame.mesh) {
+        const auto [frame, cells] = start_frame(c);
+        if (cells) {
             refuse_what_needs_a_shape();
-            const CurvedMesh mesh = frame_surface(frame, result.meshes.at(*frame.mesh));
+            const CurvedMesh mesh = disturbed(frame_surface(frame, *cells), from);
             return {[mesh, moves = velocities(frame, mesh)](int, int order) {
                         if (mesh.order == order) return StartMesh{mesh, {}, moves ? columns(*moves) : VectorField()};
                         return StartMesh{
@@ -320,14 +337,29 @@ struct Prepare {
             const auto profile = profile_of(frame);
             if (const auto* spline = std::get_if<Revolution>(&profile)) {
                 if (asks_for_velocity()) throw without_velocity();
-                return of_spline(*spline);
+                if (from.modes.empty()) return of_spline(*spline);
             }
-            const auto& [r, z, length] = std::get<ProfilePoints>(profile);
-            WavedProfile start{profile_curve(r, z, length), {}, {}};
+            WavedProfile start;
+            if (!from.modes.empty()) {
+                start = disturbed_profile(c, frame);
+            } else {
+                const auto& [r, z, length] = std::get<ProfilePoints>(profile);
+                start.curve = profile_curve(r, z, length);
+            }
             if (asks_for_velocity()) start.velocity = profile_velocities(frame, start.curve);
             return (*this)(start);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}: {}", from.path, error.what()));
+        }
+    }
+    CurvedMesh disturbed(CurvedMesh mesh, const ResultFrame& from) const {
+        if (from.modes.empty()) return mesh;
+        try {
+            const bool closed = mesh.period == 0;
+            const double radius = std::sqrt(area_of(mesh) / (4 * pi * (closed ? 1 : mesh.period)));
+            return displaced(mesh, disturbed_shape(from, closed, radius, mesh.period));
+        } catch (const std::invalid_argument& error) {
+            throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
         }
     }
     bool asks_for_velocity() const { return c.velocity.initial == InitialVelocity::result; }
@@ -370,6 +402,9 @@ Start::Start(const Case& c) {
     make_ = std::move(prepared.make);
     resizable_ = prepared.resizable;
     notes_ = std::move(prepared.notes);
+    if (c.moves() && std::holds_alternative<MeshFile>(c.shape))
+        time_scale_ = far_off(c, area_of(make_(0, element_order(c)).mesh));
+    if (!time_scale_.empty()) notes_.push_back(time_scale_);
     if (c.moves()) fields_ = fields_of(motion_law(c.model));
 }
 

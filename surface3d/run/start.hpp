@@ -32,6 +32,9 @@ public:
     bool resizable() const { return resizable_; }                     // whether it can; a file brings its own triangles
     const std::vector<std::string>& notes() const { return notes_; }  // what was changed on the way, whole sentences
 
+    // Where time.end is far from the times in which a mesh of this size moves: that it is; else empty.
+    const std::string& time_scale() const { return time_scale_; }
+
     using Make = std::function<StartMesh(int triangles, int order)>;
     // Meshes that are made elsewhere.
     Start(Make make, bool resizable) : make_(std::move(make)), resizable_(resizable) {}
@@ -40,6 +43,7 @@ private:
     Make make_;
     bool resizable_ = true;
     std::vector<std::string> notes_;
+    std::string time_scale_;
     int fields_ = 1;  // that a run solves for at the nodes
 };
 

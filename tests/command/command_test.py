@@ -218,6 +218,13 @@ class Refused(ProgramTest):
         self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
         self.assertIn("nowhere.hdf: no such file", self.refused("confirm", "nowhere.hdf"))
 
+    def test_blank_names(self):
+        self.tubule("run", "case.toml")
+        for command in (["run", "case.toml"], ["scan", "case.toml", "--over", "energy.k42=0,0.1"], ["show", "case.hdf"],
+                        ["view", "case.hdf"], ["plot", "case.hdf"], ["equilibrium", "case.toml"]):  # fmt: skip
+            for name in ("", " ", "\t "):
+                self.assertIn("must not be blank: give the file a name", self.refused(*command, "-o", name))
+
     def test_names_that_no_result_can_have(self):
         scan = ("scan", self.case, "--over", "energy.k42=0,0.1")
         for command in (("run", self.case), scan):
@@ -262,7 +269,7 @@ class Expect(ProgramTest):
     def test_a_stop_that_was_expected_is_success(self):
         self.write("case.toml", QUICK + '[expect]\nstop = "time-limit"\n')
         self.tubule("run", self.case, "--expect", "--set", "time.limit=1e-9")
-        self.tubule("run", self.case, "--set", "time.limit=1e-9", status=5)
+        self.tubule("run", self.case, "--set", "time.limit=1e-9", "--overwrite", status=5)
 
     def test_of_a_complete_result(self):
         self.write("case.toml", QUICK + EXPECT)
@@ -283,12 +290,27 @@ class Show(ProgramTest):
 
     def test_into_a_file(self):
         for words in (("--csv",), ("--json",), ()):
-            self.assertEqual(self.tubule("show", self.result, *words, "-o", "out.txt"), ("", ""))
-            self.assertEqual((self.folder / "out.txt").read_text(), self.tubule("show", self.result, *words)[0])
+            out = "-".join(("out", *words))
+            self.assertEqual(self.tubule("show", self.result, *words, "-o", out), ("", ""))
+            self.assertEqual((self.folder / out).read_text(), self.tubule("show", self.result, *words)[0])
         before = self.result.read_bytes()
         self.assertIn("is HDF5", self.refused("show", self.result, "--csv", "-o", self.result))
         self.assertEqual(self.result.read_bytes(), before)
         self.assertIn("nowhere/out.csv: cannot be written", self.refused("show", self.result, "-o", "nowhere/out.csv"))
+
+    def test_only_a_table_of_its_own_is_replaced(self):
+        case = (self.folder / "case.toml").read_bytes()
+        for what in ([], ["--csv"], ["--json"]):
+            said = self.tubule("show", self.result, *what, "-o", "case.toml", status=2)[1]
+            self.assertIn("case.toml: is no table that show has written: choose another file with -o", said)
+            self.assertEqual((self.folder / "case.toml").read_bytes(), case)
+            for _ in range(2):  # its own, again
+                self.tubule("show", self.result, *what, "-o", "table")
+            (self.folder / "table").unlink()
+        self.write("empty", "")
+        self.tubule("show", self.result, "--csv", "-o", "empty")
+        self.tubule("show", self.result, "--csv", "-o", "case.toml", "--overwrite")
+        self.assertNotEqual((self.folder / "case.toml").read_bytes(), case)
 
     def test_times_need_commas(self):
         err = self.refused("plot", "--times", "0", "0.1", "case.hdf")

@@ -165,6 +165,32 @@ class Extended(Continued):
         self.assertGreater(about(self.result)["stop_time"], reached)
 
 
+class Unfinished(Continued):
+    def test_a_run_that_can_go_on_is_not_begun_again_unasked(self):
+        for limit, status in (([], 130), (["--set", "time.limit=0.01"], 5)):
+            self.write("case.toml", SLOW)
+            if limit:
+                self.tubule("run", "case.toml", *limit, "--overwrite", status=status)
+            else:
+                self.interrupted(3)
+            before = self.result.read_bytes()
+            said = self.tubule("run", "case.toml", *limit, status=2)[1]
+            self.assertEqual(said, "case.hdf: holds an unfinished run of case.toml\n"
+                                   "--resume goes on with it, --overwrite begins again\n")  # fmt: skip
+            self.assertEqual(self.result.read_bytes(), before)
+        self.tubule("run", "case.toml", "--overwrite")
+        self.tubule("run", "case.toml")  # finished: the same again
+        self.assertEqual(about(self.result)["stop"], "finished")
+
+    def test_the_journal_of_a_run_that_was_killed_at_its_very_end_goes(self):
+        self.tubule("run", "case.toml")
+        journal = self.folder / "case.hdf.journal"
+        with h5py.File(self.result) as file:
+            journal.write_bytes(b"TUBULEJ1" + int(file.attrs["id"]).to_bytes(8, "little"))  # what is left of it then
+        self.assertIn("nothing to resume", self.tubule("run", "case.toml", "--resume")[0])
+        self.assertFalse(journal.exists())
+
+
 class Refused(Continued):
     def setUp(self):
         super().setUp()

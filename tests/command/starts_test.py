@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """Starts that a case brings along, run in both tiers: they equal the built-in shapes; a fluid goes on with the velocity of a
 result; what is refused. Argument: the program."""
+import re
 import unittest
 
 import h5py
 import numpy as np
 
+from inputs_test import octahedron
 from program import ProgramTest, about, series
 
 ENERGY = "[energy]\nk20 = 0.5\nk42 = 0.05\nH0 = -1.0\n"
@@ -21,7 +23,7 @@ def case(shape, more, tier="axisym", model=""):
     return f'tier = "{tier}"\n{ENERGY}{model}[shape]\n{shape}{more}'
 
 
-class StartsTest(ProgramTest):
+class Starts(ProgramTest):
     def run_case(self, text, status=0):
         path = self.write("case.toml", text)
         out, err = self.tubule("run", path, "-o", self.result, "--overwrite", status=status)
@@ -38,6 +40,8 @@ class StartsTest(ProgramTest):
                 for row in (0, -1):
                     self.assertAlmostEqual(found[name][row] / expected[name][row], 1, delta=relative, msg=f"{shape} {name}")
 
+
+class StartsTest(Starts):
     def test_a_profile_that_is_not_there_is_refused_at_its_key(self):
         text = 'tier = "axisym"\nenergy = {k20 = 1.0}\ntime = {end = 1e-3}\nshape = {kind = "profile", path = "none.csv"}\n'
         for tier in ("axisym", "surface3d"):
@@ -160,6 +164,117 @@ class StartsTest(ProgramTest):
         again = '[model]\nkind = "fluid"\n[velocity]\ninitial = "result"\n'
         path = self.write("case.toml", case('kind = "result"\npath = "graph.hdf"\n', MOVES.format(1e-4), model=again))
         self.assertIn("velocity.initial must not be \"result\": the frame of shape.path", self.refused("run", path))
+
+
+def mode(**keys):
+    return "[[shape.mode]]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items())
+
+
+ROUND = 'kind = "sphere"\nradius = 1.3\n'
+STRAIGHT = 'kind = "tube"\nradius = 1.2\nlength = 2.0\n'
+RING = 'kind = "torus"\nradius = 2.0\ntube_radius = {}\n'
+OVERDAMPED = '[model]\nkind = "overdamped"\n'
+
+
+class DisturbedTest(Starts):
+    """Modes and noise of frames and meshes: on spheres, tubes and tori they are those of the built-in shapes."""
+
+    def base(self, shape, more, tier="axisym", model=""):
+        self.run_case(case(shape, more, tier, model))
+        self.result.rename(self.folder / "base.hdf")
+
+    def same(self, shape, disturbed, waves, tier, relative, more=None, frame='kind = "result"\npath = "base.hdf"\nframe = 0\n'):
+        more = more or (MOVES.format(1e-6) if tier == "axisym" else AT_REST)
+        model = OVERDAMPED if tier == "axisym" else ""
+        expected, _ = self.run_case(case(shape + disturbed, more, tier, model))
+        found, _ = self.run_case(case(frame + waves, more, tier, model))
+        for name in ("energy", "area", "volume"):
+            self.assertAlmostEqual(found[name][0] / expected[name][0], 1, delta=relative, msg=f"{waves} {tier} {name}")
+
+    def test_of_a_profile(self):
+        round_, wavy = mode(amplitude=0.1, l=3), mode(amplitude=0.1, n=2, phase=0.4)
+        triaxial, around = mode(amplitude=0.1, l=3, m=2), mode(amplitude=0.05, n=1, m=3)
+        noise = "[[shape.noise]]\namplitude = 0.02\n{} = 4\nm = {}\nseed = 3\n"
+        self.base(ROUND, MOVES.format(1e-6), model=OVERDAMPED)
+        self.same(ROUND, round_, round_, "axisym", 1e-6)
+        self.same(ROUND, triaxial, triaxial, "surface3d", 1e-4)
+        for tier, m, relative in (("axisym", 0, 1e-6), ("surface3d", 2, 1e-3)):
+            self.same(ROUND, noise.format("l", m), noise.format("l", m), tier, relative)
+        self.base(STRAIGHT, MOVES.format(1e-6))  # a graph
+        self.same(STRAIGHT, wavy, wavy, "axisym", 1e-6)
+        self.same(STRAIGHT, around, around, "surface3d", 1e-4)
+        self.same(STRAIGHT, noise.format("n", 0), noise.format("n", 0), "axisym", 1e-6)
+        self.base(RING.format(0.5), MOVES.format(1e-6), model=OVERDAMPED)
+        thicker = mode(amplitude=0.1, n=0)
+        self.same(RING.format(0.6), "", thicker, "axisym", 1e-6)
+        self.same(RING.format(0.6), "", thicker, "surface3d", 1e-2, AT_REST.replace("180", "720"))  # grids differ
+
+    def test_of_a_surface(self):
+        more = AT_REST.replace("elements = 180\n", "")
+        self.base(ROUND, AT_REST, "surface3d")
+        self.same(ROUND, mode(amplitude=0.1, l=2, m=1), mode(amplitude=0.1, l=2, m=1), "surface3d", 1e-3, more)
+        self.base(STRAIGHT, AT_REST, "surface3d")
+        self.same(STRAIGHT, mode(amplitude=0.1, n=1, m=2), mode(amplitude=0.1, n=1, m=2), "surface3d", 1e-3, more)
+
+    def test_of_a_mesh_of_any_size(self):
+        self.write("mesh.off", octahedron(0))
+        more = AT_REST.replace("elements = 180\n", "").replace("1e-4", "0.1")
+        for size, radius in (("", 1), ("scale = 1.3\n", 1.3), (f"area = {4 * np.pi * 1.3**2!r}\n", 1.3)):
+            waves = mode(amplitude=0.1, l=2, m=2)
+            self.same(f'kind = "sphere"\nradius = {radius}\n', waves, waves, "surface3d", 2e-2, more,
+                      'kind = "file"\npath = "mesh.off"\n' + size)  # fmt: skip
+        found, _ = self.run_case(case('kind = "file"\npath = "mesh.off"\narea = 3.0\n', more, "surface3d"))
+        self.assertAlmostEqual(found["area"][0], 3, delta=1e-9)
+
+    def test_what_a_frame_cannot_have(self):
+        self.base(ROUND, MOVES.format(1e-4), model=OVERDAMPED)
+        frame = 'kind = "result"\npath = "base.hdf"\n'
+        for waves, words in (
+            (mode(amplitude=0.1, n=2), r"case\.toml:\d+:\d+: shape\.mode must have l, not n: the frame is a closed surface"),
+            (mode(amplitude=0.1), "shape.mode.0 needs l, if the frame is a closed surface, or n, if it is a tube or a ring"),
+            (mode(amplitude=0.1, n=1) + mode(amplitude=0.1, l=2), "shape.mode.1 must have the same of l and n as the others"),
+            (mode(amplitude=0.1, l=2, phase=1), "shape.mode.0.phase must be absent: only valid with n"),
+            (mode(amplitude=0.1, l=2, m=2), "shape.mode.0.m must be 0, not 2"),
+            (mode(amplitude=3, l=1), "shape.mode moves the surface across its axis at z = "),
+            ("[[shape.noise]]\namplitude = 0.1\nn = 3\n", "shape.noise must have l, not n"),
+        ):
+            path = self.write("case.toml", case(frame + waves, MOVES.format(1e-4), model=OVERDAMPED))
+            self.assertRegex(self.refused("run", path), words)
+        self.base(STRAIGHT, MOVES.format(1e-4))
+        path = self.write("case.toml", case(frame + mode(amplitude=0.1, l=2), MOVES.format(1e-4)))
+        self.assertIn("shape.mode must have n, not l: the frame is a tube or a ring", self.refused("run", path))
+        both = 'kind = "file"\npath = "mesh.off"\narea = 1.0\nscale = 2.0\n'
+        path = self.write("case.toml", case(both, AT_REST, "surface3d"))
+        self.assertIn("shape.scale must be absent: area says how large the surface is", self.refused("run", path))
+
+    def test_a_time_that_does_not_fit_the_size_of_a_mesh_is_told(self):
+        # R^4/(2 k20) of the unit sphere is 1 for k20 = 0.5, and 1e-8 of one that is 100 times smaller.
+        self.write("mesh.off", octahedron(0.3))
+        more = "[accuracy]\nenergy = 0.1\nestimate = false\n[time]\nend = 1.0\n"
+        small = self.write("small.toml", case('kind = "file"\npath = "mesh.off"\nscale = 0.01\n', more, "surface3d"))
+        words = r"warning: time\.end = 1 is \S+e\+07 times the \S+e-08 in which bending moves .* set time\.end to \de-08 or so"
+        self.assertRegex(self.tubule("check", small, "--quick")[1], words)
+        self.assertRegex(self.tubule("run", small, "--set", "time.limit=0.5", status=5)[1], words)
+        fits = self.write("fits.toml", case('kind = "file"\npath = "mesh.off"\n', more, "surface3d"))
+        self.assertNotIn("warning", self.tubule("check", fits, "--quick")[1])
+
+    def test_advice_for_a_mesh_names_keys_that_it_has(self):
+        """A mesh that folds at once, at rest and in motion, and a frame of it."""
+        self.write("mesh.off", octahedron(0))
+        moves = "[accuracy]\nenergy = 0.1\nestimate = false\n[time]\nend = 1e-3\n"
+        for more in (AT_REST.replace("elements = 180\n", ""), moves):
+            text = case('kind = "file"\npath = "mesh.off"\n' + mode(amplitude=0.8, l=9, m=5), more, "surface3d")
+            path = self.write("case.toml", text)
+            out, _ = self.tubule("run", path, "-o", self.result, "--overwrite", status=4)
+            self.assertIn("mesh-lost", out)
+            self.assertIn("set shape.remesh, or give the file more triangles", out)
+            self.assertNotIn("E_ref", self.tubule("show", self.result)[0])
+            said = about(self.result)
+            self.assertNotIn("estimated_error", said)
+            for key in re.findall(r"\b(?:shape|discretisation|accuracy|time)\.\w+", said["advice"]):
+                value = {"shape.remesh": "500"}.get(key, "1")
+                answer = self.start("check", path, "--quick", "--set", f"{key}={value}").communicate()[1]
+                self.assertNotIn(f"{key} must be absent", answer)
 
 
 if __name__ == "__main__":

@@ -148,7 +148,8 @@ std::vector<std::string> mesh_seeds() {
 
 void profile_text(Input input) {
     try {
-        const SmoothProfile profile = read_profile(file_of(input, "csv"), {});
+        const SmoothProfile profile =
+            read_profile("input.csv", std::string(reinterpret_cast<const char*>(input.data()), input.size()), {});
         if (!profile.r.allFinite() || !profile.z.allFinite()) throw std::logic_error("a curve of nan or inf");
         const double middle = 0.5;
         if (profile.H0 && !std::isfinite(evaluate(*profile.H0, &middle))) throw std::logic_error("an H0 of nan or inf");

@@ -268,6 +268,32 @@ print(tubule.run({TUBE!r}).stop)
             tubule.equilibrium(TUBE)
 
 
+class Inputs(Folder):
+    def test_the_case_of_a_result_reads_what_it_read(self):
+        def put(bulge):
+            t = np.linspace(0, np.pi, 60)
+            r = (1 + bulge * np.cos(2 * t)) * np.sin(t)
+            r[[0, -1]] = 0
+            np.savetxt(self.folder / "p.csv", np.column_stack([r, -1.3 * np.cos(t)]), delimiter=",")
+
+        put(0.1)
+        (self.folder / "c.toml").write_text(
+            'tier = "axisym"\n[energy]\nk20 = 1.0\n[model]\nkind = "overdamped"\n[shape]\nkind = "profile"\n'
+            'path = "p.csv"\ntolerance = 1e-2\n[accuracy]\nenergy = 1e-2\n[time]\nend = 1e-3\n')  # fmt: skip
+        case, file = self.folder / "c.toml", self.folder / "r.hdf"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            first = tubule.run(case, output=file)
+            (self.folder / "p.csv").unlink()
+            again = tubule.run(tubule.read(file).case)
+            np.testing.assert_array_equal(again.series["energy"], first.series["energy"])
+            put(0.2)
+            with self.assertRaisesRegex(tubule.CaseError, "p.csv has changed since: bring back the file"):
+                tubule.run(tubule.read(file).case)
+            with self.assertRaisesRegex(tubule.CaseError, "holds the result of another case .*p.csv has changed since"):
+                tubule.run(case, output=file)
+
+
 class Shapes(Folder):
     def test_frames_of_surfaces(self):
         frame = tubule.run(SURFACE).frames[-1]

@@ -8,6 +8,7 @@
 #include <functional>
 #include <random>
 
+#include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/ellipsoid.hpp"
@@ -19,6 +20,10 @@ namespace tubule {
 namespace {
 
 using test::message_of;
+
+SmoothProfile profile_in(const std::filesystem::path& path, const ProfileFile& how) {
+    return read_profile(path, read_input(path, megabyte), how);
+}
 
 class Files : public testing::Test {
 protected:
@@ -49,7 +54,7 @@ protected:
     // The message about this text, without the folder.
     std::string refusal(const std::string& text, const ProfileFile& how = {}) const {
         const std::filesystem::path path = write(text);
-        const std::string all = message_of<ProfileError>([&] { read_profile(path, how); });
+        const std::string all = message_of<ProfileError>([&] { profile_in(path, how); });
         return all.starts_with(path.string()) ? all.substr(folder_.string().size() + 1) : all;
     }
 
@@ -72,15 +77,14 @@ ProfileFile within(double tolerance, std::optional<double> length = {}) {
 TEST_F(ProfileFiles, ComeAsCloseAsStated) {
     // A spheroid and a tube, known everywhere; the points are exact.
     for (const double tolerance : {1e-3, 1e-6, 1e-8}) {
-        const SmoothProfile cell = read_profile(points(120, spheroid), within(tolerance));
+        const SmoothProfile cell = profile_in(points(120, spheroid), within(tolerance));
         EXPECT_EQ(cell.kind, ProfileCurve::Kind::cell);
         EXPECT_LE(cell.distance, tolerance);
-        const SmoothProfile tube =
-            read_profile(points(80,
-                                [](double t) {
-                                    return std::array{1 + 0.3 * std::cos(2 * pi * t), 0.5 + 2 * t};
-                                }),
-                         within(tolerance, 2));
+        const SmoothProfile tube = profile_in(points(80,
+                                                     [](double t) {
+                                                         return std::array{1 + 0.3 * std::cos(2 * pi * t), 0.5 + 2 * t};
+                                                     }),
+                                              within(tolerance, 2));
         EXPECT_EQ(tube.kind, ProfileCurve::Kind::tube);
         const ProfileCurve curve = profile_curve(cell);
         for (int i = 0; i <= 500; ++i) {
@@ -96,7 +100,7 @@ TEST_F(ProfileFiles, ComeAsCloseAsStated) {
 
 TEST_F(ProfileFiles, NoiseIsSmoothedAway) {
     // 200 points with noise of .01: the curve is nearer to the spheroid than the points, and by far smoother.
-    const SmoothProfile fit = read_profile(points(200, spheroid, 0.01), within(0.05));
+    const SmoothProfile fit = profile_in(points(200, spheroid, 0.01), within(0.05));
     EXPECT_LE(fit.distance, 0.05);
     for (int i = 0; i <= 200; ++i) {
         const auto p = point_at(fit, i / 200.0);
@@ -106,16 +110,16 @@ TEST_F(ProfileFiles, NoiseIsSmoothedAway) {
 }
 
 TEST_F(ProfileFiles, RunEitherWayWithOrWithoutTheLastPoint) {
-    const SmoothProfile down = read_profile(points(60, [](double t) { return spheroid(1 - t); }), within(1e-4));
+    const SmoothProfile down = profile_in(points(60, [](double t) { return spheroid(1 - t); }), within(1e-4));
     EXPECT_GT(point_at(down, 0.5)[3], 0);  // upwards on the outside
     const auto wave = [](double t) { return std::array{1 + 0.3 * std::cos(2 * pi * t * 63 / 64), 2 * t * 63 / 64}; };
-    EXPECT_LE(read_profile(points(63, wave), within(1e-6, 2)).distance, 1e-6);
+    EXPECT_LE(profile_in(points(63, wave), within(1e-6, 2)).distance, 1e-6);
     const SmoothProfile ring =
-        read_profile(points(60,
-                            [](double t) {
-                                return std::array{2 + 0.5 * std::cos(2 * pi * t), 0.5 * std::sin(2 * pi * t)};
-                            }),
-                     within(1e-9));
+        profile_in(points(60,
+                          [](double t) {
+                              return std::array{2 + 0.5 * std::cos(2 * pi * t), 0.5 * std::sin(2 * pi * t)};
+                          }),
+                   within(1e-9));
     EXPECT_EQ(ring.kind, ProfileCurve::Kind::ring);
 }
 
@@ -141,7 +145,7 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
             if (t > 0.02 && t < 0.03) point[1] *= far;
             return point;
         });
-        EXPECT_NE(message_of<ProfileError>([&] { read_profile(path, {}); }).find("smooth curve"), std::string::npos)
+        EXPECT_NE(message_of<ProfileError>([&] { profile_in(path, {}); }).find("smooth curve"), std::string::npos)
             << far;
     }
     // A corner is no smooth curve.
@@ -172,7 +176,7 @@ TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
     for (const double tolerance : {1e-4, 1e-7}) {
         ProfileFile how = within(1e-9);
         how.H0_tolerance = tolerance;
-        const SmoothProfile fit = read_profile(write(sphere_rows(200)), how);
+        const SmoothProfile fit = profile_in(write(sphere_rows(200)), how);
         ASSERT_TRUE(fit.H0);
         EXPECT_LE(fit.H0_distance, tolerance);
         using J = Jet<double, 1, 2>;
@@ -196,7 +200,7 @@ TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
         const double t = pi * i / 80;
         rows += fmt::format("{:.17g} {:.17g} {:.17g}\n", -std::cos(t), i % 80 == 0 ? 0 : std::sin(t), -std::cos(t));
     }
-    const SmoothProfile down = read_profile(write("z r H0\n" + rows), within(1e-9));
+    const SmoothProfile down = profile_in(write("z r H0\n" + rows), within(1e-9));
     EXPECT_NEAR(evaluate(*down.H0, std::array{0.25}.data()), -0.5, 1e-4);
 }
 
@@ -217,7 +221,7 @@ TEST_F(ProfileFiles, H0OfTubesAndRingsRepeatsItself) {
     for (const int last : {39, 40}) {  // without and with the point that is the first one moved up
         std::string rows = "r,z,H0\n";
         for (int i = 0; i <= last; ++i) rows += fmt::format("1,{:.17g},{:.17g}\n", i / 20.0, H0(i / 40.0));
-        check(read_profile(write(rows), within(1e-6, 2)));
+        check(profile_in(write(rows), within(1e-6, 2)));
     }
     std::string rows = "r,z,H0\n";
     for (int i = 0; i <= 80; ++i) {
@@ -225,7 +229,7 @@ TEST_F(ProfileFiles, H0OfTubesAndRingsRepeatsItself) {
         rows += fmt::format("{:.17g},{:.17g},{:.17g}\n", 2 + 0.5 * std::cos(t), 0.5 * std::sin(t),
                             H0((2 * t + 0.5 * std::sin(t)) / (4 * pi)));
     }
-    check(read_profile(write(rows), within(1e-8)));
+    check(profile_in(write(rows), within(1e-8)));
 }
 
 TEST_F(ProfileFiles, H0IsSmoothedToItsOwnTolerance) {
@@ -235,7 +239,7 @@ TEST_F(ProfileFiles, H0IsSmoothedToItsOwnTolerance) {
               std::string::npos);
     ProfileFile how;
     how.H0_tolerance = 0.05;
-    const SmoothProfile fit = read_profile(write(noisy), how);
+    const SmoothProfile fit = profile_in(write(noisy), how);
     EXPECT_NE(fit.note().find("a smooth H0 at most 0.0"), std::string::npos) << fit.note();
     for (int i = 0; i <= 100; ++i)
         EXPECT_NEAR(evaluate(*fit.H0, std::array{i / 100.0}.data()), domains(i / 100.0), 0.05);
@@ -267,7 +271,7 @@ TEST_F(ProfileFiles, BadColumnsOfH0AreRefusedWithTheirPlace) {
               "p.csv:1:5: there is no column 'H_0': the spontaneous curvature is called H0");
     EXPECT_EQ(refusal("r,z,r" + rows.substr(6)), "p.csv:1:5: a second column r");
     // Others are ignored, but that of H0 without a name is one value too many.
-    EXPECT_FALSE(read_profile(write("r,z,weight" + rows.substr(6)), {}).H0);
+    EXPECT_FALSE(profile_in(write("r,z,weight" + rows.substr(6)), {}).H0);
     EXPECT_EQ(refusal(rows.substr(7)).substr(0, 25), "p.csv:1:6: has 3 values w");
 }
 

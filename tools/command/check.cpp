@@ -105,7 +105,8 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         for (const std::string& note : physics_notes(given)) out.warnings.push_back(valid_utf8(note));
         const Case c = chosen_case(given, options, out);
         out.chosen = chosen(c);
-        engine_for(c);
+        if (const std::string warning = engine_for(c)->warning(); !warning.empty())
+            out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), warning));
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick) out.expected = forecast(c);
         if (out.expected && out.expected->ill_posed.empty()) out.advice = advice_for(c, *out.expected);

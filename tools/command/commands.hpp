@@ -40,13 +40,13 @@ struct RunOptions {
     std::optional<double> until = {};  // as time.end
     bool resume = false, overwrite = false, quiet = false, expect = false, check_derivatives = false;
     bool refuse_ill_posed = false;  // instead of recording that stop
-    bool silent = false;  // quiet, and no words on stdout even if the run ends early
+    bool silent = false;            // quiet, and no words on stdout even if the run ends early
     // Called with each result that was written, which is none where a run fails at its start and an earlier result
     // stays.
     std::function<void(const std::filesystem::path&)> written = {};
 };
 int run_cases(const RunOptions& options);
-std::filesystem::path result_path(const RunOptions& options, const Case& c);
+std::filesystem::path result_path(const RunOptions& options, const std::filesystem::path& case_path);
 
 // Names and formulas of the terms of the energy, for pictures: all listed ones, and those that a case adds.
 std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bending);
@@ -54,7 +54,8 @@ std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bend
 // Refuses, before anything is computed, a name that no result can have, or a folder that is not there. Throws
 // CaseError.
 void check_output(const std::filesystem::path& file);
-// And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another case.
+// And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another
+// case.
 void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite);
 
 }  // namespace tubule

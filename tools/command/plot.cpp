@@ -50,8 +50,8 @@ bool is_plane(const std::string& text) {
     return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
-// NAME=LABEL of the listed terms, and of those that the cases of results add. A result that cannot be read is complained
-// of by the script.
+// NAME=LABEL of the listed terms, and of those that the cases of results add. A result that cannot be read is
+// complained of by the script.
 std::vector<std::string> labels_of_terms(const std::vector<std::string>& results) {
     std::vector<std::string> out;
     const auto add = [&](const Bending& energy, std::size_t known) {
@@ -62,7 +62,7 @@ std::vector<std::string> labels_of_terms(const std::vector<std::string>& results
     add(Bending{}, 0);
     for (const std::string& result : results) try {
             const CaseText of = read_case_text(result);
-            add(parse_case(of.text, of.sets, result).energy, n_bending_terms);
+            add(parse_case(of.text, of.sets, result, of.inputs).energy, n_bending_terms);
         } catch (const std::runtime_error&) {
         }
     return out;

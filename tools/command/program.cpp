@@ -71,6 +71,18 @@ std::string unexpected_words(const CLI::App& app) {
                        words.empty() ? "" : meant_by(words.front(), *command), name);
 }
 
+// Of all commands: -o without a name would be no -o, and a blank is no name that anybody means.
+void refuse_blank_outputs(CLI::App& app) {
+    const auto blank = [](const std::string& name) {
+        return name.find_first_not_of(" \t\n") == name.npos ? "must not be blank: give the file a name" : "";
+    };
+    for (CLI::App* command : app.get_subcommands({}))
+        for (CLI::Option* option : command->get_options())
+            if (option->check_lname("output") || option->check_lname("rescue"))
+                option->check(
+                    CLI::Validator([blank](const std::string& name) { return std::string(blank(name)); }, ""));
+}
+
 // The exit status.
 int run(int argc, char** argv) {
     CLI::App app("Membranes as fluid deformable surfaces whose bending energy is a function of H and K.", "tubule");
@@ -82,6 +94,7 @@ int run(int argc, char** argv) {
 #define TUBULE_COMMAND(name) add_##name(app, status);
     TUBULE_COMMANDS(TUBULE_COMMAND)
 #undef TUBULE_COMMAND
+    refuse_blank_outputs(app);
     // Last, since subcommands would inherit it.
     end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {

@@ -19,6 +19,7 @@
 #include "common/result/durable_io.hpp"
 #include "common/result/record.hpp"
 #include "common/result/result.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/run/run_pairs.hpp"
 #include "common/solve/interrupt.hpp"
@@ -39,9 +40,9 @@
 
 namespace tubule {
 
-std::filesystem::path result_path(const RunOptions& options, const Case& c) {
+std::filesystem::path result_path(const RunOptions& options, const std::filesystem::path& case_path) {
     if (!options.output.empty()) return options.output;
-    return std::filesystem::path(c.path).filename().replace_extension(".hdf");
+    return std::filesystem::path(case_path).filename().replace_extension(".hdf");
 }
 
 void check_output(const std::filesystem::path& file) {
@@ -80,10 +81,10 @@ About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
                 {"stop_time", s.stop.time},
                 {"stop_message", s.stop.message},
                 {"advice", s.stop.advice},
-                {"asked_accuracy", c.accuracy.energy},
-                {"estimated_error", s.estimated_error},
-                {"E_ref", s.reference_energy},
-                {"wall_seconds", wall_seconds}};
+                {"asked_accuracy", c.accuracy.energy}};
+    if (s.reference_energy > 0)  // else no energy was found
+        about.insert(about.end(), {{"estimated_error", s.estimated_error}, {"E_ref", s.reference_energy}});
+    about.emplace_back("wall_seconds", wall_seconds);
     about.insert(about.end(), s.details.begin(), s.details.end());
     about.emplace_back("warnings", fmt::format("{}", fmt::join(s.warnings, "\n")));
     return about;
@@ -228,19 +229,22 @@ Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesys
     About about = about_start();
     add_choice(about, chosen);
     about.emplace_back("case_path", valid_utf8(std::filesystem::absolute(c.path).string()));
-    return {ResultWriter::create(file, {c.text, c.sets}, about, engine.series_names()), std::nullopt, std::nullopt};
+    return {ResultWriter::create(file, kept_case(c), about, engine.series_names()), std::nullopt, std::nullopt};
 }
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
 std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
     const Case& c = chosen.c;
     Result old = read_result(file);
-    if (!goes_on(c, old, file)) return std::nullopt;
+    if (!goes_on(c, old, file)) {
+        repair_result(file);  // a kill may have left its journal
+        return std::nullopt;
+    }
     if (c.equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
     ResultWriter writer = ResultWriter::resume(
-        file, [&](const Record& record) { engine.check_restart(record); }, CaseText{c.text, c.sets});
+        file, [&](const Record& record) { engine.check_restart(record); }, kept_case(c));
     const Record& record = writer.restart_record();
     Restart restart{record};
     if (record.mesh) restart.cells = old.meshes.at(*record.mesh);
@@ -305,6 +309,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         for (const Expectation& e : c.expect.values)
             if (e.time) c.time.output.push_back(*e.time);
 
+    if (!c.input) c.input = current_input(c);
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
     watch.discount(-chosen.seconds);
     const auto engine = engine_for(c);
@@ -318,6 +323,8 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
     watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!options.quiet && !result->restart)
         for (const std::string& note : physics_notes(c)) say(stderr, "{}\n", note);
+    if (const std::string warning = engine->warning(); !warning.empty() && !options.quiet)
+        say(stderr, "{}: warning: {}\n", c.path, warning);
     if (!options.quiet && !result->restart)
         if (const auto forecast = engine->forecast_if_long())
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
@@ -355,16 +362,26 @@ void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& fil
                         c.path, file.string()));
 }
 
-// A result of another case may be needed: only --overwrite replaces it.
+bool can_be_resumed(const Case& c, const Result& result) {
+    const auto stop = stop_of(result);
+    return !c.equilibrium && (!stop || can_go_on(*stop)) && (!result.frames.empty() || result.checkpoint);
+}
+
+// A result of another case may be needed, and so may the hours of a run that can go on: only --overwrite replaces them.
 void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& file) {
     if (!is_hdf5(file)) return;
     std::string other;
     try {
         other = other_case(c, read_case_text(file));
-        if (other.empty() || !has_rows(file)) return;
+        if (!has_rows(file)) return;
+        if (other.empty() && !can_be_resumed(c, read_result(file))) return;
     } catch (const std::runtime_error&) {
         return;  // no result, or a damaged one: the writer decides
     }
+    if (other.empty())
+        throw CaseError(
+            fmt::format("{}: holds an unfinished run of {}\n--resume goes on with it, --overwrite begins again",
+                        file.string(), c.path));
     throw CaseError(
         fmt::format("{}: holds the result of another case than {}: {}\n--overwrite replaces it, -o FILE keeps both",
                     file.string(), c.path, other));
@@ -420,8 +437,8 @@ Job job_of(const std::string& path, const RunOptions& options) {
     std::vector<std::string> sets = options.sets;
     if (options.until) sets.push_back(fmt::format("time.end={}", *options.until));
     if (is_hdf5(path)) return job_of_result(path, sets, options);
-    const Case c = read_case(path, sets);
-    const auto file = result_path(options, c);
+    const auto file = result_path(options, path);
+    const Case c = read_case(path, sets, options.resume ? inputs_to_resume(file) : CaseInputs{});
     try {
         ChosenCase chosen = with_model_of_run(c, file, options);
         check_replaced(chosen.c, file, options.resume || options.overwrite);
@@ -487,7 +504,8 @@ void add_run(CLI::App& app, int& exit_status) {
         "continue a result that was interrupted, killed or out of time, or extend it to a later time.end");
     command->add_option("--until", o->until, "the time at which the run ends, as --set time.end=T")
         ->check(CLI::Validator(refuse_infinite, ""));
-    command->add_flag("--overwrite", o->overwrite, "replace the result of another case");
+    command->add_flag("--overwrite", o->overwrite,
+                      "replace the result of another case, or one that --resume would go on with");
     command->add_flag("--quiet", o->quiet, "no progress; output only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,

@@ -35,6 +35,7 @@ namespace {
 struct ShowOptions {
     std::string file;
     std::string output, rescue;
+    bool overwrite = false;
     bool csv = false, json = false, verify = false;
     std::optional<long> frame;
 };
@@ -43,7 +44,7 @@ struct ShowOptions {
 
 std::string title_of(const Result& result, const std::string& file) {
     try {
-        return parse_case(result.case_text.text, result.case_text.sets, file).title;
+        return parse_case(result.case_text.text, result.case_text.sets, file, result.case_text.inputs).title;
     } catch (const CaseError&) {
         return "";  // written by a version with other keys; the rest of the result can be shown all the same
     }
@@ -280,9 +281,22 @@ int verify(const ShowOptions& options) {
     return found.has_checksums && found.damage.empty() ? 0 : 1;
 }
 
+// Whether a file begins as what is to replace it: with the same columns, or as JSON of ours.
+bool is_such_a_table(const std::string& path, std::string_view text) {
+    constexpr std::size_t told_apart = 8;
+    std::string begin(std::min(told_apart, text.size()), '\0');
+    std::ifstream(path, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+    return text.starts_with(begin);
+}
+
 // A result is never replaced: it is what this reads.
-void write_file(const std::string& path, std::string_view text) {
+void write_file(const std::string& path, std::string_view text, bool overwrite) {
     if (is_hdf5(path)) throw std::runtime_error(path + ": is HDF5, maybe a result: choose another file with -o");
+    std::error_code none;
+    const bool has_contents = std::filesystem::is_regular_file(path, none) && !std::filesystem::is_empty(path, none);
+    if (!overwrite && has_contents && !is_such_a_table(path, text))
+        throw std::runtime_error(fmt::format(
+            "{}: is no table that show has written: choose another file with -o; --overwrite replaces it", path));
     std::ofstream out(path, std::ios::binary);
     out << text << std::flush;
     if (!out) throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
@@ -295,7 +309,7 @@ int show(const ShowOptions& options) {
         if (options.output.empty())
             print_answer({out.data(), out.size()});
         else
-            write_file(options.output, {out.data(), out.size()});
+            write_file(options.output, {out.data(), out.size()}, options.overwrite);
         return 0;
     } catch (const OutputError&) {
         throw;
@@ -325,6 +339,7 @@ void add_show(CLI::App& app, int& exit_status) {
                    "if it is damaged")
         ->excludes(csv);
     command->add_option("-o,--output", options->output, "write it to this file instead of stdout");
+    command->add_flag("--overwrite", options->overwrite, "replace that file even if it is no such table");
     command->add_option("--rescue", options->rescue, "write what is good of a damaged result to this new file");
     end_help(*command,
              {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1", "tubule show figure.hdf --verify"},

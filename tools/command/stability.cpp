@@ -255,7 +255,8 @@ StabilitySubject stability_subject(Result result, const StabilityOptions& option
     StabilitySubject subject;
     subject.result = std::move(result);
     try {
-        subject.c = parse_case(subject.result->case_text.text, subject.result->case_text.sets, options.file);
+        const CaseText& of = subject.result->case_text;
+        subject.c = parse_case(of.text, of.sets, options.file, of.inputs);
     } catch (const CaseError&) {
         if (options.fit.empty()) throw;
         subject.case_is_known = false;

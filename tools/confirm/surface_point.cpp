@@ -168,7 +168,7 @@ std::string_view name(Verdict verdict) {
 Answer answer(const PointResult& axisymmetric, const Result& surface) {
     const compare::Outcome ended = compare::outcome(surface);
     if (!stop_from_name(ended.stop) || surface.frames.empty()) throw std::runtime_error("the result is not complete");
-    const Case c = parse_case(surface.case_text.text, surface.case_text.sets, "result");
+    const Case c = parse_case(surface.case_text.text, surface.case_text.sets, "result", surface.case_text.inputs);
     Answer a{.stop = ended.stop, .time = ended.time};
     a.energy_error = compare::stated_error(surface).value_or(not_known);
     if (const double t = axisymmetric[Measure::time]; t <= a.time)

@@ -1,5 +1,7 @@
 #include "tools/python/memory_result.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -7,6 +9,7 @@
 
 #include "common/case/read.hpp"
 #include "common/result/durable_io.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/command/commands.hpp"
@@ -95,11 +98,15 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 
 Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
     PauseWatch watch(given.time.limit, options.interrupted);  // for trial runs and the start, too
-    const ChosenCase chosen = with_chosen_model(given);
+    ChosenCase chosen = with_chosen_model(given);
+    if (const std::string changed = changed_input(chosen.c, inputs_of(chosen.c)); !changed.empty())
+        throw CaseError(fmt::format("{}: {}: bring back the file that its result began with, or read the case itself",
+                                    chosen.c.path, changed));
+    if (!chosen.c.input) chosen.c.input = current_input(chosen.c);
     const Case& c = chosen.c;
     const auto engine = engine_for(c);
     Result result;
-    result.case_text = {c.text, c.sets};
+    result.case_text = kept_case(c);
     result.about = about_start();
     add_choice(result.about, chosen);
     result.series_names = engine->series_names();

@@ -28,6 +28,7 @@
 #include "tools/command/compare.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/python/memory_result.hpp"
+#include "tools/run/continuation.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/scan/dispatcher.hpp"
 
@@ -248,6 +249,7 @@ py::dict scan(const Case& c, const std::vector<std::string>& over, const std::op
         }
     }
     check_scan(asked);
+    add_inputs(asked);
     if (!overwrite) refuse_to_replace_another_scan(asked, file);
     const int threads = jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
     if (threads < 1) throw std::invalid_argument("jobs must be 1 or more");
@@ -299,8 +301,16 @@ void add_cases(py::module_& m) {
                                    return out;
                                })
         .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
-    m.def("parse_case", &parse_case, py::arg("text"), py::arg("sets"), py::arg("path"));
-    m.def("read_case", &read_case, py::arg("path"), py::arg("sets"));
+    m.def(
+        "parse_case",
+        [](const std::string& text, const std::vector<std::string>& sets, const std::string& path) {
+            return parse_case(text, sets, path);
+        },
+        py::arg("text"), py::arg("sets"), py::arg("path"));
+    m.def(
+        "read_case",
+        [](const std::filesystem::path& path, const std::vector<std::string>& sets) { return read_case(path, sets); },
+        py::arg("path"), py::arg("sets"));
 }
 
 void add_results(py::module_& m) {
@@ -315,6 +325,7 @@ void add_results(py::module_& m) {
              })
         .def_property_readonly("case_text", [](const Results& r) { return r.result->case_text.text; })
         .def_property_readonly("case_sets", [](const Results& r) { return r.result->case_text.sets; })
+        .def("case", [](const Results& r, const std::string& name) { return case_of_result(*r.result, name, {}); })
         .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
         .def("frame", &frame_dictionary)
         .def("mesh", &mesh_dictionary)

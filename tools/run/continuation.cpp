@@ -13,6 +13,7 @@
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule {
@@ -125,7 +126,7 @@ Case case_of_result(const Result& result, const std::filesystem::path& file, con
     std::vector<std::string> all = result.case_text.sets;
     std::erase_if(all, [&](const std::string& set) { return replaced.contains(key_of(set)); });
     all.insert(all.end(), sets.begin(), sets.end());
-    return parse_case(result.case_text.text, all, path_of_case(result, file));
+    return parse_case(result.case_text.text, all, path_of_case(result, file), result.case_text.inputs);
 }
 
 std::optional<ModelKind> chosen_before(const std::filesystem::path& file) {
@@ -143,16 +144,27 @@ std::optional<Stop> stop_of(const Result& result) {
     return std::nullopt;
 }
 
+CaseInputs inputs_to_resume(const std::filesystem::path& file) {
+    try {
+        return is_hdf5(file) ? read_case_text(file).inputs : CaseInputs{};
+    } catch (const std::runtime_error&) {
+        return {};  // no result, or a damaged one: the run says so
+    }
+}
+
 bool goes_on(const Case& c, const Result& result, const std::filesystem::path& file) {
     const auto refuse = [&](const std::string& why) {
         throw CaseError(fmt::format("{}: cannot be resumed with {}: {}", file.string(), c.path, why));
     };
     Case before;
     try {
-        before = parse_case(result.case_text.text, result.case_text.sets, c.path);
+        before = parse_case(result.case_text.text, result.case_text.sets, c.path, result.case_text.inputs);
     } catch (const CaseError& error) {
         refuse(unreadable(error));
     }
+    if (const std::string changed = changed_input(c, result.case_text.inputs); !changed.empty())
+        refuse(fmt::format("{}\nbring back the file that it began with, or run the case anew: --overwrite or -o FILE",
+                           changed));
     if (c.moves() && !before.moves()) refuse("nothing moves in its case, so time.end must be absent");
     std::vector<Difference> fixed = differences(before, c);
     std::erase_if(fixed, may_change);
@@ -189,9 +201,9 @@ std::vector<double> missed_outputs(const Case& c, const Result& result, double f
 }
 
 std::string other_case(const Case& c, const CaseText& of_result) {
-    if (of_result.text == c.text && of_result.sets == c.sets) return {};
+    if (of_result.text == c.text && of_result.sets == c.sets) return changed_input(c, of_result.inputs);
     try {
-        return words(differences(parse_case(of_result.text, of_result.sets, c.path), c));
+        return words(differences(parse_case(of_result.text, of_result.sets, c.path, of_result.inputs), c));
     } catch (const CaseError& error) {
         return unreadable(error);
     }

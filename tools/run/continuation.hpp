@@ -33,6 +33,9 @@ bool is_hdf5(const std::filesystem::path& file);
 // The case of a result with more overrides, which replace those of the same key. Throws CaseError.
 Case case_of_result(const Result& result, const std::filesystem::path& file, const std::vector<std::string>& sets);
 
+// What a result has of the files that its case reads; nothing where there is none to go on with.
+CaseInputs inputs_to_resume(const std::filesystem::path& file);
+
 // The model that stands for model.kind = "auto" in the case of a result, if it has one.
 std::optional<ModelKind> chosen_before(const std::filesystem::path& file);
 

@@ -61,6 +61,7 @@ public:
             return std::nullopt;
         }
     }
+    std::string warning() const override { return start_.time_scale(); }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from
         return surface3d::run(case_, start_, observer, restart);
@@ -81,6 +82,7 @@ public:
         else
             axisym::check_restart(record);
     }
+    std::string warning() const override { return choice_.start ? choice_.start->time_scale() : ""; }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result* unfinished) const override {
         return run_auto(case_, choice_, observer, restart, unfinished);
     }

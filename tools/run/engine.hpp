@@ -28,6 +28,9 @@ public:
     // cost.
     virtual std::optional<Forecast> forecast_if_long() const { return std::nullopt; }
 
+    // What is to be said before it runs; empty if nothing.
+    virtual std::string warning() const { return {}; }
+
     // Runs the case, or resumes from `restart`, of the file `unfinished` (which tier "auto" needs). Throws as the
     // tier's own run.
     virtual RunSummary run(RunObserver& observer, const Restart* restart = nullptr,

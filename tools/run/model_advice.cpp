@@ -226,7 +226,7 @@ ModelChoice choose_model(const Case& c) {
 ChosenCase with_model(const Case& c, const ModelChoice& choice) {
     std::vector<std::string> sets = c.sets;
     sets.push_back(fmt::format("model.chosen={}", model_entry(choice.kind).name));
-    return {parse_case(c.text, sets, c.path), choice.reason, 0};
+    return {parse_case(c.text, sets, c.path, inputs_of(c)), choice.reason, 0};
 }
 
 ChosenCase with_chosen_model(const Case& c) {

@@ -12,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/scan/starts.hpp"
 
@@ -261,8 +262,12 @@ std::vector<std::string> Scan::sets_of(std::size_t point) const {
     return all;
 }
 
+Case Scan::case_with(const std::vector<std::string>& all_sets) const {
+    return parse_case(case_text, all_sets, case_path, inputs);
+}
+
 Case Scan::case_of(std::size_t point) const {
-    Case c = parse_case(case_text, sets_of(point), case_path);
+    Case c = case_with(sets_of(point));
     if (c.model.kind == ModelKind::automatic)
         throw complaint(c, "model.kind",
                         "must not be \"auto\" in a scan, whose points would have different models; `tubule check` says "
@@ -363,6 +368,30 @@ void check_scan(const Scan& scan) {
     check_points(scan);
 }
 
+// The file of a shape is one for all points, unless an axis names it.
+void add_inputs(Scan& scan) {
+    std::vector<std::size_t> points{0};
+    std::size_t stride = scan.size();
+    for (const Axis& axis : scan.axes) {
+        stride /= axis.size();
+        if (std::ranges::none_of(axis.keys, [](const std::string& key) {
+                return key == "shape.kind" || key == "shape.path" || key == "shape.frame";
+            }))
+            continue;
+        for (std::size_t n = points.size(), i = 0; i < n; ++i)
+            for (std::size_t value = 1; value < axis.size(); ++value) points.push_back(points[i] + value * stride);
+    }
+    for (const std::size_t point : points) {
+        const Case c = scan.case_with(scan.sets_of(point));
+        if (const std::string changed = changed_input(c, scan.inputs); !changed.empty())
+            throw CaseError(
+                fmt::format("{}: {}: bring back the file that the scan began with, or scan anew", scan.path, changed));
+        const auto known = [&](const auto& input) { return input->name == input_name(c.shape); };
+        if (std::ranges::none_of(scan.inputs, known))
+            if (auto input = current_input(c)) scan.inputs.push_back(std::move(input));
+    }
+}
+
 Scan read_scan(const ScanChoices& choices) {
     Scan scan;
     scan.path = choices.file;
@@ -403,6 +432,7 @@ Scan read_scan(const ScanChoices& choices) {
     }
     scan.to_the_end = choices.to_the_end || file.to_the_end;
     check_scan(scan);
+    add_inputs(scan);
     return scan;
 }
 

@@ -32,6 +32,7 @@ struct Scan {
     std::string path, text;  // the scan file, verbatim; of a scan without one: the case's path, empty text
     std::string title;
     std::string case_path, case_text;  // verbatim
+    CaseInputs inputs;                 // what its points read besides
     std::vector<std::string> sets;     // of all points
     std::vector<Axis> axes;            // points are numbered row by row, the last axis fastest
     std::optional<BoundaryChoice> boundary;
@@ -43,6 +44,7 @@ struct Scan {
     std::vector<std::size_t> place(std::size_t point) const;    // on each axis
     std::vector<std::string> sets_of(std::size_t point) const;  // also of points between those of the grid
     Case case_of(std::size_t point) const;                      // throws CaseError
+    Case case_with(const std::vector<std::string>& all_sets) const;
 };
 
 // What the command line adds; it overrides the file.
@@ -55,6 +57,10 @@ struct ScanChoices {
     std::optional<int> seeds, refine;
     bool to_the_end = false;
 };
+
+// Adds what the points of a scan read besides the case, as it is now. Throws CaseError where that is another one than
+// the scan has.
+void add_inputs(Scan& scan);
 
 // Throws CaseError if there are no points or too many, a key varies twice, or a value of an axis is not valid.
 void check_scan(const Scan& scan);

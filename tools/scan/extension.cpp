@@ -133,6 +133,9 @@ void refuse_different(const Scan& a, const Scan& b) {
         throw CaseError(fmt::format("{} and {} cannot be merged: {}", a.path, b.path, what));
     };
     if (a.case_text != b.case_text) refuse("they are scans of different cases");
+    for (const auto& x : a.inputs)
+        for (const auto& y : b.inputs)
+            if (x->name == y->name && !same_input(*x, *y)) refuse(fmt::format("{} was another file", x->name));
     if (a.to_the_end != b.to_the_end) refuse("only one of them runs its points to the end (--to-the-end)");
     const auto choice = [](const Scan& s) {
         return s.boundary ? std::tuple(true, s.boundary->around, s.boundary->seeds, s.boundary->refine)
@@ -195,6 +198,7 @@ Extension extended(const ScanResult& result, const std::vector<std::string>& ove
         *same = joined(*same, more);
     }
     check_scan(out.scan);
+    add_inputs(out.scan);
     take_points(out, result);
     return out;
 }
@@ -202,6 +206,7 @@ Extension extended(const ScanResult& result, const std::vector<std::string>& ove
 Extension merged(const ScanResult& a, const ScanResult& b) {
     refuse_different(a.scan, b.scan);
     Extension out{a.scan, {}};
+    out.scan.inputs.insert(out.scan.inputs.end(), b.scan.inputs.begin(), b.scan.inputs.end());
     Scan other = b.scan;
     for (const std::string& key : told_apart(a.scan, b.scan))
         for (Scan* scan : {&out.scan, &other})
@@ -210,6 +215,7 @@ Extension merged(const ScanResult& a, const ScanResult& b) {
     add_axes_of(other, out.scan);
     for (Axis& axis : out.scan.axes) axis = joined(axis, *axis_of(other, axis.keys));
     check_scan(out.scan);
+    add_inputs(out.scan);
     take_points(out, a);
     take_points(out, b);
     return out;

@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "common/result/record_bytes.hpp"
+
 namespace tubule {
 namespace {
 
@@ -115,6 +117,9 @@ private:
 Packet to_packet(const Scan& scan) {
     Writer out;
     for (const std::string& text : {scan.path, scan.case_path, scan.case_text}) out.text(text);
+    Bytes inputs;
+    put(inputs, scan.inputs);
+    out.text({reinterpret_cast<const char*>(inputs.data()), inputs.size()});
     out.number(scan.to_the_end);
     out.texts(scan.sets);
     out.number(scan.axes.size());
@@ -134,6 +139,9 @@ Scan scan_from(const Packet& packet) {
     Reader in(packet);
     Scan scan;
     for (std::string* text : {&scan.path, &scan.case_path, &scan.case_text}) *text = in.text();
+    const std::string inputs = in.text();
+    Payload bytes(std::as_bytes(std::span(inputs)));
+    scan.inputs = get_inputs(bytes);
     scan.to_the_end = in.number() != 0;
     scan.sets = in.texts();
     scan.axes.resize(in.number());

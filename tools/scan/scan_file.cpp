@@ -254,6 +254,7 @@ std::vector<std::byte> image_of(const Stored& stored) {
         put_attribute(what, "refine", std::int64_t{scan.boundary->refine});
     }
     put_text(file, "case", scan.case_text);
+    put_inputs(file, scan.inputs);
     {
         const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
         put_attribute(text, "path", scan.case_path);
@@ -330,6 +331,7 @@ Scan get_scan(hid_t file) {
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
     scan.case_path = get_text(text, "path");
     scan.sets = get_texts(open_attribute(text, "set"), "set");
+    scan.inputs = get_inputs(file);
     const auto axes = open_group(file, "axes");
     for (const std::string& axis : member_names(axes)) scan.axes.push_back(get_axis(axes, axis));
     return scan;
@@ -424,6 +426,9 @@ bool same_scan(const Scan& a, const Scan& b) {
         return s.boundary ? std::tuple(s.boundary->around, s.boundary->seeds, s.boundary->refine)
                           : std::tuple(std::optional<Outcome>(), 0, 0);
     };
+    for (const auto& x : a.inputs)
+        for (const auto& y : b.inputs)
+            if (x->name == y->name && !same_input(*x, *y)) return false;
     return a.case_text == b.case_text && a.sets == b.sets && a.to_the_end == b.to_the_end &&
            a.boundary.has_value() == b.boundary.has_value() && choice(a) == choice(b) &&
            std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(), same_axis);
@@ -521,6 +526,7 @@ ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     load(path);  // refuses a file that is not a scan before anything is changed
     auto impl = std::make_unique<Impl>(path);
     impl->stored = load(path);
+    add_inputs(impl->stored.result.scan);
     if (!same_scan(impl->stored.result.scan, scan))
         throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another scan, case, --set or --over",
                                     file.string(), scan.path));

@@ -194,7 +194,7 @@ PointResult shape_at(const Scan& scan, std::size_t point, const std::string& key
     std::vector<std::string> sets = scan.sets_of(point);
     for (std::string& set : sets)
         if (set.starts_with(key + "=")) set = fmt::format("{}={}", key, value);
-    return run_point(parse_case(scan.case_text, sets, scan.case_path), scan.to_the_end, interrupted);
+    return run_point(scan.case_with(sets), scan.to_the_end, interrupted);
 }
 
 double known_to(const PointResult& p) {

@@ -184,7 +184,7 @@ class Result:
 
     @property
     def case(self) -> Case:
-        return Case._of(_core.parse_case(self._core.case_text, self._core.case_sets, self._name))
+        return Case._of(self._core.case(self._name))
 
     def to_pandas(self):
         """The series as a pandas.DataFrame, one row a time. Needs the package pandas."""

@@ -147,7 +147,7 @@ def truth_of_result(path, quantity, times, program):
     values = {time: float(at[time]) for time in times}
     about = result.about
     scale = float(about.get("E_ref", 0)) if "energy" in quantity else max(map(abs, values.values()))
-    return Truth(values, scale or 1.0, float(about.get("estimated_error", 0)), str(path))
+    return Truth(values, scale or 1.0, float(about.get("estimated_error", 1)), str(path))
 
 
 def error_of(run, truth):

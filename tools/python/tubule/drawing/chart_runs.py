@@ -151,7 +151,7 @@ class Program:
         about = json.loads(shown[0].stdout)["about"]
         rows = [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(io.StringIO(shown[1].stdout))]
         run.outcome, run.message = about.get("stop", ""), about.get("stop_message", "")
-        run.scale, run.stated_error = about.get("E_ref", 0.0), rounded(about.get("estimated_error", 0.0))
+        run.scale, run.stated_error = about.get("E_ref", 0.0), rounded(about.get("estimated_error", 1.0))
         run.elements, run.steps = about.get("elements", 0), about.get("steps", 0)
         if not rows:
             return

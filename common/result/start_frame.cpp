@@ -1,0 +1,109 @@
+#include "common/result/start_frame.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "common/case/input_file.hpp"
+#include "common/case/read.hpp"
+#include "common/result/checksums.hpp"
+#include "common/result/frame_profile.hpp"
+#include "common/result/record_bytes.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr std::size_t most_kept = 64 * 1024, most_read = 512 * megabyte;
+
+bool is_of_run(const std::string& name) {
+    return name.starts_with("restart_");
+}
+
+StartFrame read_frame(const Case& c, const ResultFrame& from) {
+    Result result;
+    try {
+        result = read_result(beside(c, from.path));
+    } catch (const std::runtime_error& error) {
+        throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
+    }
+    const int count = static_cast<int>(result.frames.size()), number = from.frame < 0 ? count + from.frame : from.frame;
+    if (number < 0 || number >= count)
+        throw complaint(c, "shape.frame",
+                        fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
+    StartFrame out{std::move(result.frames[number]), {}};
+    std::erase_if(out.record.numbers, [](const auto& number) { return is_of_run(number.first); });
+    std::erase_if(out.record.arrays, [](const Array& array) { return is_of_run(array.name); });
+    out.record.kind = kind_of(out.record);
+    if (out.record.mesh) out.cells = result.meshes.at(*std::exchange(out.record.mesh, 0));
+    return out;
+}
+
+std::string to_bytes(const StartFrame& frame) {
+    Bytes out;
+    put(out, frame.record);
+    if (frame.cells) put(out, *frame.cells);
+    return {reinterpret_cast<const char*>(out.data()), out.size()};
+}
+
+StartFrame from_bytes(const std::string& bytes) {
+    Payload in(std::as_bytes(std::span(bytes)));
+    StartFrame out{get_record(in), {}};
+    if (!in.empty()) out.cells = get_mesh(in);
+    return out;
+}
+
+}  // namespace
+
+StartFrame start_frame(const Case& c) {
+    if (c.input && !c.input->bytes.empty()) return from_bytes(c.input->bytes);
+    return read_frame(c, std::get<ResultFrame>(c.shape));
+}
+
+WavedProfile disturbed_profile(const Case& c, const Record& frame) {
+    const auto profile = profile_of(frame);
+    const auto* graph = std::get_if<Revolution>(&profile);
+    const auto [r, z, length] = graph ? points_of(*graph) : std::get<ProfilePoints>(profile);
+    const WavedProfile surface{profile_curve(r, z, length), {}, {}};
+    try {
+        return disturbed(surface, std::get<ResultFrame>(c.shape));
+    } catch (const std::invalid_argument& error) {
+        throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
+    }
+}
+
+std::shared_ptr<const CaseInput> current_input(const Case& c) {
+    CaseInput out;
+    out.name = input_name(c.shape);
+    if (out.name.empty()) return nullptr;
+    try {
+        if (const auto* from = std::get_if<ResultFrame>(&c.shape))
+            out.bytes = to_bytes(read_frame(c, *from));
+        else
+            std::visit(
+                [&](const auto& shape) {
+                    if constexpr (requires { shape.path; }) out.bytes = read_input(beside(c, shape.path), most_read);
+                },
+                c.shape);
+    } catch (const std::runtime_error&) {
+        return nullptr;
+    }
+    out.size = out.bytes.size(), out.crc = crc32(0, std::as_bytes(std::span(out.bytes)));
+    if (out.size > most_kept) out.bytes.clear();
+    return std::make_shared<const CaseInput>(std::move(out));
+}
+
+std::string changed_input(const Case& c, const CaseInputs& of_result) {
+    const auto name = input_name(c.shape);
+    const auto old = std::ranges::find(of_result, name, [](const auto& input) { return input->name; });
+    if (name.empty() || old == of_result.end()) return {};
+    const auto now = current_input(c);
+    if (!now || same_input(*now, **old)) return {};
+    return fmt::format("{} has changed since", name);
+}
+
+CaseText kept_case(const Case& c) {
+    return {c.text, c.sets, inputs_of(c)};
+}
+
+}  // namespace tubule
