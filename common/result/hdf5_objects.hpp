@@ -82,7 +82,8 @@ Handle make_group(hid_t parent, const std::string& name);
 
 // ---- reading
 
-// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged.
+// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged, or if another
+// program has made it such that values are not in it.
 Handle open_file(const std::filesystem::path& file);
 Handle open_image(std::span<std::byte> bytes);  // of a file in memory
 
