@@ -606,6 +606,26 @@ class Refusals(InFolder):
                     self.assertIn(words, done.stderr)
                     self.assertNotIn("Traceback", done.stderr)
 
+    def test_titles_that_no_picture_holds(self):
+        path = write(self.folder / "a.hdf")
+        with h5py.File(path, "a") as file:
+            file["case"][()] = CASE.format(k42=0).replace("A made-up tube", "x" * 200000)
+        done = scripts.run_script(PLOT, "plot", path, "-o", self.folder / "a.svg")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("x" * 197 + "...", svg_texts(self.folder / "a.svg"))
+
+    @unittest.skipUnless(sys.argv[1:], "needs the program")
+    def test_interrupts_while_libraries_are_imported(self):
+        """Of Python itself, and of ours: the process ends as the program does, without a word."""
+        path = write(self.folder / "a.hdf")
+        for module in ("sitecustomize", "h5py"):
+            folder = self.folder / module
+            folder.mkdir()
+            (folder / f"{module}.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(1)\n")
+            done = subprocess.run([TUBULE, "plot", path], env=os.environ | {"PYTHONPATH": str(folder)}, capture_output=True, text=True)
+            words = [line for line in done.stderr.splitlines() if "has no checksums" not in line]
+            self.assertEqual((done.returncode, done.stdout, words), (130, "", []))
+
     def test_nothing_to_draw(self):
         self.refused("no profiles to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")
         self.refused("no energy series to draw", write(self.folder / "a.hdf", rows=0), "--kind", "energy")

@@ -215,8 +215,6 @@ def main():
         except command_line.Unavailable as error:
             command_line.say(error)
             return command_line.EXIT_UNAVAILABLE
-        except KeyboardInterrupt:
-            return 130
         command_line.say(options.movie, sys.stdout)
         return 0
 

@@ -4,6 +4,7 @@ import argparse
 import base64
 import json
 import os
+import re
 import sys
 
 import matplotlib
@@ -188,12 +189,14 @@ def page_of(data):
     except OSError:
         command_line.say(f"tubule view needs {THREE}; install the package libjs-three")
         sys.exit(command_line.EXIT_UNAVAILABLE)
-    script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
-    page = text("view.html")
-    for place, content in (("TITLE", data["title"].replace("&", "&amp;").replace("<", "&lt;")), ("LICENCE", LICENCE if three else ""),
-                           ("THREE", three), ("SCRIPT", text("view.js")), ("DATA", script)):
-        page = page.replace(f"@{place}@", content, 1)
-    return page
+    try:  # without "<", no words of the data end their element or change how the rest of the page is read
+        script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    except ValueError:
+        raise BadInput(f"{data['file']}: contains numbers that are not finite") from None
+    parts = {"TITLE": data["title"].replace("&", "&amp;").replace("<", "&lt;"), "LICENCE": LICENCE if three else "",
+             "THREE": three, "SCRIPT": text("view.js"), "DATA": script}  # fmt: skip
+    # In one pass: what is put in may have such places itself.
+    return re.sub(f"@({'|'.join(parts)})@", lambda place: parts[place[1]], text("view.html"))
 
 
 def write(path, output):
