@@ -12,6 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/scan/starts.hpp"
 
 namespace tubule {
@@ -201,6 +202,7 @@ void check_points(const Scan& scan) {
     for (const Axis& axis : scan.axes) {
         stride /= axis.size();
         for (std::size_t i = 0; i < axis.size(); ++i) {
+            check_pause();
             const Case c = scan.case_of(i * stride);
             if (c.equilibrium && c.equilibrium->branch.parameter)
                 throw CaseError(
@@ -361,27 +363,10 @@ void check_scan(const Scan& scan) {
     check_points(scan);
 }
 
-Scan read_scan(const ScanChoices& choices) {
-    Scan scan;
-    scan.path = choices.file;
-    const std::string text = read_input(choices.file, megabyte);
-    const toml::table root = parse_toml(text, choices.file);
-    ScanFile file;
-    if (root.contains("case")) {
-        file = read_scan_file(root, choices.file);
-        scan.text = text;
-        scan.case_path = file.case_path;
-        scan.case_text = read_input(file.case_path, megabyte);
-    } else if (root.contains("over") || root.contains("points")) {
-        throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
-    } else {
-        scan.case_path = choices.file;
-        scan.case_text = text;
-    }
-    scan.title = file.title;
-    scan.sets = file.sets;
-    scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
+namespace {
 
+// What varies, and the line that is looked for: of the file, where the choices have nothing else.
+Scan with_choices(Scan scan, const ScanFile& file, const ScanChoices& choices) {
     scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
@@ -402,6 +387,37 @@ Scan read_scan(const ScanChoices& choices) {
     scan.to_the_end = choices.to_the_end || file.to_the_end;
     check_scan(scan);
     return scan;
+}
+
+}  // namespace
+
+Scan read_scan(const ScanChoices& choices) {
+    Scan scan;
+    scan.path = choices.file;
+    const std::string text = read_input(choices.file, megabyte);
+    const toml::table root = parse_toml(text, choices.file);
+    ScanFile file;
+    if (root.contains("case")) {
+        file = read_scan_file(root, choices.file);
+        scan.text = text;
+        scan.case_path = file.case_path;
+        scan.case_text = read_input(file.case_path, megabyte);
+    } else if (root.contains("over") || root.contains("points")) {
+        throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
+    } else {
+        scan.case_path = choices.file;
+        scan.case_text = text;
+    }
+    scan.title = file.title;
+    scan.sets = file.sets;
+    scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
+    return with_choices(std::move(scan), file, choices);
+}
+
+Scan scan_of(const Case& c, const ScanChoices& choices) {
+    Scan scan;
+    scan.path = scan.case_path = c.path, scan.case_text = c.text, scan.sets = c.sets;
+    return with_choices(std::move(scan), {}, choices);
 }
 
 }  // namespace tubule
