@@ -503,6 +503,23 @@ class Drawing(Folder):
             tubule.draw([])
 
 
+class Missing(Folder):
+    def test_the_compiled_part(self):
+        package = self.folder / "tubule"
+        package.mkdir()
+        for file in (TOP / "tools/python/tubule").glob("*.py"):
+            (package / file.name).write_text(file.read_text())
+
+        def said():
+            done = subprocess.run(["/usr/bin/python3", "-c", "import tubule"], cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1)
+            return done.stderr.splitlines()[-1]
+
+        self.assertRegex(said(), "ImportError: tubule lacks its compiled part: .*tools/start.*python3-dev and pybind11-dev.*cmake --preset release")
+        (package / "_core.cpython-39-x86_64-linux-gnu.so").touch()
+        self.assertRegex(said(), "compiled for another Python .*cpython-39.* run /usr/bin/python3")
+
+
 class Documentation(unittest.TestCase):
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
