@@ -170,7 +170,7 @@ Wholeness examine(const std::filesystem::path& file) {
     return examine(durable::File(file, O_RDONLY).descriptor());
 }
 
-void require_whole(int descriptor, const std::filesystem::path& file) {
+bool require_whole(int descriptor, const std::filesystem::path& file) {
     const Wholeness found = examine(descriptor);
     if (found.kind == Wholeness::Kind::damaged)
         throw std::runtime_error(fmt::format("{}; `tubule show --verify {}` says what is good and can rescue it",
@@ -182,6 +182,7 @@ void require_whole(int descriptor, const std::filesystem::path& file) {
                                file.string())
                        .c_str(),
                    stderr);
+    return found.kind == Wholeness::Kind::whole;
 }
 
 }  // namespace tubule

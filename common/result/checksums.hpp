@@ -46,7 +46,8 @@ struct Wholeness {
 Wholeness examine(const std::filesystem::path& file);
 Wholeness examine(int descriptor);
 
-// Throws std::runtime_error with the damage in words; warns on stderr, once a process, of a file without checksums.
-void require_whole(int descriptor, const std::filesystem::path& file);
+// Whether it has checksums; warns on stderr, once a process, of a file without. Throws std::runtime_error with the damage
+// in words.
+bool require_whole(int descriptor, const std::filesystem::path& file);
 
 }  // namespace tubule

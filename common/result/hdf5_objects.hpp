@@ -85,7 +85,8 @@ void put_inputs(hid_t file, const CaseInputs& inputs);
 
 // ---- reading
 
-// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged.
+// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged, or if another
+// program has made it such that values are not in it.
 Handle open_file(const std::filesystem::path& file);
 Handle open_image(std::span<std::byte> bytes);  // of a file in memory
 

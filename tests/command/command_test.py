@@ -427,6 +427,9 @@ class Others(ProgramTest):
         out, _ = self.tubule("--version")
         for name in ("version", "git_hash", "compiler", "sundials", "suitesparse", "cgal", "hdf5", "blas"):
             self.assertRegex(out, rf"(?m)^{name} +\S")
+        if "none: no shape.remesh" in out:
+            self.assertRegex(out, "(?m)^lacks +shape.remesh: install libcgal-dev$")
+            self.assertIn("then cmake --preset release", out)
 
     def test_help(self):
         out, _ = self.tubule("--help")

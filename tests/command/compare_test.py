@@ -159,7 +159,7 @@ class Runs(Compare):
         for bad in ("1", "1:", "a:0", "1:2:3"):
             self.assertIn("must be I:J", self.refused("compare", self.fine, self.fine, f"--frames={bad}"))
         self.assertIn("no frame 4: there are 4 frames", self.refused("compare", self.fine, self.fine, "--frames=0:4"))
-        self.assertIn("excludes", self.refused("compare", self.fine, self.fine, "--align", "--no-shapes"))
+        self.assertIn("--no-shapes must be absent", self.refused("compare", self.fine, self.fine, "--align", "--no-shapes"))
 
         def later(file):
             for frame in file["frames"].values():

@@ -426,6 +426,15 @@ class Kill(ScanTest):
         self.assert_same_points(points(self.result), whole)
 
 
+@unittest.skipIf(MPIRUN, "built with MPI")
+class WithoutMpi(ProgramTest):
+    def test_processes_of_an_mpirun_are_refused(self):
+        done = subprocess.run([PROGRAM, "scan", self.write("case.toml", UNDULATED_TUBE), "--over", "energy.k42=0,0.1"], cwd=self.folder,
+                              env=os.environ | {"OMPI_COMM_WORLD_SIZE": "2"}, capture_output=True, text=True)  # fmt: skip
+        self.assertEqual(done.returncode, 2, done)
+        self.assertIn("install libopenmpi-dev and openmpi-bin", done.stderr)
+
+
 @unittest.skipUnless(MPIRUN, "built without MPI")
 class Ranks(Kill):
     """The same across the processes of an mpirun."""

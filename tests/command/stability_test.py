@@ -320,10 +320,14 @@ equilibrium = {modes = 2, area = 41.074}
         for option in ("--tension", "--Re", "--gamma"):
             for number in ("nan", "inf", "1e999"):
                 model = () if option == "--tension" else ("--model", "stokes")
-                self.refuses(f"{number} is not a finite number", self.tube, option, number, *model)
-        self.refuses("--tension -1e+308 is too large to compute with: at most 1e+100", self.tube, "--tension", "-1e308")
-        self.tubule("stability", self.tube, "--model", "solid", status=2)
-        self.tubule("stability", self.tube, "--modes", "-1", status=2)
+                self.refuses(f"{option} must be from", self.tube, option, number, *model)
+        self.refuses("--tension must be from -1e+100 to 1e+100, not -1e+308", self.tube, "--tension", "-1e308")
+        self.refuses('not "stokse"; did you mean "stokes"?', self.tube, "--model", "stokse")
+        self.refuses("--modes must be from 0 to 100, not -1", self.tube, "--modes", "-1")
+        self.refuses("--rates must be from 1 to 100, not 0", self.tube, "--numerical", "--rates", "0")
+        self.refuses("--waves must be from 1 to 10000, not 10001", self.tube, "--waves", "10001")
+        self.refuses("--fit needs a result", self.tube, "--fit", "1")
+        self.refuses("--frame needs a result", self.tube, "--frame", "0")
 
 
 if __name__ == "__main__":

@@ -4,9 +4,12 @@
     python_test.py TUBULE TOP PACKAGES
 """
 import doctest
+import copy
 import json
 import os
+import pickle
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -79,6 +82,17 @@ class Cases(Folder):
             cases.toml_value(float("nan"))
         with self.assertRaisesRegex(TypeError, "complex"):
             cases.toml_value(1j)
+        with self.assertRaisesRegex(TypeError, "float128: give float"):
+            cases.toml_value(np.longdouble(1))
+        itself = {}
+        itself["a"] = itself["b"] = itself
+        with self.assertRaisesRegex(ValueError, "contain itself"):
+            tubule.Case(itself)
+        for name in ("\ud800.toml", "a\0b.toml", ""):
+            with self.assertRaisesRegex(ValueError, "no name of a file"):
+                tubule.Case(name)
+        with self.assertRaisesRegex(TypeError, "must be a dictionary"):
+            tubule.Case(TUBE, 5)
 
     def test_overrides(self):
         case = tubule.Case(TUBE, {"energy.k42": 0.2}).with_(energy__k20=0.7)
@@ -93,6 +107,11 @@ class Cases(Folder):
             tubule.Case(path)
         self.assertEqual(str(raised.exception), said)
         self.assertIsInstance(raised.exception, ValueError)
+
+    def test_copies(self):
+        case = tubule.Case(TUBE).with_(energy__k20=0.7)
+        for twin in (pickle.loads(pickle.dumps(case)), copy.deepcopy(case)):
+            self.assertEqual(twin.toml, case.toml)
 
     def test_a_forecast(self):
         self.assertGreater(tubule.Case(TUBE).forecast()["steps"], 10)
@@ -159,6 +178,16 @@ class Runs(Folder):
         pinched = tubule.run(TOP / "cases/pinch_off.toml")
         self.assertEqual(pinched.stop, "pinch-off")
         self.assertLess(len(pinched.warnings), 3)
+
+    def test_arguments(self):
+        for options, words in (({"threads": -1}, "threads must be from 0 to 1000"), ({"threads": 10**6}, "threads must be from 0 to 1000"),
+                               ({"threads": 2**40}, "too large"), ({"output": "a\0.hdf"}, "no name of a file")):  # fmt: skip
+            with self.assertRaisesRegex(ValueError, words):
+                tubule.run(TUBE, **options)
+        for options, words in (({"threads": 1.5}, "must be an integer"), ({"progress": 5}, "must be a function")):
+            with self.assertRaisesRegex(TypeError, words):
+                tubule.run(TUBE, **options)
+        self.assertEqual(tubule.run(SURFACE, threads=1000).stop, "finished")  # no more than there are processors
 
     def test_progress(self):
         seen = []
@@ -239,6 +268,34 @@ print(tubule.run({TUBE!r}).stop)
 """
         done = subprocess.run(["/usr/bin/python3", "-c", script], text=True, capture_output=True, timeout=200, cwd=self.folder)
         self.assertEqual(done.stdout, "['SIGINT', 'SIGALRM', 'SIGALRM']\n['SIGINT', 'SIGINT', 'SIGINT']\nfinished\n", done.stderr)
+
+    def test_interrupts_of_many_runs(self):
+        """The first Ctrl-C ends those that have begun; they would take minutes."""
+        script = f"""
+import sys
+sys.path.insert(0, {sys.argv[3]!r})
+import tubule
+print("begun", flush=True)
+try:
+    tubule.run_many([{LONG!r}] * 6, jobs=3)
+except KeyboardInterrupt:
+    print("interrupted")
+print(*(r.stop for r in tubule.run_many([{TUBE!r}] * 2)))
+"""
+        with subprocess.Popen(["/usr/bin/python3", "-c", script], stdout=subprocess.PIPE, text=True) as process:
+            process.stdout.readline()
+            time.sleep(1)
+            process.send_signal(signal.SIGINT)
+            sent = time.monotonic()
+            self.assertEqual(process.stdout.readline(), "interrupted\n")
+            self.assertLess(time.monotonic() - sent, 5)  # on a busy machine; 0.3 s on another
+            self.assertEqual(process.stdout.readline(), "finished finished\n")
+
+    def test_a_run_that_fails_ends_the_others(self):
+        began = time.monotonic()
+        with self.assertRaisesRegex(tubule.CaseError, "missing.off"):
+            tubule.run_many([LONG, LONG, SURFACE | {"shape": {"kind": "file", "path": "missing.off"}, "discretisation": {}}], jobs=3)
+        self.assertLess(time.monotonic() - began, 30)
 
     def test_without_the_lock_of_the_interpreter(self):
         ticks, over = [], threading.Event()
@@ -343,8 +400,29 @@ class Shapes(Folder):
             tubule.read(self.folder / "x.hdf")
         with self.assertRaises(IndexError):
             tubule.run(TUBE).frames[99]
-        with self.assertRaises(KeyError):
+        with self.assertRaisesRegex(KeyError, "did you mean 'energy'"):
             tubule.run(TUBE).series["enrgy"]
+        for points in (1, 10**9):
+            with self.assertRaisesRegex(ValueError, "points must be from 2 to"):
+                tubule.run(TUBE).frames[0].profile(points)
+        with self.assertRaisesRegex(ValueError, "3 points or more around"):
+            tubule.run(TUBE).frames[0].revolve(-3)
+
+    def test_copies(self):
+        """A result is its file; a copy has all of it, the meshes of surfaces, too."""
+        for case in (TUBE, SURFACE, VESICLE):
+            result = tubule.run(case)
+            for twin in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+                self.assertEqual(twin.about, result.about)
+                self.assertEqual(twin.case.toml, result.case.toml)
+                for name in result.series:
+                    np.testing.assert_array_equal(twin.series[name], result.series[name])
+                for a, b in zip(twin.frames, result.frames, strict=True):
+                    self.assertEqual((a.time, a.kind, a.numbers), (b.time, b.kind, b.numbers))
+                    for name in b.arrays:
+                        np.testing.assert_array_equal(a[name], b[name])
+                if case is SURFACE:
+                    np.testing.assert_array_equal(twin.frames[-1].cells, result.frames[-1].cells)
 
 
 class Answers(Folder):
@@ -361,6 +439,25 @@ class Answers(Folder):
         with self.assertRaisesRegex(ValueError, "exclude"):
             tubule.stability(path, q=[1.0], waves=2)
 
+    def test_what_cannot_be_asked_of_stability(self):
+        """As the command says it, but for the dashes."""
+        case = tubule.Case(TUBE)
+        for options, words in (({"fit": (1,)}, "fit needs a result"), ({"frame": 3}, "frame needs a result"),
+                               ({"rates": 0}, "rates must be from 1 to 100, not 0"), ({"rates": -1, "numerical": True}, "rates must be from 1"),
+                               ({"modes": 10**9}, "modes must be from 0 to 100"), ({"modes": -1}, "modes must be from 0"),
+                               ({"waves": 10**8}, "waves must be from 1 to 10000"), ({"waves": -5}, "waves must be from 1"),
+                               ({"Re": -1.0}, "Re must be from 1e-100"), ({"gamma": -1.0}, "gamma must be from 0"),
+                               ({"tension": float("nan")}, "tension must be from"), ({"model": "stokse"}, 'did you mean "stokes"'),
+                               ({"q": []}, "q must not be empty"), ({"q": [float("nan")]}, "is not a number")):  # fmt: skip
+            with self.assertRaisesRegex(ValueError, "^(?!--).*" + words):
+                tubule.stability(case, **options)
+        for options, words in (({"model": None}, "model must be a text"), ({"modes": 1.5}, "modes must be an integer"),
+                               ({"Re": "x"}, "Re must be a number")):  # fmt: skip
+            with self.assertRaisesRegex(TypeError, words):
+                tubule.stability(case, **options)
+        with self.assertRaisesRegex(ValueError, "m must be from 0"):
+            case.growth_rate(1.0, m=-1)
+
     def test_comparisons_as_the_program_says_them(self):
         for name, k42 in (("a.hdf", 0.1), ("b.hdf", 0.11)):
             self.assertEqual(self.program("run", self.written(TUBE), "--set", f"energy.k42={k42}", "-o", name).returncode, 0)
@@ -370,6 +467,10 @@ class Answers(Folder):
         self.assertEqual(ours["frames"], theirs["frames"])
         with self.assertRaisesRegex(ValueError, "no frame 77"):
             tubule.compare(tubule.run(TUBE), tubule.run(TUBE), frames=[(77, 0)])
+        with self.assertRaisesRegex(ValueError, "no-shapes must be absent"):
+            tubule.compare(tubule.run(TUBE), tubule.run(TUBE), align=True, shapes=False)
+        with self.assertRaisesRegex(TypeError, "a result is wanted"):
+            tubule.compare(tubule.run(TUBE), "b.hdf")
 
     def test_scans_as_the_program_makes_them(self):
         over = {"energy.k42": [0, 0.1], "shape.mode.0.amplitude": "0.1:0.3:3"}
@@ -384,6 +485,13 @@ class Answers(Folder):
             np.testing.assert_array_equal(written["points/energy"][:], theirs["points/energy"][:])
         with self.assertRaisesRegex(tubule.CaseError, "energy.k24"):
             tubule.scan(TUBE, {"energy.k24": [1, 2]})
+        for options, words in (({"jobs": 0}, "jobs must be 1 or more"), ({"boundary": "not-run"}, "boundary must be one of"),
+                               ({"output": "a.journal"}, "name of the journal")):  # fmt: skip
+            with self.assertRaisesRegex(tubule.CaseError, words):
+                tubule.scan(TUBE, {"energy.k42": [0, 0.1]}, **options)
+        with self.assertRaisesRegex(TypeError, "over must be a dictionary"):
+            tubule.scan(TUBE, ["energy.k42"])
+        self.assertEqual(len(pickle.loads(pickle.dumps(ours)).to_pandas()), 6)
 
     def test_closed_forms(self):
         # theory.md (2.1); a tube of radius R has H = -1/R, K = 0, a sphere H = -2/R, K = 1/R^2.
@@ -450,11 +558,32 @@ class Drawing(Folder):
 
     def test_refusals(self):
         result = tubule.run(TUBE)
-        for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "must be one of"),
+        for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "is not one of"),
                                ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame"),
-                               ({"dpi": 5}, "not between 30 and 1200")):  # fmt: skip
+                               ({"dpi": 5}, "not between 30 and 1200"), ({"colour": ["T"]}, "is not one of u_n"),
+                               ({"plane": ("w", 0)}, "is not one of x"), ({"times": [float("nan")]}, "must be finite"),
+                               ({"quantity": "energy"}, "belong to scans")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, words):
                 tubule.draw(result, **options)
+        with self.assertRaisesRegex(ValueError, "no result to draw"):
+            tubule.draw([])
+
+
+class Missing(Folder):
+    def test_the_compiled_part(self):
+        package = self.folder / "tubule"
+        package.mkdir()
+        for file in (TOP / "tools/python/tubule").glob("*.py"):
+            (package / file.name).write_text(file.read_text())
+
+        def said():
+            done = subprocess.run(["/usr/bin/python3", "-c", "import tubule"], cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1)
+            return done.stderr.splitlines()[-1]
+
+        self.assertRegex(said(), "ImportError: tubule lacks its compiled part: .*tools/start.*python3-dev and pybind11-dev.*cmake --preset release")
+        (package / "_core.cpython-39-x86_64-linux-gnu.so").touch()
+        self.assertRegex(said(), "compiled for another Python .*cpython-39.* run /usr/bin/python3")
 
 
 class Documentation(unittest.TestCase):

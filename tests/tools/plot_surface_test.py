@@ -174,7 +174,7 @@ class Surfaces(InFolder):
         def lost(file):
             del file["meshes"]
 
-        damaged(nan, "frame 000000 contains numbers that are not finite")
+        damaged(nan, "contains numbers that are not finite")
         damaged(short, "frame 000000: Points, normal, H, K must have one row per point")
         damaged(lost, "damaged or not a result of tubule")
 

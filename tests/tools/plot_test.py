@@ -573,10 +573,71 @@ class Refusals(InFolder):
 
         damaged(short, "frame 000001: z, r, H, K must be lists of one length")
         damaged(short_velocity, "frame 000001: z, r, H, K, u_t must be lists of one length")
-        damaged(nan, "frame 000001 contains numbers that are not finite")
+        damaged(nan, "/frames/000001/H contains numbers that are not finite")
         damaged(lack, "frame 000001 lacks K")
         damaged(ragged, "series of different lengths")
         damaged(text, "its case is not valid TOML")
+
+    def test_values_that_the_file_does_not_hold(self):
+        """Links to other files, values in them, and more values than the file has bytes: refused by every reader."""
+        secret = self.folder / "secret"
+        secret.write_bytes(np.arange(40.0).tobytes())
+        other = write(self.folder / "other.hdf")
+
+        def linked(file):
+            file["series/energy"] = h5py.ExternalLink(str(other), "/series/energy")
+
+        def outside(file):
+            file.create_dataset("series/energy", (40,), float, external=[(str(secret), 0, 320)])
+
+        def virtual(file):
+            layout = h5py.VirtualLayout((40,), float)
+            layout[:] = h5py.VirtualSource(str(other), "/series/energy", (40,))
+            file.create_virtual_dataset("series/energy", layout)
+
+        def huge(file):
+            file.create_dataset("series/energy", (2**40,), float, chunks=(1024,))
+
+        def huge_packed(file):
+            file.create_dataset("series/energy", (2**40,), float, chunks=(1024,), compression="gzip")
+
+        def nan(file):
+            file["series/energy"] = np.full(40, np.nan)
+
+        for change, words in ((linked, "link to another file: not followed"), (outside, "in another file: not read"), (virtual, "in another file: not read"),
+                              (huge, "not all are in the file"), (huge_packed, "not all are in the file"), (nan, "energy")):  # fmt: skip
+            path = write(self.folder / "foreign.hdf")
+            with h5py.File(path, "a") as file:
+                del file["series/energy"]
+                change(file)
+            with self.subTest(change=change.__name__):
+                self.refused(words, path)
+                self.assertRaisesRegex(results.BadInput, words, results.read_result, path)
+                for command in ("show", "plot", "view") if TUBULE else ():
+                    done = subprocess.run([TUBULE, command, path], capture_output=True, text=True)
+                    self.assertEqual(done.returncode, 2, (command, done))
+                    self.assertIn(words, done.stderr)
+                    self.assertNotIn("Traceback", done.stderr)
+
+    def test_titles_that_no_picture_holds(self):
+        path = write(self.folder / "a.hdf")
+        with h5py.File(path, "a") as file:
+            file["case"][()] = CASE.format(k42=0).replace("A made-up tube", "x" * 200000)
+        done = scripts.run_script(PLOT, "plot", path, "-o", self.folder / "a.svg")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("x" * 197 + "...", svg_texts(self.folder / "a.svg"))
+
+    @unittest.skipUnless(sys.argv[1:], "needs the program")
+    def test_interrupts_while_libraries_are_imported(self):
+        """Of Python itself, and of ours: the process ends as the program does, without a word."""
+        path = write(self.folder / "a.hdf")
+        for module in ("sitecustomize", "h5py"):
+            folder = self.folder / module
+            folder.mkdir()
+            (folder / f"{module}.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(1)\n")
+            done = subprocess.run([TUBULE, "plot", path], env=os.environ | {"PYTHONPATH": str(folder)}, capture_output=True, text=True)
+            words = [line for line in done.stderr.splitlines() if "has no checksums" not in line]
+            self.assertEqual((done.returncode, done.stdout, words), (130, "", []))
 
     def test_nothing_to_draw(self):
         self.refused("no profiles to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")

@@ -5,7 +5,9 @@
 """
 
 import base64
+import html
 import json
+import random
 import re
 import shutil
 import subprocess
@@ -88,6 +90,18 @@ class Pages(Folder):
         page = made(self.folder, [*TUBE, "--set", "about.title=$k$ & co", "--overwrite"])[1]
         self.assertEqual(data_of(page)["title"], "$k$ & co")
         self.assertIn("<title>$k$ &amp; co</title>", page.read_text())
+
+    def test_titles_are_words_whatever_they_are(self):
+        data = view.run_page(made(self.folder, TUBE)[0])
+        rng, parts = random.Random(36), ["@DATA@", "@SCRIPT@", "@THREE@", "@TITLE@", "<!--", "<script>", "</script>", "-->", "\\u003c", "\\1", "&", "<"]
+        for title in (*parts, "<!--<script>", *("".join(rng.choices(parts, k=rng.randint(2, 6))) for _ in range(20))):
+            with self.subTest(title=title):
+                page = view.page_of(data | {"title": title})
+                inside = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, re.S)[1]
+                self.assertNotIn("<", inside)
+                self.assertEqual(json.loads(inside)["title"], title)
+                self.assertEqual(html.unescape(re.search("<title>(.*?)</title>", page, re.S)[1]), title)
+                self.assertEqual(page.count("three.js authors"), 1 + Path(view.THREE).read_text().count("three.js authors"))
 
     def test_map_of_a_scan_names_the_command_of_a_point(self):
         result, page = made(self.folder, SCAN)

@@ -13,6 +13,7 @@
 #include <fstream>
 
 #include "build_config.hpp"
+#include "common/case/text.hpp"
 #include "git_hash.hpp"
 
 namespace tubule {
@@ -85,6 +86,12 @@ std::vector<std::pair<std::string, std::string>> build_info() {
             {"gsl", gsl_version},
             {"blas", blas()},
             {"machine", machine()}};
+}
+
+std::vector<std::string> lacking() {
+    std::vector<std::string> parts = split(TUBULE_LACKS, '\n');
+    parts.pop_back();
+    return parts;
 }
 
 }  // namespace tubule

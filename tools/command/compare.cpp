@@ -1,5 +1,7 @@
 // tubule compare A B: two results of any tiers against each other, as a table, CSV, JSON and a picture; the exit status
 // says whether they agree within tolerances.
+#include "tools/command/compare.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -17,7 +19,6 @@
 #include "common/case/text.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/compare.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/python.hpp"
@@ -184,6 +185,8 @@ Side side_of(const std::string& name, const Result& result) {
 }
 
 Comparison compared(const CompareOptions& options, const Result& a, const Result& b) {
+    if (options.no_shapes && (options.align || !options.frames.empty()))
+        refuse(fmt::format("{} compares shapes: --no-shapes must be absent", options.align ? "--align" : "--frames"));
     const std::vector<Tolerance> tolerances = tolerances_of(options);
     Comparison out;
     out.a = side_of(options.results[0], a), out.b = side_of(options.results[1], b);
@@ -362,13 +365,12 @@ void add_compare(CLI::App& app, int& exit_status) {
                      "NAME=VALUE, the largest relative difference of a series, shape, shape_l2, area_drift, "
                      "volume_drift or outcome; exit status 1 if one is larger")
         ->allow_extra_args(false);
-    CLI::Option* no_shapes = command->add_flag("--no-shapes", o->no_shapes, "do not compare the frames' surfaces");
-    command->add_flag("--align", o->align, "first move B rigidly to where it fits best")->excludes(no_shapes);
+    command->add_flag("--no-shapes", o->no_shapes, "do not compare the frames' surfaces");
+    command->add_flag("--align", o->align, "first move B rigidly to where it fits best");
     command
         ->add_option("--frames", o->frames,
                      "I:J, compare frame I of A with frame J of B (-1: the last) whatever their times, and no series")
-        ->allow_extra_args(false)
-        ->excludes(no_shapes);
+        ->allow_extra_args(false);
     CLI::Option* csv_flag = command->add_flag("--csv", o->csv, "the table as CSV, in full precision");
     command->add_flag("--json", o->json, "all of it as JSON, with the series over time")->excludes(csv_flag);
     command->add_option("--plot", o->pictures, "picture to write, .png, .svg or .pdf; may be repeated")

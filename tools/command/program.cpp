@@ -34,6 +34,9 @@ namespace {
 std::string version() {
     std::string text;
     for (const auto& [name, value] : build_info()) text += fmt::format("{:<12} {}\n", name, value);
+    for (const std::string& part : lacking()) text += fmt::format("{:<12} {}\n", "lacks", part);
+    if (!lacking().empty())
+        text += fmt::format("{:<12} then cmake --preset release && cmake --build --preset release\n", "");
     return text;
 }
 

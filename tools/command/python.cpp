@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -25,6 +26,23 @@ namespace {
 constexpr int no_picture = 4;
 constexpr const char* python = "/usr/bin/python3";  // PATH's python3 may lack Debian's modules
 
+// While it lives SIGINT waits, also for a program that is started now: Python would print a traceback until its script
+// listens (drawing/__main__.py).
+class Withheld {
+public:
+    Withheld() {
+        sigset_t interrupt;
+        sigemptyset(&interrupt), sigaddset(&interrupt, SIGINT);
+        sigprocmask(SIG_BLOCK, &interrupt, &before_);
+    }
+    ~Withheld() { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+    Withheld(const Withheld&) = delete;
+    Withheld& operator=(const Withheld&) = delete;
+
+private:
+    sigset_t before_;
+};
+
 // Waits for the command, which reads the file from its beginning. Its exit status.
 int wait_for(const std::string& subcommand, std::vector<std::string> command, std::FILE* input) {
     std::vector<char*> argv;
@@ -36,7 +54,10 @@ int wait_for(const std::string& subcommand, std::vector<std::string> command, st
     posix_spawn_file_actions_adddup2(&actions, fileno(input), STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
     pid_t child = 0;
-    const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+    const int error = [&] {
+        const Withheld interrupts;
+        return posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+    }();
     posix_spawn_file_actions_destroy(&actions);
     int status = 0;
     if (error != 0 || waitpid(child, &status, 0) != child)
@@ -78,6 +99,7 @@ int become(const std::string& subcommand, std::vector<std::string> command) {
     for (std::string& argument : command) argv.push_back(argument.data());
     argv.push_back(nullptr);
     std::fflush(nullptr);
+    const Withheld interrupts;
     execv(argv[0], argv.data());
     say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
     return no_picture;

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
@@ -137,8 +136,7 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
     if (!options.output.empty()) check_output(options.output);
     if (ranks && options.jobs)
         throw CaseError("--jobs must be absent under mpirun: each rank runs one point at a time");
-    const int jobs = options.jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
-    if (jobs < 1) throw CaseError(fmt::format("--jobs must be 1 or more, not {}", jobs));
+    const int jobs = scan_threads(options.jobs);
     ScanWriter writer = [&] {
         const PauseWatch watch(std::nullopt, interrupted);
         return is_scan(options.choices.file) ? grown_result(options) : new_result(options);

@@ -3,6 +3,7 @@
 #include "tools/command/stability.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 #include "common/result/record.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
@@ -31,6 +33,11 @@
 
 namespace tubule {
 
+void require_within(const std::string& option, double value, double low, double high) {
+    if (!(low <= value && value <= high))
+        throw std::invalid_argument(fmt::format("{} must be from {:g} to {:g}, not {:g}", option, low, high, value));
+}
+
 std::string words(const Model& model) {
     std::string text = name(model);
     const ModelEntry& has = model_entry(model.kind);
@@ -45,8 +52,6 @@ std::string words(const Model& model) {
 }
 
 namespace {
-
-constexpr double largest_tension = 1e100;  // products with it are numbers
 
 // The exit status of the script, which has said why.
 struct NoPicture {
@@ -66,12 +71,7 @@ Record frame_of(const StabilityOptions& options, const Result& result) {
 }
 
 StabilitySubject subject_of(const StabilityOptions& options) {
-    if (!is_result(options.file)) {
-        if (!options.fit.empty())
-            throw std::invalid_argument("--fit needs a result, NAME.hdf, not a case: run it first");
-        if (options.frame) throw std::invalid_argument("--frame needs a result, NAME.hdf, not a case");
-        return {read_case(options.file, options.sets)};
-    }
+    if (!is_result(options.file)) return {read_case(options.file, options.sets)};
     if (!options.sets.empty())
         throw std::invalid_argument("--set needs a case: the case of a result cannot be changed");
     std::optional<Result> result;
@@ -93,6 +93,14 @@ Model with_kind(const Model& own, ModelKind kind) {
         return model;
     }
     return {.kind = kind, .Re = own.Re, .gamma = own.gamma, .keeps_volume = {}};
+}
+
+std::vector<std::string> model_names() {
+    std::vector<std::string> names;
+    for (const ModelEntry& m : models)
+        if (m.kind != ModelKind::automatic) names.emplace_back(m.name);
+    names.emplace_back("all");
+    return names;
 }
 
 std::vector<Model> models_of(const StabilityOptions& options, const Model& own) {
@@ -213,10 +221,25 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     return spectrum_report(options, subject, models);
 }
 
-void refuse_contradictions(const StabilityOptions& o) {
-    if (o.tension && std::abs(*o.tension) > largest_tension)
-        throw std::invalid_argument(
-            fmt::format("--tension {:g} is too large to compute with: at most {:g}", *o.tension, largest_tension));
+// The one place that knows what each option may be, for the command and for Python.
+void refuse_values(const StabilityOptions& o) {
+    require_within("--modes", o.modes, 0, most_modes);
+    require_within("--rates", o.rates, 1, 100);
+    if (o.waves) require_within("--waves", *o.waves, 1, 10000);
+    if (o.tension) require_within("--tension", *o.tension, -largest_number, largest_number);
+    if (o.Re) require_within("--Re", *o.Re, 1 / largest_number, largest_number);
+    if (o.gamma) require_within("--gamma", *o.gamma, 0, largest_number);
+    const std::vector<std::string> names = model_names();
+    if (o.model.empty() || std::find(names.begin(), names.end(), o.model) != names.end()) return;
+    const auto meant = near_miss(o.model, names);
+    throw std::invalid_argument(fmt::format("--model must be one of {}, not \"{}\"{}", fmt::join(names, ", "), o.model,
+                                            meant ? fmt::format("; did you mean \"{}\"?", *meant) : ""));
+}
+
+void refuse_contradictions(const StabilityOptions& o, bool of_result) {
+    if (!of_result && !o.fit.empty())
+        throw std::invalid_argument("--fit needs a result, NAME.hdf, not a case: run it first");
+    if (!of_result && o.frame) throw std::invalid_argument("--frame needs a result, NAME.hdf, not a case");
     if (!o.q.empty() && o.waves)
         throw std::invalid_argument("--q and --waves exclude each other: both choose the waves");
     if (!o.fit.empty() && (!o.q.empty() || o.waves || o.tension || o.frame || o.numerical || !o.plot.empty() ||
@@ -227,7 +250,8 @@ void refuse_contradictions(const StabilityOptions& o) {
 }  // namespace
 
 std::string stability_answer(const StabilityOptions& options, StabilitySubject subject) {
-    refuse_contradictions(options);
+    refuse_values(options);
+    refuse_contradictions(options, subject.result.has_value());
     return answer_for(options, std::move(subject));
 }
 
@@ -272,26 +296,16 @@ void add_stability(CLI::App& app, int& exit_status) {
     finds_installed_cases(*command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required());
     command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
         ->allow_extra_args(false);
-    std::vector<std::string> names{"all"};
-    for (const ModelEntry& m : models)
-        if (m.kind != ModelKind::automatic) names.insert(names.end() - 1, m.name);
-    command->add_option("--model", o->model, "another model than the case's, or all")->check(CLI::IsMember(names));
-    command->add_option("--Re", o->Re, "of viscous models, where the case has none")
-        ->check(refuse_infinite)
-        ->check(CLI::PositiveNumber);
-    command->add_option("--gamma", o->gamma, "friction of all models but gradient flow, where the case has none")
-        ->check(refuse_infinite)
-        ->check(CLI::NonNegativeNumber);
-    command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)")
-        ->check(refuse_infinite);
-    command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this")
-        ->check(CLI::Range(0, 100))
-        ->capture_default_str();
-    command->add_option("--waves", o->waves, "tube: n = 0 ... this; sphere: l (default: all that grow, and some)")
-        ->check(CLI::Range(1, 10000));
+    command->add_option("--model", o->model, "another model than the case's, or all")
+        ->type_name(fmt::format("TEXT:{{{}}}", fmt::join(model_names(), ",")));
+    command->add_option("--Re", o->Re, "of viscous models, where the case has none");
+    command->add_option("--gamma", o->gamma, "friction of all models but gradient flow, where the case has none");
+    command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)");
+    command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this, up to 100")->capture_default_str();
+    command->add_option("--waves", o->waves,
+                        "tube: n = 0 ... this, up to 10000; sphere: l (default: all that grow, and some)");
     command->add_option("--q", o->q, "tube: these wave numbers instead, as 0.5,1,1.5 or from:to:count");
-    command->add_option("--rates", o->rates, "other shapes: how many rates for each m")
-        ->check(CLI::Range(1, 100))
+    command->add_option("--rates", o->rates, "other shapes: how many rates for each m, up to 100")
         ->capture_default_str();
     command->add_option("--frame", o->frame, "of a result (default: -1, the last one)");
     command->add_flag("--numerical", o->numerical, "the numerical spectrum, also for tubes and spheres");

@@ -11,6 +11,12 @@
 
 namespace tubule {
 
+inline constexpr double largest_number = 1e100;  // products with it are numbers
+inline constexpr int most_modes = 100;
+
+// Throws std::invalid_argument unless low <= value <= high. `option` names it.
+void require_within(const std::string& option, double value, double low, double high);
+
 enum class Output { words, csv, json };
 
 // Many fields: one for each option of the command.

@@ -8,6 +8,7 @@
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
+#include "common/solve/pause.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
 #include "surface3d/curvature/surface_modes.hpp"
@@ -18,6 +19,8 @@
 namespace tubule {
 
 namespace {
+
+constexpr int most_waves = 1000;
 
 struct WaveNumbers {
     int n = 0, m = 0;
@@ -34,9 +37,11 @@ WaveNumbers wave_of(const std::string& text) {
     auto read = std::from_chars(at, end, wave.n);
     if (read.ec == std::errc{} && read.ptr != end && *read.ptr == ',')
         read = std::from_chars(read.ptr + 1, end, wave.m);
-    if (read.ec != std::errc{} || read.ptr != end || wave.n < 0 || wave.m < 0 || (wave.n == 0 && wave.m == 0))
+    const bool known = std::min(wave.n, wave.m) >= 0 && std::max(wave.n, wave.m) <= most_waves;
+    if (read.ec != std::errc{} || read.ptr != end || !known || (wave.n == 0 && wave.m == 0))
         throw std::invalid_argument(
-            fmt::format("--fit must be n or n,m with n, m >= 0 and not both 0, such as 1 or 2,1; not {}", text));
+            fmt::format("--fit must be n or n,m with n, m from 0 to {} and not both 0, such as 1 or 2,1; not {}",
+                        most_waves, text));
     return wave;
 }
 
@@ -63,6 +68,7 @@ Amplitudes amplitudes_of(const Result& result, WaveNumbers wave) {
     Amplitudes out;
     const bool surfaces = !result.frames.empty() && result.frames.back().mesh;
     for (const Record& frame : result.frames) {
+        check_pause();
         if (surfaces && !frame.mesh && wave.m > 0) continue;
         if (!out.times.empty() && out.times.back() == frame.time) out.times.pop_back(), out.values.pop_back();
         out.times.push_back(frame.time);

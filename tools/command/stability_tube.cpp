@@ -69,20 +69,26 @@ std::vector<std::string> split(const std::string& text, char at) {
 }
 
 std::vector<double> wave_numbers(const std::string& text) {
+    constexpr int most = 100000;
+    if (std::count(text.begin(), text.end(), ',') >= most)
+        throw std::invalid_argument(fmt::format("--q: more than {} wave numbers", most));
     std::vector<double> q;
     if (text.find(':') != std::string::npos) {
         const auto parts = split(text, ':');
         if (parts.size() != 3)
             throw std::invalid_argument("--q must be a list q1,q2,... or from:to:count, not " + text);
         const double from = number(parts[0], "--q"), to = number(parts[1], "--q"), count = number(parts[2], "--q");
-        if (!(to > from) || count != std::floor(count) || count < 2 || count > 100000)
-            throw std::invalid_argument("--q from:to:count needs to > from and 2 to 100000 wave numbers, not " + text);
+        if (!(to > from) || count != std::floor(count) || count < 2 || count > most)
+            throw std::invalid_argument(
+                fmt::format("--q from:to:count needs to > from and 2 to {} wave numbers, not {}", most, text));
         for (int i = 0; i < count; ++i) q.push_back(from + (to - from) * i / (count - 1));
     } else {
         for (const std::string& part : split(text, ',')) q.push_back(number(part, "--q"));
     }
     for (const double value : q)
-        if (value < 0) throw std::invalid_argument(fmt::format("--q: wave numbers are >= 0, not {:g}", value));
+        if (!(value >= 0 && value <= largest_number))
+            throw std::invalid_argument(
+                fmt::format("--q: wave numbers are >= 0 and at most {:g}, not {:g}", largest_number, value));
     return q;
 }
 

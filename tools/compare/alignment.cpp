@@ -6,6 +6,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/compare/distance.hpp"
 #include "tools/compare/same_kind.hpp"
 
@@ -57,6 +58,7 @@ std::vector<Sample> quadrature_points(const Surface& surface, const Surface& oth
 }
 
 std::vector<Foot> feet(const std::vector<Sample>& samples, const Surface& b, const RigidMotion& motion) {
+    check_pause();
     std::vector<Foot> out(samples.size());
     parallel_for(
         samples.size(), [&](std::size_t i) { out[i] = b.foot(motion(samples[i].x)); },

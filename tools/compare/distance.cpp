@@ -5,6 +5,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
+#include "common/solve/pause.hpp"
 #include "tools/compare/same_kind.hpp"
 
 namespace tubule::compare {
@@ -43,7 +44,11 @@ double climb(const Surface& from, const Surface& to, const RigidMotion& motion, 
 OneWay one_way(const Surface& from, const Surface& to, const RigidMotion& motion) {
     const std::vector<Sample> samples = from.samples(to.grain());
     std::vector<double> away(samples.size());
-    parallel_for(samples.size(), [&](std::size_t i) { away[i] = to.foot(motion(samples[i].x)).distance; });
+    SharedPause pause;
+    parallel_for(samples.size(), [&](std::size_t i) {
+        if (!pause.look(i)) away[i] = to.foot(motion(samples[i].x)).distance;
+    });
+    pause.check();
 
     OneWay out;
     for (std::size_t i = 0; i < samples.size(); ++i) {

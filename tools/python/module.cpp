@@ -9,13 +9,16 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
-#include <thread>
+#include <functional>
+#include <regex>
 
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 #include "common/energy/bending.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
+#include "common/result/result_image.hpp"
 #include "common/series/catalogue.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/parallel.hpp"
@@ -83,7 +86,8 @@ private:
     std::exception_ptr raised_;
 };
 
-// Does the work without the GIL, with so many threads for loops over elements (0: as many as there are processors).
+// Does the work without the GIL, with so many threads for loops over elements (0: as many as there are processors; more
+// than that would only wait).
 // Handlers of signals end it by what they raise: Ctrl-C by KeyboardInterrupt.
 template <class Work>
 auto without_gil(int threads, const Work& work) {
@@ -92,12 +96,13 @@ auto without_gil(int threads, const Work& work) {
         const py::gil_scoped_release release;
         const PauseWatch watch(std::nullopt, [&] { return signals.interrupted(); });
         const int before = omp_get_max_threads();
-        omp_set_num_threads(threads > 0 ? threads : std::min(before, omp_get_num_procs()));
+        omp_set_num_threads(std::min(threads > 0 ? threads : before, omp_get_num_procs()));
         struct Reset {
             int threads;
             ~Reset() { omp_set_num_threads(threads); }
         } reset{before};
         multiply_on_one_thread();
+        const PauseWatch watch(std::nullopt, interrupted);
         try {
             return work();
         } catch (const Paused& pause) {
@@ -113,6 +118,30 @@ auto without_gil(int threads, const Work& work) {
         signals.check();
         throw;
     }
+}
+
+// What the command refuses, in Python's words: options are arguments here.
+template <class Work>
+auto as_arguments(const Work& work) {
+    const auto renamed = [](const std::exception& error) {
+        return std::regex_replace(valid_utf8(error.what()), std::regex("--(?=[A-Za-z])"), "");
+    };
+    try {
+        return work();
+    } catch (const CaseError& error) {
+        throw CaseError(renamed(error));
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(renamed(error));
+    }
+}
+
+// f of numbers or arrays that broadcast. Long arrays hear Ctrl-C.
+template <class... Numbers>
+auto of_each(const std::function<double(Numbers...)>& f) {
+    return py::vectorize(std::function<double(Numbers...)>([f, calls = 0u](Numbers... numbers) mutable {
+        if (++calls % 65536 == 0 && PyErr_CheckSignals() != 0) throw py::error_already_set();
+        return f(numbers...);
+    }));
 }
 
 py::array_t<double> numpy(const std::vector<double>& values) {
@@ -169,7 +198,7 @@ py::tuple profile(const Results& r, std::size_t number, int points) {
     if (const auto* listed = std::get_if<ProfilePoints>(&shape))
         return py::make_tuple(numpy(listed->r), numpy(listed->z), listed->length);
     const Revolution& tube = std::get<Revolution>(shape);
-    if (points < 2) throw std::invalid_argument("a profile needs at least 2 points");
+    require_within("points", points, 2, 1000000);
     std::vector<double> radius, height;
     for (int i = 0; i < points; ++i) {
         height.push_back(tube.length * i / (points - 1));
@@ -178,7 +207,14 @@ py::tuple profile(const Results& r, std::size_t number, int points) {
     return py::make_tuple(numpy(radius), numpy(height), tube.length);
 }
 
-Results run(const Case& c, const py::object& progress, const py::object& output, bool overwrite, int threads) {
+// Raised by one thread, asked by the runs of others.
+struct Flag {
+    std::atomic<bool> raised = false;
+};
+
+Results run(const Case& c, const py::object& progress, const py::object& output, bool overwrite, int threads,
+            const std::shared_ptr<Flag>& enough) {
+    require_within("threads", threads, 0, 1000);
     MemoryRunOptions options;
     std::exception_ptr raised;  // by the caller's own function: it ends the run
     std::atomic<bool> unwanted = false;
@@ -193,7 +229,7 @@ Results run(const Case& c, const py::object& progress, const py::object& output,
                 unwanted = true;
             }
         };
-    options.interrupted = [&] { return unwanted.load(); };
+    options.interrupted = [&] { return unwanted || (enough && enough->raised); };
     std::vector<std::string> notes;
     options.note = [&](const std::string& words) { notes.push_back(words); };
     if (!output.is_none()) options.output = output.cast<std::filesystem::path>();
@@ -214,10 +250,10 @@ py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
     const std::vector<const char*> names{"f", "f_H", "f_K", "f_HH", "f_HK", "f_KK"};
     py::dict out;
     const auto part = [&](std::size_t i) {
-        return py::vectorize([&c, i](double h, double k) {
+        return of_each(std::function([&c, i](double h, double k) {
             const CurvatureJet<double> d = density(c.energy, h, k);
             return std::array{d.f, d.H, d.K, d.HH, d.HK, d.KK}[i];
-        });
+        }));
     };
     for (std::size_t i = 0; i < names.size(); ++i) out[names[i]] = part(i)(H, K);
     return out;
@@ -226,41 +262,33 @@ py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
 py::object growth_rates(const Case& c, const Numbers& q, int m, std::optional<double> tension) {
     const auto start = theory::tube_start(c);
     if (!start) throw std::invalid_argument("growth rates in closed form need a case with shape.kind = \"tube\"");
+    require_within("m", m, 0, most_modes);
+    if (tension) require_within("tension", *tension, -largest_number, largest_number);
     theory::UniformTube tube = start->tube;
     if (tension) tube.tension = *tension;
     const MotionLaw law = motion_law(c.model);
-    return py::vectorize([&](double wave) { return theory::growth(tube, law, wave, m).rate(); })(q);
+    return of_each(std::function([&](double wave) { return theory::growth(tube, law, wave, m).rate(); }))(q);
 }
 
 // ---- scans
 
-py::dict scan(const Case& c, const std::vector<std::string>& over, const std::optional<std::string>& boundary,
+py::dict scan(const Case& c, const std::vector<std::string>& over, const std::string& boundary,
               const std::filesystem::path& file, bool overwrite, std::optional<int> jobs, bool to_the_end) {
-    Scan asked;
-    asked.path = asked.case_path = c.path, asked.case_text = c.text, asked.sets = c.sets;
-    for (const std::string& axis : over) asked.axes.push_back(parse_axis(axis));
-    asked.to_the_end = to_the_end;
-    if (boundary) {
-        asked.boundary.emplace();
-        if (*boundary != "outcome") {
-            asked.boundary->around = outcome_from_name(*boundary);
-            if (!asked.boundary->around)
-                throw std::invalid_argument("boundary must be \"outcome\" or the name of an outcome, not " + *boundary);
-        }
-    }
-    check_scan(asked);
-    add_inputs(asked);
-    if (!overwrite) refuse_to_replace_another_scan(asked, file);
-    const int threads = jobs.value_or(static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
-    if (threads < 1) throw std::invalid_argument("jobs must be 1 or more");
-    const ScanResult done = without_gil(1, [&] {
+    ScanChoices choices;
+    choices.over = over, choices.boundary = boundary, choices.to_the_end = to_the_end;
+    const auto run = [&] {
+        const int threads = scan_threads(jobs);
+        check_output(file);
+        const Scan asked = scan_of(c, choices);
+        if (!overwrite) refuse_to_replace_another_scan(asked, file);
         ScanWriter writer = ScanWriter::create(file, asked, about_start());
         Dispatcher dispatcher(writer, true);
         run_scan(dispatcher, asked, threads);
         const Stop stop = dispatcher.was_interrupted() ? Stop::interrupted : Stop::finished;
         if (writer.began()) writer.finish({{"stop", std::string(name(stop))}});
         return writer.result();
-    });
+    };
+    const ScanResult done = as_arguments([&] { return without_gil(1, run); });
     py::dict out;
     py::list outcomes, messages;
     for (const PointResult& p : done.points) outcomes.append(std::string(name(p.outcome))), messages.append(p.message);
@@ -329,9 +357,16 @@ void add_results(py::module_& m) {
         .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
         .def("frame", &frame_dictionary)
         .def("mesh", &mesh_dictionary)
-        .def("profile", &profile);
+        .def("profile", &profile)
+        .def("image", [](const Results& r) {
+            const std::vector<std::byte> image = result_image(*r.result);
+            return py::bytes(reinterpret_cast<const char*>(image.data()), image.size());
+        });
+    py::class_<Flag, std::shared_ptr<Flag>>(m, "Flag").def(py::init<>()).def("raise_it", [](Flag& f) {
+        f.raised = true;
+    });
     m.def("run", &run, py::arg("case"), py::arg("progress"), py::arg("output"), py::arg("overwrite"),
-          py::arg("threads"));
+          py::arg("threads"), py::arg("enough") = nullptr);
     m.def("read_result",
           [](const std::filesystem::path& file) { return Results{std::make_shared<const Result>(read_result(file))}; });
 }
@@ -346,9 +381,9 @@ void add_closed_forms(py::module_& m) {
     m.def("profile_curvatures",
           [](const Numbers& r, const Numbers& r1, const Numbers& r2, const Numbers& z1, const Numbers& z2) {
               const auto part = [&](auto member) {
-                  return py::vectorize([member](double a, double b, double c, double d, double e) {
+                  return of_each(std::function([member](double a, double b, double c, double d, double e) {
                       return profile_point(a, b, c, d, e).*member;
-                  })(r, r1, r2, z1, z2);
+                  }))(r, r1, r2, z1, z2);
               };
               return py::make_tuple(part(&ProfilePoint<double>::H), part(&ProfilePoint<double>::K));
           });
@@ -367,29 +402,35 @@ void add_answers(py::module_& m) {
         .def_readwrite("model", &StabilityOptions::model)
         .def_readwrite("q", &StabilityOptions::q)
         .def_readwrite("fit", &StabilityOptions::fit)
-        .def_readwrite("Re", &StabilityOptions::Re)
-        .def_readwrite("gamma", &StabilityOptions::gamma)
-        .def_readwrite("tension", &StabilityOptions::tension)
-        .def_readwrite("waves", &StabilityOptions::waves)
-        .def_readwrite("frame", &StabilityOptions::frame)
-        .def_readwrite("modes", &StabilityOptions::modes)
-        .def_readwrite("rates", &StabilityOptions::rates)
+        .def_readwrite("Re", &StabilityOptions::Re, "a number")
+        .def_readwrite("gamma", &StabilityOptions::gamma, "a number")
+        .def_readwrite("tension", &StabilityOptions::tension, "a number")
+        .def_readwrite("waves", &StabilityOptions::waves, "an integer")
+        .def_readwrite("frame", &StabilityOptions::frame, "an integer")
+        .def_readwrite("modes", &StabilityOptions::modes, "an integer")
+        .def_readwrite("rates", &StabilityOptions::rates, "an integer")
         .def_readwrite("numerical", &StabilityOptions::numerical);
     m.def("stability", [](const Case& c, StabilityOptions options) {
         options.json = true, options.file = c.path;
-        return without_gil(0, [&] { return stability_answer(options, StabilitySubject{c, true, {}, {}}); });
+        return as_arguments([&] {
+            return without_gil(0, [&] { return stability_answer(options, StabilitySubject{c, true, {}, {}}); });
+        });
     });
     m.def("stability", [](const Results& r, const std::string& name, StabilityOptions options) {
         options.json = true, options.file = name;
-        return without_gil(0, [&] { return stability_answer(options, stability_subject(*r.result, options)); });
+        return as_arguments([&] {
+            return without_gil(0, [&] { return stability_answer(options, stability_subject(*r.result, options)); });
+        });
     });
     m.def("compare",
           [](const Results& a, const Results& b, bool align, bool shapes, const std::vector<std::string>& frames) {
               CompareOptions options;
               options.results = {"a", "b"}, options.frames = frames, options.align = align, options.no_shapes = !shapes;
-              return without_gil(0, [&] { return comparison_json(options, *a.result, *b.result); });
+              return as_arguments(
+                  [&] { return without_gil(0, [&] { return comparison_json(options, *a.result, *b.result); }); });
           });
     m.def("scan", &scan);
+    m.def("scan_threads", [](std::optional<int> jobs) { return as_arguments([&] { return scan_threads(jobs); }); });
     m.def("build_info", &build_info);
 }
 

@@ -392,27 +392,10 @@ void add_inputs(Scan& scan) {
     }
 }
 
-Scan read_scan(const ScanChoices& choices) {
-    Scan scan;
-    scan.path = choices.file;
-    const std::string text = read_input(choices.file, megabyte);
-    const toml::table root = parse_toml(text, choices.file);
-    ScanFile file;
-    if (root.contains("case")) {
-        file = read_scan_file(root, choices.file);
-        scan.text = text;
-        scan.case_path = file.case_path;
-        scan.case_text = read_input(file.case_path, megabyte);
-    } else if (root.contains("over") || root.contains("points")) {
-        throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
-    } else {
-        scan.case_path = choices.file;
-        scan.case_text = text;
-    }
-    scan.title = file.title;
-    scan.sets = file.sets;
-    scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
+namespace {
 
+// What varies, and the line that is looked for: of the file, where the choices have nothing else.
+Scan with_choices(Scan scan, const ScanFile& file, const ScanChoices& choices) {
     scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
@@ -434,6 +417,37 @@ Scan read_scan(const ScanChoices& choices) {
     check_scan(scan);
     add_inputs(scan);
     return scan;
+}
+
+}  // namespace
+
+Scan read_scan(const ScanChoices& choices) {
+    Scan scan;
+    scan.path = choices.file;
+    const std::string text = read_input(choices.file, megabyte);
+    const toml::table root = parse_toml(text, choices.file);
+    ScanFile file;
+    if (root.contains("case")) {
+        file = read_scan_file(root, choices.file);
+        scan.text = text;
+        scan.case_path = file.case_path;
+        scan.case_text = read_input(file.case_path, megabyte);
+    } else if (root.contains("over") || root.contains("points")) {
+        throw CaseError(choices.file + ": is a scan without a case: it needs case = \"FILE\"");
+    } else {
+        scan.case_path = choices.file;
+        scan.case_text = text;
+    }
+    scan.title = file.title;
+    scan.sets = file.sets;
+    scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
+    return with_choices(std::move(scan), file, choices);
+}
+
+Scan scan_of(const Case& c, const ScanChoices& choices) {
+    Scan scan;
+    scan.path = scan.case_path = c.path, scan.case_text = c.text, scan.sets = c.sets;
+    return with_choices(std::move(scan), {}, choices);
 }
 
 }  // namespace tubule

@@ -68,6 +68,9 @@ void check_scan(const Scan& scan);
 // Reads and checks it all, every value of every axis on its own included. Throws CaseError.
 Scan read_scan(const ScanChoices& choices);
 
+// The same of a case at hand: `choices.file` and `choices.sets` are not looked at.
+Scan scan_of(const Case& c, const ScanChoices& choices);
+
 // A value of an axis as a number, if it is one.
 std::optional<double> number_of(const std::string& value);
 

@@ -1,5 +1,6 @@
 #include "tools/scan/dispatcher.hpp"
 
+#include <fmt/format.h>
 #include <omp.h>
 
 #include <algorithm>
@@ -78,6 +79,12 @@ PointResult run_one(const Scan& scan, const Work& work) {
     }
     result.point = work.number;
     return result;
+}
+
+int scan_threads(std::optional<int> asked) {
+    const int processors = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    if (asked.value_or(1) < 1) throw CaseError(fmt::format("--jobs must be 1 or more, not {}", *asked));
+    return std::min(asked.value_or(processors), static_cast<int>(most_threads));
 }
 
 int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {

@@ -46,6 +46,9 @@ private:
     ScanProgress progress_;
 };
 
+// As many threads as asked for, by default one a processor. Throws CaseError if that is less than one.
+int scan_threads(std::optional<int> asked);
+
 // Runs the scan on `jobs` threads of this process, or fewer: at most one a point, as many as the system allows, and
 // 256. How many it had.
 int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs);

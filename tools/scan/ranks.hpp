@@ -25,10 +25,11 @@ public:
 // From a task to its result. Throws nothing on ranks other than 0.
 using Compute = std::function<Packet(const Packet& task)>;
 
-// The other processes of the mpirun that started this one. Only where MPI was built in and it was mpirun that did.
+// The other processes of the mpirun that started this one.
 class Ranks {
 public:
-    // Joins them; nothing if this process runs by itself.
+    // Joins them; nothing if this process runs by itself. Throws CaseError where MPI was not built in: each process
+    // would do all of the work.
     static std::optional<Ranks> join();
     Ranks(Ranks&& other) noexcept;
     ~Ranks();  // leaves them

@@ -12,6 +12,7 @@
 Keys of cases: docs/case_files.md. Series: docs/results.md. All numbers are dimensionless: docs/theory.md.
 """
 
+from . import compiled  # noqa: F401  first: it says what to do where the compiled part is missing
 from ._core import CaseError, SolveError, build_info as _build_info
 from .cases import Case
 from .commands import Scan, compare, curvatures, energy_density, equilibrium, run, run_many, scan, stability

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-from pathlib import Path
 from typing import Any, Mapping, Union
 
 from . import _core
@@ -14,6 +13,8 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 
 
 def _key(name: str) -> str:
+    if not isinstance(name, str):
+        raise TypeError(f"a key of a case must be a text, not {name!r}")
     return name if _BARE.match(name) else _text(name)
 
 
@@ -29,21 +30,30 @@ def _text(value: str) -> str:
     return out + '"'
 
 
-def toml_value(value: Any) -> str:
+MOST_LEVELS = 50  # of tables and lists within one another
+
+
+def toml_value(value: Any, levels: int = MOST_LEVELS) -> str:
     """A Python value as TOML: numbers (also NumPy's), texts, truth values, sequences and mappings.
 
-    Raises TypeError for anything else, and ValueError for numbers that are not finite.
+    Raises TypeError for anything else, and ValueError for numbers that are not finite and for more than `levels` of tables
+    and lists within one another.
     """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, os.PathLike):
-        return _text(os.fspath(value))
+        return _text(file_name(value))
+    if levels < 0:
+        raise ValueError(f"a case has at most {MOST_LEVELS} levels of tables and lists: does one contain itself?")
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in value.items() if v is not None) + "}"
+        return "{" + ", ".join(f"{_key(k)} = {toml_value(v, levels - 1)}" for k, v in value.items() if v is not None) + "}"
     if hasattr(value, "tolist"):  # NumPy's numbers and arrays
-        return toml_value(value.tolist())
+        plain = value.tolist()
+        if hasattr(plain, "tolist"):  # as of longdouble, which Python has not
+            raise TypeError(f"a case has no values of type {type(value).__name__}: give float(value)")
+        return toml_value(plain, levels)
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
@@ -51,13 +61,27 @@ def toml_value(value: Any) -> str:
             raise ValueError(f"a case has finite numbers only, not {value}")
         return repr(value)
     if isinstance(value, (list, tuple, range)):
-        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+        return "[" + ", ".join(toml_value(v, levels - 1) for v in value) + "]"
     raise TypeError(f"a case has no values of type {type(value).__name__}")
 
 
 def to_toml(case: Mapping[str, Any]) -> str:
     """A dictionary as a case file: one line for each key."""
     return "".join(f"{_key(k)} = {toml_value(v)}\n" for k, v in case.items() if v is not None)
+
+
+def file_name(path: str | os.PathLike) -> str:
+    """A path as text. Raises TypeError for what is no path, ValueError for what is no name of a file."""
+    name = os.fsdecode(path)
+    if not name or "\0" in name or name != name.encode(errors="replace").decode():
+        raise ValueError(f"{name!r} is no name of a file: it is empty, or has characters that are not Unicode")
+    return name
+
+
+def as_mapping(name: str, value) -> Mapping:
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{name} must be a dictionary, not of type {type(value).__name__}")
+    return value
 
 
 class Case:
@@ -76,13 +100,19 @@ class Case:
     """
 
     def __init__(self, source: Union[Mapping[str, Any], str, os.PathLike], set: Mapping[str, Any] | None = None):
-        sets = [f"{key}={toml_value(value)}" for key, value in (set or {}).items()]
+        sets = _sets(set or {})
         if isinstance(source, Mapping):
-            self._core = _core.parse_case(to_toml(source), sets, "case")
+            self._core = _core.parse_case(to_toml(source).encode(), sets, "case")
         elif isinstance(source, str) and "\n" in source:
-            self._core = _core.parse_case(source, sets, "case")
+            self._core = _core.parse_case(source.encode(), sets, "case")
         else:
-            self._core = _core.read_case(str(Path(source)), sets)
+            self._core = _core.read_case(file_name(source), sets)
+
+    @classmethod
+    def _parsed(cls, text: str, sets: list[str], path: str) -> "Case":
+        case = cls.__new__(cls)
+        case._core = _core.parse_case(text, sets, path)
+        return case
 
     @classmethod
     def _of(cls, core: _core.Case) -> "Case":
@@ -90,11 +120,13 @@ class Case:
         case._core = core
         return case
 
+    def __reduce__(self):
+        return Case._parsed, (self._core.text, self._core.sets, self._core.path)
+
     def with_(self, set: Mapping[str, Any] | None = None, **keys: Any) -> "Case":
         """The case with other values: `set` as for Case, or keywords with __ for the dots."""
-        more = dict(set or {}) | {key.replace("__", "."): value for key, value in keys.items()}
-        sets = self._core.sets + [f"{key}={toml_value(value)}" for key, value in more.items()]
-        return Case._of(_core.parse_case(self._core.text, sets, self._core.path))
+        more = dict(as_mapping("set", set or {})) | {key.replace("__", "."): value for key, value in keys.items()}
+        return Case._parsed(self._core.text, self._core.sets + _sets(more), self._core.path)
 
     @property
     def toml(self) -> str:
@@ -122,6 +154,10 @@ class Case:
 
     def __repr__(self) -> str:
         return f"<tubule.Case {self._core.title or self._core.path!r}>"
+
+
+def _sets(values: Mapping[str, Any]) -> list[bytes]:
+    return [f"{key}={toml_value(value)}".encode() for key, value in as_mapping("set", values).items()]
 
 
 def as_case(case) -> Case:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
+import reprlib
 import tempfile
-import threading
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from . import _core
-from .cases import Case, as_case, toml_value
+from .cases import Case, as_case, as_mapping, file_name, toml_value
 from .results import Result, read
 
 Progress = Callable[[float, float, float], None]
@@ -28,31 +29,64 @@ def run(case, *, output: str | os.PathLike | None = None, overwrite: bool = Fals
     output    a result file, written as the run goes on: a kill loses nothing. Without it all stays in memory
     overwrite replace the result of another case in that file, which is refused otherwise
     progress  called with (time, energy, step) at most ten times a second; what it raises ends the run
-    threads   for loops over elements of tier surface3d; 0: one a processor
+    threads   for loops over elements of tier surface3d, at most one a processor; 0: one a processor
 
     A run that cannot go on is no exception: see Result.stop. What is worth knowing, such as an accuracy that is wider than
     what the energy can change by, is a warning of Python. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad
-    input, RuntimeError where nothing could be computed.
+    input, ValueError or TypeError for other arguments that make no sense, RuntimeError where nothing could be computed.
 
     >>> result = run(tube)
     >>> result.stop, len(result.frames)
     ('finished', 4)
     """
-    return Result(_core.run(as_case(case)._core, progress, None if output is None else os.fspath(output), overwrite, threads))
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be a function, not {reprlib.repr(progress)}")
+    file = None if output is None else file_name(output)
+    return Result(_core.run(as_case(case)._core, progress, file, bool(overwrite), _integer("threads", threads), None))
+
+
+def _integer(name: str, value) -> int | None:
+    """As C++ has them. Raises TypeError for what is none, ValueError for one of more than 31 bits."""
+    if value is None:
+        return None
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, not {reprlib.repr(value)}") from None
+    if abs(number) >= 2**31:
+        raise ValueError(f"{name} = {reprlib.repr(number)}: is too large")
+    return number
+
+
+def _text(name: str, value) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a text, not {reprlib.repr(value)}")
+    return value
+
+
+def _list(name: str, values, text) -> str:
+    """As the command has it; empty where there is none."""
+    if values is None:
+        return ""
+    if not (texts := [text(value) for value in values]):
+        raise ValueError(f"{name} must not be empty")
+    return ",".join(texts)
 
 
 def run_many(cases: Iterable, *, jobs: int | None = None) -> list[Result]:
     """Runs cases side by side, one thread each, on all processors. Their results, in order.
 
-    The first exception of a run is raised when all that have begun are at their end.
+    The first exception of a run, or Ctrl-C, ends the others and is raised.
     """
-    prepared = [as_case(case) for case in cases]
-    jobs = jobs or os.cpu_count() or 1
-    with ThreadPoolExecutor(max_workers=jobs) as pool:
-        runs = [pool.submit(run, case, threads=1) for case in prepared]
+    prepared, enough = [as_case(case)._core for case in cases], _core.Flag()
+    with ThreadPoolExecutor(max_workers=_core.scan_threads(_integer("jobs", jobs))) as pool:
+        runs = [pool.submit(_core.run, case, None, None, False, 1, enough) for case in prepared]
         try:
-            return [each.result() for each in runs]
+            for each in wait(runs, return_when=FIRST_EXCEPTION).done:
+                each.result()
+            return [Result(each.result()) for each in runs]
         except BaseException:
+            enough.raise_it()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
@@ -81,10 +115,15 @@ def stability(subject, *, model: str = "", Re: float | None = None, gamma: float
     Raises ValueError for what cannot be asked.
     """
     o = _core.StabilityOptions()
-    o.model, o.Re, o.gamma, o.tension, o.modes, o.waves = model, Re, gamma, tension, modes, waves
-    o.rates, o.frame, o.numerical = rates, frame, numerical
-    o.q = "" if q is None else ",".join(repr(float(x)) for x in q)
-    o.fit = "" if fit is None else ",".join(str(i) for i in fit)
+    integers = {"modes": modes, "waves": waves, "rates": rates, "frame": frame}
+    given = {"model": _text("model", model), "Re": Re, "gamma": gamma, "tension": tension, "numerical": bool(numerical)}
+    for name, value in (given | {name: _integer(name, value) for name, value in integers.items()}).items():
+        try:
+            setattr(o, name, value)
+        except TypeError:
+            raise TypeError(f"{name} must be {getattr(type(o), name).__doc__}, not {reprlib.repr(value)}") from None
+    o.q = _list("q", q, lambda x: repr(float(x)))
+    o.fit = _list("fit", fit, lambda n: str(operator.index(n)))
     if isinstance(subject, Result):
         return json.loads(_core.stability(subject._core, subject._name, o))
     return json.loads(_core.stability(as_case(subject)._core, o))
@@ -98,7 +137,11 @@ def compare(a: Result, b: Result, *, align: bool = False, shapes: bool = True,
     shapes   compare the frames' surfaces, too
     frames   pairs of frames to compare whatever their times; then no series are compared
     """
-    return json.loads(_core.compare(a._core, b._core, align, shapes, [f"{i}:{j}" for i, j in frames]))
+    for result in (a, b):
+        if not isinstance(result, Result):
+            raise TypeError(f"a result is wanted, not {reprlib.repr(result)}: read() gives that of a file")
+    pairs = [f"{operator.index(i)}:{operator.index(j)}" for i, j in frames]
+    return json.loads(_core.compare(a._core, b._core, bool(align), bool(shapes), pairs))
 
 
 class Scan:
@@ -161,10 +204,10 @@ def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: 
     >>> scan(tube, {"energy.k42": [0, 0.06]})["energy"].shape
     (2,)
     """
-    axes = [_axis(key, values) for key, values in over.items()]
+    axes = [_axis(key, values) for key, values in as_mapping("over", over).items()]
     with tempfile.TemporaryDirectory() as folder:
-        file = os.fspath(output) if output is not None else str(Path(folder) / "scan.hdf")
-        return Scan(_core.scan(as_case(case)._core, axes, boundary, file, overwrite, jobs, to_the_end),
+        file = file_name(output) if output is not None else str(Path(folder) / "scan.hdf")
+        return Scan(_core.scan(as_case(case)._core, axes, "" if boundary is None else _text("boundary", boundary), file, bool(overwrite), _integer("jobs", jobs), bool(to_the_end)),
                     None if output is None else file)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from types import SimpleNamespace
 
 from . import _core
+from .cases import file_name
 from .commands import Scan
 from .results import Frame, Result, read
 
@@ -37,7 +39,7 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
     from .drawing import plot, scan, style
     from .drawing.results import BadInput
 
-    outputs = [os.fspath(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
+    outputs = [file_name(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
     try:
         style.check_outputs(outputs)
         with matplotlib.rc_context(style.SETTINGS), style.resolution(dpi):
@@ -45,17 +47,18 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
             if file is not None:
                 figure = scan.figure_of(file, quantity, list(slices))
             else:
+                if quantity or slices:
+                    raise BadInput("--quantity and --slices belong to scans, and this is none")
                 results = [each if isinstance(each, Result) else read(each) for each in _listed(what)]
-                if kind not in plot.NOTHING:
-                    raise BadInput(f"kind={kind!r}: must be one of {', '.join(plot.NOTHING)}")
                 choice = plot.Choice(list(series), x, None, None, logy) if series else None
-                options = SimpleNamespace(kind=kind, times=list(times), colour=list(colour), label=list(labels), plane=plane, scale=scale,
-                                          series=choice, terms=_term_labels(results))  # fmt: skip
+                options = SimpleNamespace(kind=kind, times=[float(time) for time in times], colour=list(colour), label=[str(l) for l in labels],
+                                          plane=(plane[0], float(plane[1])), scale=scale, series=choice, terms=_term_labels(results))  # fmt: skip
+                plot.require_valid(options)
                 figure = plot.figure_of([_plain(result) for result in results], options)
             style.save(figure, outputs)
             return figure
-    except BadInput as error:
-        raise ValueError(str(error)) from None
+    except (BadInput, ValueError) as error:
+        raise ValueError(re.sub("--(?=[a-z])", "", str(error))) from None
 
 
 def _listed(what) -> list:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
+import operator
 import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from . import _core
-from .cases import Case
+from .cases import Case, file_name
 
 
 class Series(Mapping):
@@ -19,6 +22,10 @@ class Series(Mapping):
         self._core = core
 
     def __getitem__(self, name: str) -> np.ndarray:
+        names = self._core.series_names
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 1) if isinstance(name, str) else []
+            raise KeyError(f"no series {name!r}" + (f"; did you mean {near[0]!r}?" if near else f": there are {', '.join(names)}"))
         return self._core.series(name)
 
     def __iter__(self) -> Iterator[str]:
@@ -83,7 +90,13 @@ class Frame:
         return points, inverse.reshape(cells.shape), seen[:, 0]
 
     def revolve(self, around: int = 96, points: int = 401) -> tuple[np.ndarray, np.ndarray]:
-        """The surface of revolution of a profile as flat triangles: points [n, 3], cells [m, 3]."""
+        """The surface of revolution of a profile as flat triangles: points [n, 3], cells [m, 3].
+
+        Raises ValueError for fewer than 3 points around the axis, and for more than ten million points in all.
+        """
+        around = operator.index(around)
+        if around < 3 or around * operator.index(points) > 10**7:
+            raise ValueError(f"a surface of revolution has 3 points or more around, and 10 million at most, not {around} x {points}")
         r, z = self.profile(points)
         angle = 2 * np.pi * np.arange(around) / around
         xyz = np.stack([r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), np.broadcast_to(z[:, None], (len(r), around))], axis=-1)
@@ -143,6 +156,7 @@ class Frames(Sequence):
     def __getitem__(self, number):
         if isinstance(number, slice):
             return [self[i] for i in range(*number.indices(len(self)))]
+        number = operator.index(number)
         if not -len(self) <= number < len(self):
             raise IndexError(f"there are {len(self)} frames")
         return Frame(self._core, number % len(self))
@@ -186,6 +200,9 @@ class Result:
     def case(self) -> Case:
         return Case._of(self._core.case(self._name))
 
+    def __reduce__(self):
+        return _from_image, (self._core.image(), self._name)
+
     def to_pandas(self):
         """The series as a pandas.DataFrame, one row a time. Needs the package pandas."""
         import pandas
@@ -197,6 +214,16 @@ class Result:
         return f"<tubule.Result {self.stop}, {rows} rows, {len(self.frames)} frames>"
 
 
+def _from_image(image: bytes, name: str) -> Result:
+    """A result that was pickled: the bytes of its file."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "result.hdf")
+        with open(file, "wb") as out:
+            out.write(image)
+        return Result(_core.read_result(file), name)
+
+
 def read(file: str | os.PathLike) -> Result:
     """A result file, also of a run that goes on or was killed. Raises RuntimeError if it is none."""
-    return Result(_core.read_result(os.fspath(file)), os.fspath(file))
+    name = file_name(file)
+    return Result(_core.read_result(name), name)

@@ -4,9 +4,12 @@ The package tubule around this folder is not imported, for it needs its compiled
 """
 
 import importlib.util
+import os
+import signal
 import sys
 from pathlib import Path
 
+EXIT_INTERRUPTED, EXIT_UNAVAILABLE = 130, 4
 FOLDER = Path(__file__).resolve().parent
 
 
@@ -17,7 +20,21 @@ def import_as(name):
     spec.loader.exec_module(sys.modules[name])
 
 
-def main():
+class EndedByInterrupts:
+    """Ctrl-C ends the process at once, without a word: for imports, where an exception may be swallowed. The program holds
+    the signal back until here."""
+
+    def __enter__(self):
+        self.before = signal.getsignal(signal.SIGINT)
+        if self.before is signal.default_int_handler:  # else who calls us ignores it, and so do we
+            signal.signal(signal.SIGINT, lambda *_: os._exit(EXIT_INTERRUPTED))
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+    def __exit__(self, *_):
+        signal.signal(signal.SIGINT, self.before)
+
+
+def module_to_run():
     sys.path.pop(0)  # this folder, whose modules are not to be found under their bare names
     import_as("tubule_drawing")
     script = sys.argv.pop(1)
@@ -25,7 +42,19 @@ def main():
         command_line = importlib.import_module("tubule_drawing.command_line")
         command_line.require_libraries("tubule stability --plot" if script == "stability" else f"tubule {script}")
         importlib.import_module("tubule_drawing.style").apply()
-    return importlib.import_module(f"tubule_drawing.{script}").main()
+    return importlib.import_module(f"tubule_drawing.{script}")
+
+
+def main():
+    with EndedByInterrupts():
+        module = module_to_run()
+    try:
+        return module.main()
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except MemoryError:
+        print("out of memory", file=sys.stderr)
+        return EXIT_UNAVAILABLE
 
 
 if __name__ == "__main__":

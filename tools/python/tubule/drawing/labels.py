@@ -7,6 +7,7 @@ SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
 SUPERSCRIPT = dict(zip("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b"))
 MINUS = "\u2212"
 NOT_SET = object()
+LONGEST_LABEL = 200  # characters: more than is to be read in a picture
 MAX_DIFFERENCES = 4  # cases with more differences are labelled by their names
 
 # Never a label: descriptions and expectations of a case, and times, which are visible.
@@ -20,9 +21,13 @@ NAMES = {
 }
 
 
+def shortened(words):
+    return words if len(words) <= LONGEST_LABEL else words[: LONGEST_LABEL - 3] + "..."
+
+
 def as_label(words):
     """A name given by a user or a file, as text of a picture: "$" is no mathematics, undecodable bytes become "?"."""
-    return words.encode(errors="replace").decode().replace("$", r"\$")
+    return shortened(words.encode(errors="replace").decode()).replace("$", r"\$")
 
 
 class BadCase(ValueError):
@@ -148,8 +153,8 @@ def _value(value):
     if isinstance(value, (int, float)):
         return number(value)
     if isinstance(value, list):
-        return "[" + ", ".join(_value(entry) for entry in value) + "]"
-    return str(value)
+        return shortened("[" + ", ".join(_value(entry) for entry in value) + "]")
+    return shortened(str(value))
 
 
 def number(value):

@@ -1,6 +1,7 @@
 """Draws results of tubule: shapes and cuts at the output times, energies over time. See `tubule plot --help`."""
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -20,6 +21,7 @@ from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, choose_columns
 
 COLOURS = ("u_n", "H", "K", "p")
+SCALES = ("run", "shape")
 NOTHING = {
     "profiles": "no profiles",
     "surface": "no surfaces",
@@ -39,7 +41,7 @@ def arguments():
     parser.add_argument("--plane", default="z=0", help="plane of the cuts")
     parser.add_argument("--kind", choices=NOTHING, default="all")
     parser.add_argument("--label", action="append", default=[], help="of each result, instead of what its case differs by")
-    parser.add_argument("--scale", choices=("run", "shape"), default="run",
+    parser.add_argument("--scale", choices=SCALES, default="run",
                         help="velocities relative to the largest of")  # fmt: skip
     parser.add_argument("--series", default="", help="series to draw, and nothing else")
     parser.add_argument("--x", default="time", help="the series they are drawn against")
@@ -112,6 +114,8 @@ class Page:
 
 def figure_of(results, options):
     """Decides what can be drawn of the results and lays the panels out from top to bottom."""
+    if not results:
+        raise BadInput("no result to draw")
     names = [as_label(os.path.splitext(os.path.basename(result.path))[0]) for result in results]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
     if options.label:
@@ -145,6 +149,16 @@ def figure_of(results, options):
     return figure
 
 
+def require_valid(options):
+    """Raises ValueError for what no picture can show, on the command line and in draw()."""
+    for option, value, allowed in (("kind", options.kind, NOTHING), ("scale", options.scale, SCALES), ("plane", options.plane[0], "xyz"),
+                                   *(("colour", name, COLOURS) for name in options.colour)):  # fmt: skip
+        if not isinstance(value, str) or value not in [*allowed]:
+            raise ValueError(f"--{option}: {value!r} is not one of {', '.join(allowed)}")
+    if not all(map(math.isfinite, [options.plane[1], *options.times])):
+        raise ValueError("--times and --plane: a number must be finite")
+
+
 def read_arguments(options):
     """Converts the texts to values; raises ValueError with the reason."""
     try:
@@ -152,14 +166,12 @@ def read_arguments(options):
     except ValueError:
         raise ValueError(f"--times: '{options.times}' is not a list of numbers t1,t2,...") from None
     options.colour = [name for name in options.colour.split(",") if name]
-    for name in options.colour:
-        if name not in COLOURS:
-            raise ValueError(f"--colour: '{name}' is not one of {', '.join(COLOURS)}")
     plane = re.fullmatch(r"([xyz])=([-+.\deE]+)", options.plane)
     try:
         options.plane = plane[1], float(plane[2])
     except (TypeError, ValueError):
         raise ValueError(f"--plane: '{options.plane}' is not x, y or z = number, such as z=0") from None
+    require_valid(options)
     names = [name for name in options.series.split(",") if name]
     if not names and (options.low is not None or options.high is not None or options.logy or options.x != "time"):
         raise ValueError("--x, --from, --to and --logy belong to --series")
@@ -215,8 +227,6 @@ def main():
         except command_line.Unavailable as error:
             command_line.say(error)
             return command_line.EXIT_UNAVAILABLE
-        except KeyboardInterrupt:
-            return 130
         command_line.say(options.movie, sys.stdout)
         return 0
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import h5py
@@ -132,8 +133,13 @@ class Result:
         return list(dict.fromkeys([*(name for name in known if f"energy_{name}" in self.series), *others]))
 
 
-def read_result(path):
-    """Raises BadInput naming the file if it is not a result or a record is damaged."""
+BEST_COMPRESSION = 1032  # of deflate
+
+
+@contextmanager
+def opened(path):
+    """The HDF5 file. BadInput names it for all that is wrong with it, and for links to other files: what lies there may be
+    anything, and anybody's."""
     if not os.path.exists(path):
         raise BadInput(f"{path}: no such file")
     if not os.path.isfile(path):
@@ -143,18 +149,46 @@ def read_result(path):
     except OSError as error:
         raise BadInput(f"{path}: cannot be read as HDF5") from error
     with file:
-        if "case" not in file:
-            raise BadInput(f"{path}: is not a result of tubule (it has no /case)")
+        elsewhere = file.id.links.visit(lambda name, link: name if link.type >= h5py.h5l.TYPE_EXTERNAL else None, info=True)
+        if elsewhere:
+            raise BadInput(f"{path}: /{elsewhere.decode(errors='replace')} is a link to another file: not followed")
         try:
-            case = effective_case(file["case"].asstr()[()], _strings(file["case"].attrs.get("set")))
-            about = {key: _plain(value) for key, value in file["about"].attrs.items()} if "about" in file else {}
-            series = file.get("series", {})
-            meanings = {name: str(_plain(data.attrs.get("meaning", name))) for name, data in series.items()}
-            return Result(path, case, about, series_in_time(series), *_frames(path, file), meanings)
+            yield file
         except BadCase as error:
             raise BadInput(f"{path}: {error}") from error
-        except (OSError, KeyError, TypeError, ValueError, AttributeError) as error:
+        except (OSError, KeyError, TypeError, ValueError, AttributeError, MemoryError) as error:
             raise BadInput(f"{path}: damaged or not a result of tubule ({error})") from error
+
+
+def values(data):
+    """Of a dataset. Raises ValueError where they are not in the file, or not all of them."""
+    how = data.id.get_create_plist()
+    if how.get_external_count() or how.get_layout() == h5py.h5d.VIRTUAL:
+        raise ValueError(f"the values of {data.name} are in another file: not read")
+    if data.nbytes > data.id.get_storage_size() * (BEST_COMPRESSION if how.get_nfilters() else 1):
+        raise ValueError(f"{data.name} has {data.size} values, and not all are in the file")
+    return data[()]
+
+
+def finite_values(data):
+    """As values(), of a result, whose numbers are never NaN or infinite."""
+    array = np.asarray(values(data))
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise ValueError(f"{data.name} contains numbers that are not finite")
+    return array
+
+
+def read_result(path):
+    """Raises BadInput naming the file if it is not a result or a record is damaged."""
+    with opened(path) as file:
+        if "case" not in file:
+            raise BadInput(f"{path}: is not a result of tubule (it has no /case)")
+        case = effective_case(_plain(values(file["case"])), _strings(file["case"].attrs.get("set")))
+        about = {key: _plain(value) for key, value in file["about"].attrs.items()} if "about" in file else {}
+        group = file.get("series", {})
+        series = {name: finite_values(data) for name, data in group.items()}
+        meanings = {name: str(_plain(data.attrs.get("meaning", name))) for name, data in group.items()}
+        return Result(path, case, about, series_in_time(series), *_frames(path, file), meanings)
 
 
 def _plain(value):
@@ -190,6 +224,8 @@ def _frames(path, file):
     for name, record in sorted(file.get("frames", {}).items()):
         if "time" not in record.attrs:
             raise BadInput(f"{path}: frame {name} lacks its time")
+        if not np.isfinite(record.attrs["time"]):
+            raise BadInput(f"{path}: frame {name}: its time is not finite")
         if "mesh" in record.attrs:
             surfaces.append(_surface(path, name, record, file[f"meshes/{record.attrs['mesh']:06d}"]))
         else:
@@ -205,10 +241,7 @@ def _arrays(path, name, group, keys):
     missing = [key for key in keys if key not in group]
     if missing:
         raise BadInput(f"{path}: frame {name} lacks {', '.join(missing)}")
-    arrays = [np.asarray(group[key], float) for key in keys]
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise BadInput(f"{path}: frame {name} contains numbers that are not finite")
-    return arrays
+    return [np.asarray(finite_values(group[key]), float) for key in keys]
 
 
 def _profile(path, name, record):
@@ -222,7 +255,7 @@ def _profile(path, name, record):
 
 def _surface(path, name, record, mesh):
     order = int(mesh.attrs["order"])
-    cells = np.asarray(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
+    cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     (points,) = _arrays(path, name, record, ("Points",))
     data = record["PointData"]
     keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p") if key in data)]

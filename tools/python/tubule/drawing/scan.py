@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from . import style
 from .labels import as_label, formula
-from .results import BadInput
+from .results import BadInput, opened, values
 
 HEIGHT = 4.2  # inches
 # By name of the outcome: light for shapes at rest, dark for early stops.
@@ -78,10 +78,10 @@ class Axis:
     def __init__(self, group):
         self.key = ", ".join(group.attrs["keys"])
         self.logarithmic = bool(group.attrs["logarithmic"])
-        values = group["values"][()]
-        self.texts = [", ".join(text.decode() for text in row) for row in group["texts"][()]]
-        self.is_numeric = values.shape[1] == 1 and np.isfinite(values).all() and (np.diff(values[:, 0]) > 0).all()
-        self.values = values[:, 0] if self.is_numeric else np.arange(len(values), dtype=float)
+        numbers = values(group["values"])
+        self.texts = [", ".join(text.decode() for text in row) for row in values(group["texts"])]
+        self.is_numeric = numbers.shape[1] == 1 and np.isfinite(numbers).all() and (np.diff(numbers[:, 0]) > 0).all()
+        self.values = numbers[:, 0] if self.is_numeric else np.arange(len(numbers), dtype=float)
 
     @property
     def label(self):
@@ -123,19 +123,19 @@ def is_scan(path):
 
 
 def read(path):
-    with h5py.File(path) as file:
+    with opened(path) as file:
         axes = [Axis(file["axes"][name]) for name in sorted(file["axes"], key=int)]
-        points = {name: data[()] for name, data in file["points"].items()}
+        points = {name: values(data) for name, data in file["points"].items()}
         names = list(file["points/outcome"].attrs["names"])
         title = file["scan"].attrs["title"]
         starts = file["scan"].attrs.get("start_axis")
-        boundary = file["boundary"][()]
-        crossings = file["crossing"][()].mean(axis=1) if "crossing" in file else []
+        boundary = values(file["boundary"])
+        crossings = values(file["crossing"]).mean(axis=1) if "crossing" in file else []
         thresholds = [
-            (line.attrs["label"], line["first"][()], line["second"][()], line["values"][()])
+            (line.attrs["label"], values(line["first"]), values(line["second"]), values(line["values"]))
             for line in file["thresholds"].values()
         ]
-        equal = {name: data[()] for name, data in file["equal_energies"].items()} if starts is not None else None
+        equal = {name: values(data) for name, data in file["equal_energies"].items()} if starts is not None else None
     return axes, points, names, title, boundary, crossings, thresholds, starts, equal
 
 

@@ -4,16 +4,16 @@ import argparse
 import base64
 import json
 import os
+import re
 import sys
 
-import h5py
 import matplotlib
 import numpy as np
 
 from . import command_line, scan, style
 from .labels import as_label, flatten
 from .raster import lattice
-from .results import BadInput, read_result
+from .results import BadInput, finite_values, opened, read_result, values
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 THREE = "/usr/share/javascript/three/three.min.js"
@@ -64,20 +64,20 @@ class Shape:
         self.parameter = float(record.attrs["parameter"]) if "parameter" in record.attrs else None
         self.mesh = int(record.attrs["mesh"]) if "mesh" in record.attrs else None
         if self.mesh is None:
-            self.points = np.column_stack([record["r"][()], record["z"][()]])
+            self.points = np.column_stack([finite_values(record["r"]), finite_values(record["z"])])
             data, self.period = record, float(record.attrs.get("length", 0))
         else:
-            self.points, data = record["Points"][()], record["PointData"]
+            self.points, data = finite_values(record["Points"]), record["PointData"]
             self.period = float(meshes[f"{self.mesh:06d}"].attrs["period"])
             order = int(meshes[f"{self.mesh:06d}"].attrs["order"])
-            self.cells = np.asarray(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
+            self.cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
             self.order = order
-        self.fields = {name: data[name][()] for name in WORDS if name in data}
-        self.u = data["u"][()] if "u" in data else None
+        self.fields = {name: finite_values(data[name]) for name in WORDS if name in data}
+        self.u = finite_values(data["u"]) if "u" in data else None
 
 
 def read_shapes(path):
-    with h5py.File(path) as file:
+    with opened(path) as file:
         meshes = file.get("meshes", {})
         return [Shape(record, meshes) for _, record in sorted(file.get("frames", {}).items())]
 
@@ -160,11 +160,11 @@ def scan_page(path):
     axes, points, names, title, *_ = scan.read(path)
     if len(axes) > 2:
         raise BadInput(f"{path}: a scan of {len(axes)} axes has no map; view one of two axes")
-    with h5py.File(path) as file:
+    with opened(path) as file:
         case = os.path.basename(str(file["scan"].attrs["path"]))
         sets = [str(text) for text in file["case"].attrs.get("set", [])] if "case" in file else []
         stops = list(file["points/stop"].attrs["names"])
-    values = {name: data for name, data in points.items() if data.ndim == len(axes) and data.dtype.kind in "fiu"}
+    numbers = {name: data for name, data in points.items() if data.ndim == len(axes) and data.dtype.kind in "fiu"}
     return {
         "kind": "scan",
         "title": as_label(title).replace(r"\$", "$") or os.path.basename(path),
@@ -174,7 +174,7 @@ def scan_page(path):
         "names": {"outcome": names, "stop": stops},
         "outcome_colours": [scan.COLOURS.get(name, "#ffffff") for name in names],
         "colours": colour_table("viridis"),
-        "points": {name: finite(data.astype(float).ravel()) for name, data in values.items()},
+        "points": {name: finite(data.astype(float).ravel()) for name, data in numbers.items()},
     }
 
 
@@ -189,12 +189,14 @@ def page_of(data):
     except OSError:
         command_line.say(f"tubule view needs {THREE}; install the package libjs-three")
         sys.exit(command_line.EXIT_UNAVAILABLE)
-    script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
-    page = text("view.html")
-    for place, content in (("TITLE", data["title"].replace("&", "&amp;").replace("<", "&lt;")), ("LICENCE", LICENCE if three else ""),
-                           ("THREE", three), ("SCRIPT", text("view.js")), ("DATA", script)):
-        page = page.replace(f"@{place}@", content, 1)
-    return page
+    try:  # without "<", no words of the data end their element or change how the rest of the page is read
+        script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    except ValueError:
+        raise BadInput(f"{data['file']}: contains numbers that are not finite") from None
+    parts = {"TITLE": data["title"].replace("&", "&amp;").replace("<", "&lt;"), "LICENCE": LICENCE if three else "",
+             "THREE": three, "SCRIPT": text("view.js"), "DATA": script}  # fmt: skip
+    # In one pass: what is put in may have such places itself.
+    return re.sub(f"@({'|'.join(parts)})@", lambda place: parts[place[1]], text("view.html"))
 
 
 def write(path, output):

@@ -1,0 +1,14 @@
+// A result as the bytes of its file.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "common/result/result.hpp"
+
+namespace tubule {
+
+// Of a file from which read_result() gives this result.
+std::vector<std::byte> result_image(const Result& result);
+
+}  // namespace tubule
