@@ -19,6 +19,7 @@ namespace tubule {
 namespace {
 
 constexpr double most_in_range = 1e5;
+constexpr double shortest_ramp = 1e-6;  // of its time: where steps are shorter, the work of a load is inexact
 
 std::string shown(const toml::node& node) {
     if (const auto* value = node.as_string()) return "the string " + toml_string(value->get());
@@ -259,6 +260,12 @@ void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& tar
     read(table, path_of(key), where(table), complaints_, [&](Reader& k) {
         k.increasing("time", times, {.from = 0}, required);
         k.numbers("value", values, required);
+        k.check("time", [&] {
+            const auto jumps = [](double from, double to) { return to - from < shortest_ramp * to; };
+            return std::adjacent_find(times.begin(), times.end(), jumps) == times.end()
+                       ? ""
+                       : "must increase by a millionth at least: a jump needs a duration that steps resolve";
+        });
         k.check("value", [&] {
             return times.empty()                   ? "needs at least one time"
                    : times.size() != values.size() ? "must be as many numbers as there are times"

@@ -9,6 +9,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
+#include "common/solve/sparse.hpp"
 #include "surface3d/curvature/polynomial_graph.hpp"
 #include "surface3d/fem/surface_space.hpp"
 
@@ -16,6 +17,7 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr int samples = 240, meridians = 8;
+constexpr double most_rows = 1e5;
 constexpr double growth = 1.0 / 3;
 
 // A point of the profile's surface and its tangents in t and in the angle.
@@ -154,6 +156,7 @@ std::vector<Ring> rings_for(const Resolution& r, const Profile& profile, const s
     std::vector<double> rows(samples + 1, 0);  // number of rows up to a sample
     for (int i = 1; i <= samples; ++i)
         rows[i] = rows[i - 1] + (r.speed[i] / size[i] + r.speed[i - 1] / size[i - 1]) / (std::sqrt(3.0) * samples);
+    if (!(rows[samples] < most_rows)) throw SolveError("the surface is not finite, or no mesh of it can be");
     const auto parameter_of = [&](double row) {
         const int i =
             std::clamp(static_cast<int>(std::upper_bound(rows.begin(), rows.end(), row) - rows.begin()), 1, samples);

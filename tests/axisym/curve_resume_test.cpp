@@ -38,7 +38,7 @@ TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
         Watch undisturbed;
         const RunSummary whole = run(c, undisturbed);
         ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
-        ASSERT_EQ(whole.attempts, 3);
+        ASSERT_GE(whole.attempts, 2);
         Watch watch;
         std::optional<Restart> restart;
         int coarser = 0, later_pairs = 0;

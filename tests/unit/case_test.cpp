@@ -437,6 +437,9 @@ TEST(CaseRefusal, RampsThatAreNone) {
         tension("{time = [-1, 1], value = [0, 1]}", "9:20: model.tension.time.0 must be a number >= 0, not -1"),
         tension("{time = [0, 1], value = [0, 1, 2]}",
                 "9:35: model.tension.value must be as many numbers as there are times"),
+        tension("{time = [0.1, 0.10000000001], value = [0, 1]}",
+                "9:19: model.tension.time must increase by a millionth at least: a jump needs a duration that steps "
+                "resolve"),
         tension("{time = [], value = []}", "9:31: model.tension.value needs at least one time"),
         tension("{time = [0, 1], value = [0, \"a\"]}",
                 "9:39: model.tension.value.1 must be a finite number, not the string \"a\""),

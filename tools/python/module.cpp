@@ -102,7 +102,6 @@ auto without_gil(int threads, const Work& work) {
             ~Reset() { omp_set_num_threads(threads); }
         } reset{before};
         multiply_on_one_thread();
-        const PauseWatch watch(std::nullopt, interrupted);
         try {
             return work();
         } catch (const Paused& pause) {
