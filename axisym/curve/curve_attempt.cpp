@@ -279,7 +279,7 @@ void CurveAttempt::go() {
         !doubt.empty())
         summary.warnings.push_back(doubt);
     summary.counters = counters();
-    out_.end(*stop, flow_->time(), [this] { return record(); });
+    out_.end(*stop, stop_ ? 0 : flow_->time(), [this] { return record(); });
     describe_effort(summary);
 }
 
