@@ -71,7 +71,8 @@ public:
     bool refine(const tubule::RunSummary& last) override {
         const bool good = last.as_accurate_as_asked && !failed(last.stop);
         if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
-        if (failed(last.stop) && ++failures_ > most_failures) return false;
+        const bool cheap = last.stop.time == 0;  // a failure at the beginning, where finer meshes may do
+        if (failed(last.stop) && !cheap && ++failures_ > most_failures) return false;
         const double excess = last.error_is_known() ? last.estimated_error / case_.accuracy.energy : 1;
         if (may_be_graded() && !failed(last.stop)) {
             const double excess_of_mesh =

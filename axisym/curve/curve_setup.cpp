@@ -193,9 +193,10 @@ CurveBegin given_state(const CurveSetup& setup) {
 }
 
 CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings s) {
-    constexpr double most_lost = 1e-3;  // of the energy, where less accuracy is asked for
+    constexpr double most_lost =
+        0.1;  // of the energy; what is lost beyond the accuracy asked for, a pair of runs tells
     if (settings_given(c) || !start.meridian.seams.empty()) return s;
-    const double allowed = std::min(c.accuracy.energy, most_lost) * start.bending.magnitude;
+    const double allowed = most_lost * start.bending.magnitude;
     const ArcLength arc(start.meridian);
     while (can_be_finer(s)) {
         const auto space = space_of(c, start.meridian, first_breaks(arc, s, c, least_seam));

@@ -62,8 +62,7 @@ CurveBegin begin_state(const CurveSetup& setup);
 // The initial shape alone, with no velocity: what can be shown where begin_state() throws.
 CurveBegin given_state(const CurveSetup& setup);
 
-// These settings, with as many more elements as a spline needs that has the energy of the initial shape to the accuracy
-// asked for.
+// These settings, with as many more elements as a spline needs that has nearly the energy of the initial shape.
 CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings settings);
 
 }  // namespace tubule::axisym

@@ -53,6 +53,16 @@ StartFrame from_bytes(const std::string& bytes) {
     return out;
 }
 
+// Whether there is a file where the shape comes from, readable or not.
+bool has_file(const Case& c) {
+    return std::visit(
+        [&](const auto& shape) {
+            if constexpr (requires { shape.path; }) return std::filesystem::exists(beside(c, shape.path));
+            return false;
+        },
+        c.shape);
+}
+
 }  // namespace
 
 StartFrame start_frame(const Case& c) {
@@ -98,7 +108,7 @@ std::string changed_input(const Case& c, const CaseInputs& of_result) {
     const auto old = std::ranges::find(of_result, name, [](const auto& input) { return input->name; });
     if (name.empty() || old == of_result.end()) return {};
     const auto now = current_input(c);
-    if (!now || same_input(*now, **old)) return {};
+    if (now ? same_input(*now, **old) : !has_file(c)) return {};
     return fmt::format("{} has changed since", name);
 }
 
