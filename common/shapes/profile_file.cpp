@@ -255,7 +255,7 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
         if (!pole && !(points[i].r > 0))
             refuse(path, points[i].at, fmt::format("r = {:.6g}: the profile meets the axis", points[i].r));
         if (i > 0 && points[i].r == points[i - 1].r && points[i].z == points[i - 1].z)
-            refuse(path, points[i].at, "the same point as before");
+            refuse(path, points[i].at, "the same point as before; remove one of the two");
     }
     refuse_crossing(path, points, file.length.value_or(0), tolerance);
     double volume = 0;  // below 0 where the profile runs downwards on the outside

@@ -131,7 +131,7 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     EXPECT_EQ(refusal("a,b\n" + half + rest), "p.csv:1:1: a heading must name the columns r and z");
     EXPECT_EQ(refusal(half), "p.csv:3:1: 3 points are too few: a profile needs 9");
     EXPECT_EQ(refusal(half + "-.1,0\n" + rest), "p.csv:4:1: r = -0.1: the profile meets the axis");
-    EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before");
+    EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before; remove one of the two");
     EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6:1: the profile crosses itself"), std::string::npos);
     EXPECT_NE(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n").find("p.csv:9:1: the profile is not closed"),
               std::string::npos);
