@@ -241,8 +241,8 @@ CurveBegin begin_state(const CurveSetup& setup) {
     std::optional<CurveMotion::Start> consistent;
     // Short, since a start that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
-    double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0),
-                        0.1 * OutputTimes(setup.c).next());
+    const double first_output = OutputTimes(setup.c).next();
+    double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
     const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
                         most_risen * setup.reference_energy;
     for (int tries = 0; !consistent; ++tries) try {
@@ -252,7 +252,7 @@ CurveBegin begin_state(const CurveSetup& setup) {
                 throw SolveError("the first step leads to no admissible shape of lower energy");
             consistent = found;
         } catch (const SolveError&) {
-            if (tries == 4) throw;
+            if (tries == 4 || 20 * h > first_output) throw;
             h *= 10;
         }
     CurveBegin out{consistent->y, consistent->rate, consistent->y, consistent->time, h};

@@ -9,16 +9,38 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
+#include <vector>
 
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 
 namespace tubule {
+namespace {
+
+// Why a file may be missing; else empty.
+std::string hint(const std::filesystem::path& path) {
+    const std::string name = path.filename().string();
+    if (path.string().find("~/") == 0 || path.string().find("/~/") != std::string::npos)
+        return "; ~ does not stand for the home directory here: write the whole path";
+    if (name.starts_with("\u2013") || name.starts_with("\u2014"))
+        return "; an option begins with the hyphen of the keyboard, -";
+    std::vector<std::string> others;
+    std::error_code error;
+    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+        if (entry.path().extension() == path.extension() && others.size() < 1000)
+            others.push_back(entry.path().filename().string());
+    const auto near = near_miss(name, others);
+    return near ? fmt::format("; did you mean {}?", *near) : "";
+}
+
+}  // namespace
 
 std::string read_input(const std::filesystem::path& path, std::size_t most) {
     const auto refuse = [&](const std::string& why) { throw CaseError(fmt::format("{}: {}", path.string(), why)); };
     // Without O_NONBLOCK, opening a pipe would wait for somebody who writes into it.
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0) refuse(fmt::format("cannot be opened: {}", std::strerror(errno)));
+    if (fd < 0) refuse(fmt::format("cannot be opened: {}{}", std::strerror(errno), errno == ENOENT ? hint(path) : ""));
     const std::unique_ptr<const int, void (*)(const int*)> closer(&fd, [](const int* open) { ::close(*open); });
     struct stat info {};
     if (::fstat(fd, &info) != 0) refuse(fmt::format("cannot be read: {}", std::strerror(errno)));

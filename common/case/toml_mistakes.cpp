@@ -23,6 +23,7 @@ struct Rule {
 #define KEY R"(^\s*([A-Za-z0-9_.\-]+)\s*)"
 #define NUMBER R"([+\-]?\d[\d.]*(?:[eE][+\-]?\d+)?)"
 constexpr Rule rules[]{
+    {R"(^\s*(```).*$)", 1, "leave out the lines ``` around a case that was copied"},
     {R"((?:^|\s)(//|/\*|%|--|\*\*\*).*$)", 1, "a comment begins with #"},
     {R"(^\s*([!;*]).*$)", 1, "a comment begins with #"},
     {R"(^\s*([{}]))", 1, "a case is written in TOML, not in JSON: a line [energy], then a line k20 = 0.5"},

@@ -174,8 +174,9 @@ void check_connected(const ImportedMesh& in, const std::vector<std::array<std::s
         ++count;
     }
     if (count > 1) {
-        refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}", count,
-                               triangle_name(in, second), triangle_name(in, 0)));
+        refuse(in, fmt::format("the mesh consists of {} separate surfaces: {} is not connected to {}; keep one of them "
+                               "in a file",
+                               count, triangle_name(in, second), triangle_name(in, 0)));
     }
 }
 

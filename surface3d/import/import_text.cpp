@@ -67,7 +67,13 @@ Word TextReader::next_word(const std::string& what) {
 
 double TextReader::number(const Word& word) const {
     double value = 0;
-    if (!parse(word.text, value)) fail(word, fmt::format("'{}' is not a number", shown(word.text)));
+    if (!parse(word.text, value)) {
+        std::string dotted(word.text);
+        std::ranges::replace(dotted, ',', '.');
+        const bool comma = dotted != word.text && parse(dotted, value);
+        fail(word, fmt::format("'{}' is not a number{}", shown(word.text),
+                               comma ? fmt::format("; decimals have a point: {}", shown(dotted)) : ""));
+    }
     if (!std::isfinite(value)) fail(word, fmt::format("'{}' is not a finite number", shown(word.text)));
     return value;
 }

@@ -152,7 +152,7 @@ TEST(CloseMesh, RefusesDuplicateFaces) {
 TEST(CloseMesh, RefusesSeveralComponents) {
     EXPECT_EQ(refusal_of_obj(corners + faces + second_corners + second_faces),
               "a.obj: the mesh consists of 2 separate surfaces: triangle 5 (line 13) is not connected to triangle 1 "
-              "(line 5)");
+              "(line 5); keep one of them in a file");
 }
 
 TEST(CloseMesh, RefusesBrokenMeshesInMemory) {

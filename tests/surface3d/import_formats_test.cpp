@@ -120,6 +120,7 @@ TEST(Obj, Refusals) {
     expect_refusals(
         "a.obj",
         {{"v 0 0 zero\n", ":1:7: 'zero' is not a number"},
+         {"v 0 0 0,5\n", ":1:7: '0,5' is not a number; decimals have a point: 0.5"},
          {"v 0 0 0\r\nv 0 nan 0\r\n", ":2:5: 'nan' is not a finite number"},
          {"v 1 2\n", ":1:1: a point needs three coordinates"},
          {three + "f 1 2\n", ":4:1: a face needs three vertices"},

@@ -58,8 +58,17 @@ std::string meant_by(const std::string& word, const CLI::App& command) {
     else
         for (const CLI::App* one : command.get_subcommands({})) names.push_back(one->get_name());
     if (const auto near = near_miss(word, names)) return fmt::format("; did you mean '{}'?", *near);
+    if (word.starts_with("\u2013") || word.starts_with("\u2014"))
+        return "; an option begins with the hyphen of the keyboard, -";
+    if (word.starts_with("-") && !command.get_subcommands({}).empty())
+        return "; options follow the name of a command, such as tubule run CASE -o FILE";
+    if (word.starts_with("-"))
+        return fmt::format(
+            "; options are {}{}", fmt::join(names, " "),
+            command.get_option_no_throw("--set") ? "; keys of a case are changed by --set key=value" : "");
     if (!names.empty() && word.ends_with(".toml")) return fmt::format("; to run a case: tubule run {}", word);
     if (!names.empty() && word.ends_with(".hdf")) return fmt::format("; to look at a result: tubule show {}", word);
+    if (!names.empty()) return fmt::format("; the commands are {}", fmt::join(names, " "));
     return "";
 }
 

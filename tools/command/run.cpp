@@ -49,7 +49,16 @@ void check_output(const std::filesystem::path& file) {
     if (file.extension() == ".journal")
         throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
                                     std::filesystem::path(file).replace_extension().string()));
+    for (const char* other : {".toml", ".csv", ".json", ".txt", ".png", ".svg", ".pdf", ".gif", ".html"})
+        if (file.extension() == other)
+            throw CaseError(
+                fmt::format("{}: a result is an HDF5 file: give it a name such as {}; tubule show makes tables "
+                            "of it, tubule plot pictures",
+                            file.string(), std::filesystem::path(file).replace_extension(".hdf").filename().string()));
     std::error_code error;
+    if (std::filesystem::is_directory(file, error))
+        throw CaseError(fmt::format("{}: is a folder: name a file in it, such as {}", file.string(),
+                                    (file / "result.hdf").string()));
     const std::filesystem::path folder = file.parent_path();
     if (!folder.empty() && std::filesystem::status(folder, error).type() == std::filesystem::file_type::not_found)
         throw CaseError(
@@ -439,6 +448,8 @@ Job job_of(const std::string& path, const RunOptions& options) {
     if (is_hdf5(path)) return job_of_result(path, sets, options);
     const auto file = result_path(options, path);
     const Case c = read_case(path, sets, options.resume ? inputs_to_resume(file) : CaseInputs{});
+    if (options.expect && c.expect.values.empty() && !c.expect.stop)
+        throw CaseError(fmt::format("{}: has no table [expect], with which --expect would compare", path));
     try {
         ChosenCase chosen = with_model_of_run(c, file, options);
         check_replaced(chosen.c, file, options.resume || options.overwrite);

@@ -83,9 +83,12 @@ Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
 
 CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const std::string& why) {
     const std::string key = key_of_ill_posed(c);
-    return complaint(c, key,
-                     fmt::format("makes the start ill-posed, {}: {}; bring {} nearer to 0, or make energy.k20 larger",
-                                 outcome, why, key == "energy" ? "its moduli" : "it"));
+    return complaint(
+        c, key,
+        fmt::format("makes the start ill-posed, {}: {}; {}", outcome, why,
+                    key == "energy.k20" ? "it must be above 0, unless energy.k40 or energy.k42 make up for it"
+                    : key == "energy"   ? "bring its moduli nearer to 0, or make energy.k20 larger"
+                                        : "bring it nearer to 0, or make energy.k20 larger"));
 }
 
 std::optional<CaseError> ill_posed_start(const Case& c) {
