@@ -188,7 +188,7 @@ void require_own_values(hid_t dataset, const std::string& name) {
             fmt::format("/{} has {} values, and not all are in the file: it is damaged", name, values));
 }
 
-// Of all groups but /VTKHDF, whose virtual datasets point into the file itself, and which is not read here.
+// All groups but /VTKHDF, whose virtual datasets point into the file itself, and which is not read here.
 void require_all_values(hid_t file) {
     struct Found {
         std::string elsewhere;

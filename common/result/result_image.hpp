@@ -8,7 +8,7 @@
 
 namespace tubule {
 
-// Of a file from which read_result() gives this result.
+// The bytes of a file from which read_result() gives this result.
 std::vector<std::byte> result_image(const Result& result);
 
 }  // namespace tubule

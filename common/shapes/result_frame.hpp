@@ -10,7 +10,7 @@
 
 namespace tubule {
 
-// Of a closed surface l, of a tube or ring n: which of them it is only reading the frame tells.
+// l for a closed surface, n for a tube or ring: which of them it is only reading the frame tells.
 struct FrameMode {
     double amplitude = 0;
     std::optional<int> l, n;

@@ -9,7 +9,7 @@ void catch_interrupts();
 
 bool interrupted();
 
-// Of a host that handles signals itself: Python.
+// For a host that handles signals itself: Python.
 void set_interrupted(bool raised);
 
 }  // namespace tubule

@@ -276,7 +276,7 @@ RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
 
 namespace {
 
-// Of a surface that brings its own triangles, in terms of the keys that it has.
+// For a surface that brings its own triangles: advice in the keys that it has.
 void advise_given_triangles(const Case& c, std::string& advice) {
     const auto* file = std::get_if<MeshFile>(&c.shape);
     const std::string more = !file          ? "begin with a frame of more triangles"

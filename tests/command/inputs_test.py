@@ -62,7 +62,7 @@ def octahedron(bulge, comments=0):
 PROFILE = 'kind = "profile"\npath = "input.csv"\ntolerance = 1e-2\n'
 MESH = 'kind = "file"\npath = "input.off"\n'
 FRAME = 'kind = "result"\npath = "input.hdf"\nframe = 0\n'
-# Of each kind: the case, the file, what makes it for a bulge, whether a result keeps its bytes.
+# For each kind: the case, the file, what makes it for a bulge, whether a result keeps its bytes.
 KINDS = {
     "profile": (AXISYM.format(PROFILE), "input.csv", lambda test, bulge: profile(bulge), True),
     "large profile": (AXISYM.format(PROFILE), "input.csv", lambda test, bulge: profile(bulge, MANY), False),

@@ -83,7 +83,7 @@ std::string unexpected_words(const CLI::App& app) {
                        words.empty() ? "" : meant_by(words.front(), *command), name);
 }
 
-// Of all commands: -o without a name would be no -o, and a blank is no name that anybody means.
+// In all commands: -o without a name would be no -o, and a blank is no name that anybody means.
 void refuse_blank_outputs(CLI::App& app) {
     const auto blank = [](const std::string& name) {
         return name.find_first_not_of(" \t\n") == name.npos ? "must not be blank: give the file a name" : "";

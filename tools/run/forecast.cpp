@@ -16,10 +16,10 @@
 namespace tubule {
 namespace {
 
-// Of a result file, measured: a frame without its arrays, and the memory that writing the file takes, over its size.
+// Measured for result files: a frame without its arrays, and the memory that writing the file takes, over its size.
 constexpr double seconds_of_frame = 0.85e-3, bytes_of_frame = 8.5e3, memory_of_file = 4.3;
 constexpr double much = 1e8;  // bytes
-// Of surfaces at rest, measured: for each triangle, times the square of its order.
+// Measured for surfaces that do not move: for each triangle, times the square of its order.
 constexpr double seconds_at_rest = 7.2e-6, bytes_at_rest = 1.25e3;
 constexpr double pilot_limit = 2;           // seconds
 constexpr double reported_by_coarser = 4;   // cost of the runs of a pair

@@ -14,7 +14,7 @@ namespace tubule {
 // seconds of the run itself. Throws as an engine and its run; Paused where a PauseWatch of this thread ends it.
 Forecast forecast(const Case& c);
 
-// Of a surface at rest whose triangles are given in number; of all else nothing.
+// For a surface at rest whose triangles are given in number; nothing for all else.
 std::optional<Forecast> forecast_at_rest(const Case& c);
 
 // What the frames that a case asks for take, where that is much, in words: told by the first of them. Else empty.
