@@ -22,7 +22,7 @@ constexpr double start_steps = 40;                 // over which steps grow wher
 constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
 constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
 constexpr int few_steps = 8;
-constexpr double hopeless_rise = 0.1;  // of E_ref: of a run that is not asked for an accuracy
+constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
 
 // How often the integrator has begun by this time: at the start, and at each kink of the loads.
 int beginnings(const MotionLaw& law, double t) {
@@ -227,8 +227,9 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
 std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
     const bool asked = out_.reported() && !settings_given(setup_.c);
     const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
-                 allowed = asked ? std::max(setup_.c.accuracy.energy * summary.reference_energy, error)
-                                 : hopeless_rise * summary.reference_energy;
+                 hopeless = hopeless_rise * summary.reference_energy,
+                 wanted = setup_.c.accuracy.energy * summary.reference_energy,
+                 allowed = asked ? std::max(wanted, std::min(error, hopeless)) : hopeless;
     if (!is_admissible(s) || !(rise <= allowed)) {
         restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time);
         return StopReport{

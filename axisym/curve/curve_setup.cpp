@@ -193,8 +193,7 @@ CurveBegin given_state(const CurveSetup& setup) {
 }
 
 CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings s) {
-    constexpr double most_lost =
-        0.1;  // of the energy; what is lost beyond the accuracy asked for, a pair of runs tells
+    constexpr double most_lost = 0.1;  // of the energy; what less than that costs, a pair of runs shows
     if (settings_given(c) || !start.meridian.seams.empty()) return s;
     const double allowed = most_lost * start.bending.magnitude;
     const ArcLength arc(start.meridian);
