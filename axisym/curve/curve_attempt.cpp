@@ -76,8 +76,13 @@ void CurveAttempt::begin() {
     write_frame(0, s, at.shown.data(), at.rate.data());
     if (!stop_) stop_ = find_event(s, 0);
     if (stop_) now_ = s;
-    // The steps that lead from the curve to the first unknowns dissipate the difference.
-    past_.dissipated = past_.total_start - now_.total();
+    // In the time of the steps that lead from the curve to the first unknowns, changing loads do work at this shape;
+    // the rest of the difference dissipates.
+    const auto at_loads = [&](double t) {
+        return loads_at(setup_.motion->law(), t).energy(now_.o.area, now_.o.volume, now_.period);
+    };
+    past_.work = at_loads(at.time) - at_loads(0);
+    past_.dissipated = past_.total_start + past_.work - now_.total();
 }
 
 void CurveAttempt::resume(const Record& restart) {

@@ -91,6 +91,23 @@ TEST(Admissible, theFirstRowIsTheGivenShape) {
     EXPECT_NEAR(o["energy"][0], bending_energy(meridian(Capsule{1.006, 3.181}), c.energy).energy, 1e-10);
 }
 
+// The tension falls before the first step ends: what it does is work, not a rise of the energy.
+TEST(Admissible, loadsWorkBeforeTheFirstStep) {
+    Case c;
+    c.energy = bending(0.1646, -5.7976, 0.00080488);
+    c.model.kind = ModelKind::stokes;
+    c.model.Re = 2.0428, c.model.gamma = 0.5;
+    c.model.area = AreaRule::reservoir;
+    c.model.tension = Ramp({0, 1e-12, 1e-11}, {0.24, -0.1, 0.44});
+    c.shape = Dumbbell{};
+    c.accuracy.energy = 3.5e-4;
+    c.time.end = 4e-5;
+    c.time.output = {4e-9};
+    const Outcome o = run_case(c);
+    EXPECT_EQ(word(o.summary.stop.reason), std::string("finished")) << o.summary.stop.message;
+    EXPECT_NEAR(o["identity_defect"].back(), 0, 3.5e-4 * o.summary.reference_energy);
+}
+
 TEST(Admissible, aMeshThatCannotFollowIsAFailureAtTheBeginning) {
     Case c = dented(0.4055, -0.0933, 1e-6);
     explicitly(c, 68, 1e-3);

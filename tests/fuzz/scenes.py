@@ -161,7 +161,7 @@ class Run:
             return
         with h5py.File(result) as file:
             about, series = file["about"].attrs, file["series"]
-            self.stop, self.scale, self.stated = about.get("stop", "none"), float(about["E_ref"]), float(about["estimated_error"])
+            self.stop, self.scale, self.stated = about.get("stop", "none"), float(about.get("E_ref", math.nan)), float(about.get("estimated_error", math.inf))
             self.warnings, self.time_tolerance = about["warnings"], about.get("time_tolerance")
             self.warned = bool(self.warnings)
             self.energy = dict(zip(series["time"][:], series[quantity][:]))
