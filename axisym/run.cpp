@@ -7,17 +7,6 @@
 #include "common/run/run_pairs.hpp"
 
 namespace tubule::axisym {
-namespace {
-
-// Whether the case can be computed as a graph r(z), and nothing else is asked for.
-bool begins_as_graph(const Case& c) {
-    const MotionLaw law = motion_law(c.model);
-    return std::holds_alternative<Tube>(c.shape) && law.unconstrained() && !law.loads_change() &&
-           !c.energy.H0_varies() &&
-           c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
-}
-
-}  // namespace
 
 std::vector<std::string> series_names(const Case& c) {
     return begins_as_graph(c) ? graph_series(c).names() : curve_series(c).names();

@@ -175,7 +175,7 @@ TimeControl CurveSetup::control(double first_step) const {
     TimeControl control;
     control.relative = settings.tolerance;
     control.absolute = 0.1 * settings.tolerance;
-    control.max_order = c.discretisation.time_order;
+    control.max_order = c.time.max_order;
     control.first_step = first_step;
     control.growth = step_growth_of(settings);
     control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);

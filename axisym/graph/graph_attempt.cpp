@@ -65,7 +65,8 @@ FlowSystem GraphAttempt::system() {
     system.banded = stage_->space.cell().mirror;
     system.mass = [&forms](const double* at, double* values) { forms.mass(at, values); };
     system.dissipation = [this, &forms](double when, const double* at, const double* rate) {
-        return when == now_.time ? now_.o.dissipation : forms.observe(at, rate).dissipation;
+        if (when != now_.time && is_one_step()) return forms.observe(at, rate).dissipation;  // within a step
+        return observe(when, at, rate).dissipation;
     };
     system.guards = [this](double when, const double* at, const double* rate) {
         const Observation& o = observe(when, at, rate);
@@ -87,7 +88,7 @@ void GraphAttempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v,
     control.relative = settings_.time_tolerance;
     control.absolute =
         1e-3 * settings_.time_tolerance * std::min(std::get<Tube>(case_.shape).radius, 1e3 * case_.accuracy.r_min);
-    control.max_order = case_.discretisation.time_order;
+    control.max_order = case_.time.max_order;
     control.first_step = first_step;
     now_.time = std::numeric_limits<double>::quiet_NaN();
     if (is_one_step())
@@ -240,7 +241,7 @@ StopReport GraphAttempt::failure(const std::string& what) const {
     if (may_be_undefined(o.domain))
         return undefined_energy(o.domain, good_.time, fmt::format("z = {:.6g}", stage_->place(o.domain.place)));
     return {Stop::solver_failed, good_.time, fmt::format("{} ({})", what, suspects()),
-            "ask for more accuracy, or lower discretisation.time_order"};
+            "ask for more accuracy, or lower time.max_order"};
 }
 
 std::optional<StopReport> GraphAttempt::recover() {
@@ -282,7 +283,7 @@ std::optional<StopReport> GraphAttempt::step() {
     const StopReport given_up{Stop::resolution_lost, t, "the error exceeds the requested accuracy", ""};
     if (outcome == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
     const Observation o = observe(t, flow_->x(), flow_->v());
-    if (t > before) stage_->transport.add_step(*flow_, before);
+    if (t > before) stage_->transport.add_step(*flow_, before, is_one_step());
     if (const auto rise = find_rise(o)) return rise;
     const bool due = error_.due(o, is_one_step());
     if ((due || outcome != Flow::Outcome::step) && must_give_up(o)) return given_up;

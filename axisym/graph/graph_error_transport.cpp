@@ -26,13 +26,13 @@ void ErrorTransport::Level::add(double weight) {
 }
 
 // M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
-void ErrorTransport::Level::advance(double time, Eigen::VectorXd& error) {
+void ErrorTransport::Level::advance(double time, double sampled, Eigen::VectorXd& error) {
     forms.jacobian(state.data(), rate.data(), 1 / time, matrix.data());
     lu.factor(matrix.data());
     forms.residual(state.data(), rate.data(), rest.data());
     middle = state + error;
     forms.residual(middle.data(), rate.data(), residual.data());
-    residual += driven / time - rest;
+    residual += (driven - sampled * rest) / time;
     lu.solve(residual.data());
     error -= residual;
     driven.setZero();
@@ -68,21 +68,35 @@ void ErrorTransport::begin(const double* x, const double* v) {
     on_coarse_.rate = Eigen::Map<const Eigen::VectorXd>(v, n);
     on_coarse_.driven.setZero();
     on_fine_.driven.setZero();
-    elapsed_ = 0;
+    elapsed_ = sampled_ = 0;
 }
 
-void ErrorTransport::add_step(const Flow& flow, double from) {
-    const double h = flow.time() - from;
+// That of the path at `middle` and `slope` of the coarse level.
+void ErrorTransport::add_residual(double weight) {
     Level &c = on_coarse_, &f = on_fine_;
-    for (std::size_t q = 0; q < path_points.size(); ++q) {
-        flow.interpolate(from + path_points[q] * h, c.middle.data(), c.slope.data());
-        f.middle.noalias() = prolongation_ * c.middle;
-        f.slope.noalias() = prolongation_ * c.slope;
-        c.add(path_weights[q] * h);
-        f.add(path_weights[q] * h);
+    f.middle.noalias() = prolongation_ * c.middle;
+    f.slope.noalias() = prolongation_ * c.slope;
+    c.add(weight);
+    f.add(weight);
+    sampled_ += weight;
+}
+
+void ErrorTransport::add_step(const Flow& flow, double from, bool long_step) {
+    const double h = flow.time() - from;
+    Level& c = on_coarse_;
+    const Eigen::Map<const Eigen::VectorXd> x(flow.x(), c.state.size()), v(flow.v(), c.rate.size());
+    if (long_step) {
+        for (std::size_t q = 0; q < path_points.size(); ++q) {
+            flow.interpolate(from + path_points[q] * h, c.middle.data(), c.slope.data());
+            add_residual(path_weights[q] * h);
+        }
+    } else {
+        c.middle = 0.5 * (c.state + x) + (h / 8) * (c.rate - v);
+        c.slope = (1.5 / h) * (x - c.state) - 0.25 * (c.rate + v);
+        add_residual(2.0 / 3 * h);
     }
-    c.state = Eigen::Map<const Eigen::VectorXd>(flow.x(), c.state.size());
-    c.rate = Eigen::Map<const Eigen::VectorXd>(flow.v(), c.rate.size());
+    c.state = x;
+    c.rate = v;
     elapsed_ += h;
 }
 
@@ -90,9 +104,9 @@ void ErrorTransport::advance() {
     if (elapsed_ == 0) return;
     on_fine_.state.noalias() = prolongation_ * on_coarse_.state;
     on_fine_.rate.noalias() = prolongation_ * on_coarse_.rate;
-    on_fine_.advance(elapsed_, total);
-    on_coarse_.advance(elapsed_, temporal);
-    elapsed_ = 0;
+    on_fine_.advance(elapsed_, sampled_, total);
+    on_coarse_.advance(elapsed_, sampled_, temporal);
+    elapsed_ = sampled_ = 0;
 }
 
 ErrorTransport::EnergyError ErrorTransport::energy_error(double energy) const {

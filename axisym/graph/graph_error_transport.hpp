@@ -34,10 +34,11 @@ public:
 
     // Starts the path here, with the errors that are set in total and temporal.
     void begin(const double* x, const double* v);
-    // The last step of the run, which began at time `from`: the residual of its path, a polynomial in time, is
-    // integrated by Gauss' rule. (The error estimate of the method cannot replace it: it is that of a method of lower
-    // order.)
-    void add_step(const Flow& flow, double from);
+    // The last step of the run, which began at time `from`: integrates the residual of its path. A long step takes the
+    // polynomial of its method and Gauss' rule. (The error estimate of the method cannot replace it: it is that of a
+    // method of lower order.) A short one takes the cubic through states and rates at its ends and Simpson's rule, as
+    // at the ends only the residual of space is left.
+    void add_step(const Flow& flow, double from, bool long_step);
     // Brings the errors to the time of the last step.
     void advance();
 
@@ -60,10 +61,13 @@ private:
         Eigen::VectorXd state, rate, middle, slope, residual, rest, driven;
         explicit Level(const Forms& f);
         void add(double weight);
-        void advance(double time, Eigen::VectorXd& error);
+        void advance(double time, double sampled, Eigen::VectorXd& error);
     };
     Level on_fine_, on_coarse_;
+    void add_residual(double weight);
     double elapsed_ = 0;
+    double sampled_ =
+        0;  // sum of the weights of samples within steps; the rest of `elapsed_` has the residual of its end
 };
 
 }  // namespace tubule::axisym

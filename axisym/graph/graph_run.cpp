@@ -1,5 +1,7 @@
 #include "axisym/graph/graph_run.hpp"
 
+#include <fmt/format.h>
+
 #include <optional>
 #include <utility>
 
@@ -18,7 +20,7 @@ public:
           watch_(watch),
           clock_(clock),
           restart_(restart),
-          settings_(first_graph_settings(c, c.discretisation.time_order == 5)) {}
+          settings_(first_graph_settings(c, c.time.integrator == Integrator::rosenbrock)) {}
 
     RunSummary& next() override {
         settings_.may_give_up = --left_ > 0;
@@ -29,12 +31,14 @@ public:
             run_->begin();
         run_->go();
         run_->summary.attempts = count_;
+        run_->summary.integrator = settings_.one_step ? "rosenbrock" : "ida";
+        if (!fallback_.empty()) run_->summary.warnings.push_back(fallback_);
         describe_effort(run_->summary);
         return run_->summary;
     }
 
     bool refine(const tubule::RunSummary& last) override {
-        if (!run_->gave_up) return try_backward_differences(last);
+        if (!run_->gave_up) return fall_back_on_ida(last);
         const double allowed = case_.accuracy.energy * last.reference_energy / stated_over_computed;
         settings_ = tightened(settings_, run_->latest_error(), allowed, count_++);
         return true;
@@ -50,9 +54,11 @@ public:
 private:
     // Where H is zero an energy of powers of H alone has no stiffness. What appears there within a step, the linearised
     // flow of a Rosenbrock method does not see; Newton's method does.
-    bool try_backward_differences(const tubule::RunSummary& last) {
+    bool fall_back_on_ida(const tubule::RunSummary& last) {
         const bool lost = last.stop.reason == Stop::resolution_lost || last.stop.reason == Stop::solver_failed;
         if (!settings_.one_step || !lost) return false;
+        fallback_ = fmt::format("IDA has integrated the run: time.integrator = \"rosenbrock\" failed at t = {:.4g}, {}",
+                                last.stop.time, last.stop.message);
         settings_ = first_graph_settings(case_, false);
         left_ = most_attempts, ++count_;
         return true;
@@ -63,6 +69,7 @@ private:
     const RunClock& clock_;
     const Record* restart_;  // until the run goes on from it
     GraphSettings settings_;
+    std::string fallback_;  // why IDA integrates what Rosenbrock's method should have
     int count_ = 1, left_ = most_attempts;
     std::optional<GraphAttempt> run_;  // the last one
 };

@@ -14,7 +14,7 @@ struct GraphSettings {
     double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
     bool free_time = true, free_mesh = true;
     bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
-    bool one_step = true;     // Rosenbrock's method, else backward differences
+    bool one_step = false;    // Rosenbrock's method, else IDA
 };
 
 GraphSettings first_graph_settings(const Case& c, bool one_step);

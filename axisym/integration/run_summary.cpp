@@ -7,7 +7,8 @@ namespace tubule::axisym {
 void describe_effort(RunSummary& s) {
     const FlowCounters& n = s.counters;
     s.effort = fmt::format("{} steps, {} elements", n.steps, s.elements);
-    s.details = {{"attempts", std::int64_t{s.attempts}},
+    s.details = {{"integrator", s.integrator},
+                 {"attempts", std::int64_t{s.attempts}},
                  {"meshes", std::int64_t{s.meshes}},
                  {"elements", std::int64_t{s.elements}},
                  {"time_tolerance", s.time_tolerance},

@@ -10,6 +10,7 @@ struct RunSummary : tubule::RunSummary {
     int attempts = 1;  // how often the run began again with finer settings, plus one
     int meshes = 1;    // of the last attempt
     double time_tolerance = 0;
+    std::string integrator = "ida";  // as time.integrator names it
     FlowCounters counters;  // of the last attempt
 };
 

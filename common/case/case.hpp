@@ -79,7 +79,6 @@ struct Discretisation {
     int order = 5;                                   // polynomial degree of the spline: 3, 5, 7
     std::optional<int> smoothness;                   // continuous derivatives at knots, 1 ... order-1; default order-1
     std::optional<double> time_tolerance;            // relative tolerance of the time integrator
-    int time_order = 5;                              // largest order of the backward differences, 1 ... 5
     bool symmetry = true;                            // solve one cell of a start that repeats or mirrors itself
     std::optional<Parametrisation> parametrisation;  // by default as the model and the shape have it
 };
@@ -101,11 +100,18 @@ struct SurfaceDiscretisation {
     bool coarsen = false;                  // fewer triangles when the motion has become smooth
 };
 
+// What integrates a profile in time: SUNDIALS' IDA (backward differences of variable order), or Rodas5P, a Rosenbrock
+// method of order 5 for graphs r(z).
+enum class Integrator { ida, rosenbrock };
+
 struct TimeSpan {
     double end = 0;                    // 0: none, nothing moves
     std::vector<double> output;        // times of frames; 0 and end are always written
     std::optional<double> stationary;  // stop when the energy could change by less than this * E_ref until end
     std::optional<double> limit;       // wall clock seconds
+    // Of tier axisym:
+    Integrator integrator = Integrator::ida;
+    int max_order = 5;  // of IDA
 };
 
 // Tier "auto": when an axisymmetric run goes on in three dimensions.
@@ -160,6 +166,17 @@ struct Case {
 
     bool moves() const { return time.end > 0; }
 };
+
+// Whether a run of tier axisym can be one of a graph r(z).
+inline bool can_be_graph(const Case& c) {
+    const MotionLaw law = motion_law(c.model);
+    return is_tube(c.shape) && law.unconstrained() && !law.loads_change() && !c.energy.H0_varies();
+}
+// Whether it is, unless the profile overhangs.
+inline bool begins_as_graph(const Case& c) {
+    return can_be_graph(c) &&
+           c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
+}
 
 // What the equilibrium of a case holds fixed.
 inline Held held_of(const Case& c) {

@@ -213,7 +213,6 @@ void keys(Keys& k, Discretisation& d) {
     k.integer("order", d.order, {.from = 3, .to = 7, .step = 2});
     k.integer("smoothness", d.smoothness, {.from = 1, .to = d.order - 1.0, .note = "order - 1"});
     k.number("time_tolerance", d.time_tolerance, {.above = 1e-14, .to = 0.1});
-    k.integer("time_order", d.time_order, {.from = 1, .to = 5});
     k.flag("symmetry", d.symmetry);
     k.choice(
         "parametrisation", d.parametrisation,
@@ -274,11 +273,21 @@ void keys(Keys& k, SurfaceDiscretisation& d, bool moves) {
 }
 
 template <class Keys>
-void keys(Keys& k, TimeSpan& time) {
+void keys(Keys& k, TimeSpan& time, Tier tier) {
     k.number("end", time.end, {.above = 0}, k.required);
     k.increasing("output", time.output, {.from = 0, .to = time.end, .note = "time.end"});
     k.number("stationary", time.stationary, {.above = 0});
     k.number("limit", time.limit, {.above = 0});
+    if (tier != Tier::axisym) {
+        for (const char* key : {"integrator", "max_order"})
+            k.absent(key, "must be absent: only valid with tier = \"axisym\"");
+        return;
+    }
+    k.choice("integrator", time.integrator, {{"ida", Integrator::ida}, {"rosenbrock", Integrator::rosenbrock}});
+    if (time.integrator == Integrator::ida)
+        k.integer("max_order", time.max_order, {.from = 1, .to = 5});
+    else
+        k.absent("max_order", "must be absent: only valid with integrator = \"ida\"");
 }
 
 template <class Keys>
@@ -511,8 +520,9 @@ void check_chosen_model(Keys& k, const Case& c) {
             return "must not be \"auto\" with [equilibrium]: nothing moves; \"fluid\" and \"overdamped\" have the same "
                    "shapes at rest";
         if (!c.surface.scheme || entry(*c.surface.scheme).general) return {};
-        return fmt::format("must not be \"auto\" with discretisation.scheme = \"{}\", which does not support all models; name one",
-                           entry(*c.surface.scheme).name);
+        return fmt::format(
+            "must not be \"auto\" with discretisation.scheme = \"{}\", which does not support all models; name one",
+            entry(*c.surface.scheme).name);
     });
 }
 
@@ -544,12 +554,19 @@ void check_together(Keys& k, const Case& c) {
     k.check(key, [&] { return complaint; });
     k.check("discretisation.parametrisation", [&]() -> std::string {
         const auto chosen = c.discretisation.parametrisation;
-        if (chosen == Parametrisation::graph && (!is_tube(c.shape) || !law.unconstrained() || law.loads_change()))
+        if (chosen == Parametrisation::graph && !can_be_graph(c))
             return "must not be \"graph\": only the gradient flow of a tube with free volume and area, under tension "
                    "and pressure that do not change, is computed as a graph";
         if (chosen == Parametrisation::material && !law.inextensible && !c.energy.H0_varies())
             return "must not be \"material\": the gradient flow has no flow along the membrane";
         return {};
+    });
+    k.check("time.integrator", [&] {
+        return c.time.integrator == Integrator::rosenbrock && !begins_as_graph(c)
+                   ? "must not be \"rosenbrock\": it integrates graphs r(z) alone, the gradient flow of a tube with "
+                     "free "
+                     "volume and area under constant loads; omit it"
+                   : "";
     });
     if (c.equilibrium) check_equilibrium_keys(k, c, law);
     check_neck(k, c);
@@ -573,7 +590,7 @@ void automatic_keys(Keys& k, Case& c) {
     k.table("model", [&](auto& k) { keys(k, c.model); });
     k.table("velocity", [&](auto& k) { keys(k, c.velocity, c.model); });
     k.table("auto", [&](auto& k) { keys(k, c.automatic); });
-    k.table("time", [&](auto& k) { keys(k, c.time); });
+    k.table("time", [&](auto& k) { keys(k, c.time, c.tier); });
 }
 
 // Tier axisym moves a profile or computes its equilibria.
@@ -594,7 +611,7 @@ void surface_motion_keys(Keys& k, Case& c) {
     k.absent("equilibrium", "must be absent: only valid with tier = \"axisym\"");
     std::optional<TimeSpan> time;
     if (c.moves()) time = c.time;
-    k.optional_table("time", time, [](auto& k, TimeSpan& t) { keys(k, t); });
+    k.optional_table("time", time, [&](auto& k, TimeSpan& t) { keys(k, t, c.tier); });
     if (time) c.time = *time;
     if (!c.moves()) {
         for (const char* key : {"model", "velocity"})
@@ -640,7 +657,7 @@ void keys(Keys& k, Case& c) {
             k.number("limit", c.time.limit, {.above = 0});
         });
     else if (c.tier == Tier::axisym)
-        k.table("time", [&](auto& k) { keys(k, c.time); });
+        k.table("time", [&](auto& k) { keys(k, c.time, c.tier); });
     // The shapes of a branch are numbered as if that were their time.
     const double end = c.equilibrium ? std::numeric_limits<int>::max() : c.time.end;
     k.table("expect", [&](auto& k) { keys(k, c.expect, end); });

@@ -10,9 +10,10 @@
 namespace tubule::axisym {
 namespace {
 
-void figure_run(benchmark::State& state) {
+void figure_run(benchmark::State& state, Integrator integrator) {
     Case c = figure_case();
     c.accuracy.energy = std::pow(10.0, -static_cast<double>(state.range(0)));
+    c.time.integrator = integrator;
     RunSummary summary;
     double error = 0;
     for (auto _ : state) {
@@ -26,7 +27,8 @@ void figure_run(benchmark::State& state) {
     state.counters["elements"] = summary.elements;
     state.counters["attempts"] = summary.attempts;
 }
-BENCHMARK(figure_run)->DenseRange(3, 9)->Unit(benchmark::kMillisecond)->Name("figure_run/digits");
+BENCHMARK_CAPTURE(figure_run, ida, Integrator::ida)->DenseRange(3, 9)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(figure_run, rosenbrock, Integrator::rosenbrock)->DenseRange(3, 9)->Unit(benchmark::kMillisecond);
 
 // The kernels, per call on one cell of 8 elements.
 struct Kernel {

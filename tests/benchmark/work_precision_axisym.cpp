@@ -43,11 +43,12 @@ void print(const std::string& series, const Point& p) {
     fmt::print("{},{:.0e},{:.3e},{:.3e},{:.4f}\n", series, p.asked, p.error, p.estimate, p.cpu);
 }
 
-void asked_for() {
+void asked_for(const std::string& series, Integrator integrator) {
     Case c = figure_case();
+    c.time.integrator = integrator;
     for (double digits = 3; digits <= 10; digits += 0.5) {
         c.accuracy.energy = std::pow(10.0, -digits);
-        print("accuracy asked for", measure(c, 21));
+        print(series, measure(c, 21));
     }
 }
 
@@ -78,7 +79,8 @@ void tuned(const std::string& series, int order, int smoothness) {
 int main() {
     using namespace tubule::axisym;
     fmt::print("series,energy_asked,error,estimate,cpu_ms\n");
-    asked_for();
+    asked_for("accuracy asked for, IDA", Integrator::ida);
+    asked_for("accuracy asked for, Rosenbrock", Integrator::rosenbrock);
     tuned("by hand: cubic spline", 3, 2);
     tuned("by hand: cubic Hermite", 3, 1);
     tuned("by hand: quintic spline", 5, 4);

@@ -93,7 +93,7 @@ class Extended(GrowTest):
 
     def test_killed_it_goes_on_by_its_result(self):
         slow = ("--set=time.end=0.5", "--set=discretisation.elements=60", "--set=discretisation.time_tolerance=1e-12",
-                "--set=discretisation.time_order=2", "--to-the-end")  # fmt: skip
+                "--set=time.max_order=2", "--to-the-end")  # fmt: skip
         self.scan("case.toml", f"--over={AMPLITUDE}=0.1,0.12", *slow, "-o", "scan.hdf")
         known = contents(self.result)["points/energy"]
         for number in (signal.SIGKILL, signal.SIGINT):

@@ -39,11 +39,10 @@ output = [0.01, 0.05]
 """
 
 # The same with 10000 steps and more, a second or so, and 400 frames. Explicit settings: it never begins again.
-SLOW = QUICK.replace("[0.01, 0.05]", str([i / 2000 for i in range(1, 400)])) + """
+SLOW = QUICK.replace("[0.01, 0.05]", str([i / 2000 for i in range(1, 400)]) + "\nmax_order = 2") + """
 [discretisation]
 elements = 40
 time_tolerance = 1e-12
-time_order = 2
 """
 
 # A tube that pearls, pinches or relaxes, as its amplitude and k42 have it: the case of scans.

@@ -34,7 +34,7 @@ CASE = UNDULATED_TUBE
 MAP = ("--over", f"{AMPLITUDE}=0.3:0.5:6", "--over", f"{K42}=1e-5:1e-2:6:log")
 # Points that take 0.1 s each, so that there is time to kill their scan.
 SLOW = ("--over", f"{AMPLITUDE}=0.1:0.12:8", "--set", "time.end=0.5", "--set", "discretisation.elements=60",
-        "--set", "discretisation.time_tolerance=1e-12", "--set", "discretisation.time_order=2", "--to-the-end")
+        "--set", "discretisation.time_tolerance=1e-12", "--set", "time.max_order=2", "--to-the-end")
 
 
 def points(result):

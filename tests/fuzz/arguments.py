@@ -16,7 +16,7 @@ import numpy as np, tubule
 warnings.simplefilter("ignore")
 case, at_rest, surface = (tubule.Case(name + ".toml") for name in ("tube", "equilibrium", "surface"))
 result, curve, cells = (tubule.read(name + ".hdf") for name in ("tube", "curve", "surface"))
-long = case.with_(set={{"discretisation.elements": 8000, "discretisation.time_tolerance": 1e-12, "discretisation.time_order": 1}})
+long = case.with_(set={{"discretisation.elements": 8000, "discretisation.time_tolerance": 1e-12, "time.max_order": 1}})
 loop = {{}}
 loop["energy"] = loop
 pathlib.Path("ready").touch()

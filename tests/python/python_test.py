@@ -36,7 +36,7 @@ TUBE = {
     "time": {"end": 0.2, "output": [0.01, 0.05]},
 }
 # It would take minutes.
-LONG = TUBE | {"discretisation": {"elements": 8000, "time_tolerance": 1e-12, "time_order": 1}}
+LONG = TUBE | {"discretisation": {"elements": 8000, "time_tolerance": 1e-12}, "time": TUBE["time"] | {"max_order": 1}}
 SURFACE = {
     "tier": "surface3d",
     "energy": {"k20": 1},

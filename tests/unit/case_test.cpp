@@ -146,7 +146,7 @@ TEST(CaseRefusal, TextThatIsNoToml) {
 
 TEST(CaseRefusal, NamesOfOtherPrograms) {
     const std::string energy = " Allowed here: k20, k40, k42, H0, term",
-                      time = " Allowed here: end, output, stationary, limit";
+                      time = " Allowed here: end, output, stationary, limit, integrator, max_order";
     expect_refused({
         Edit{"k42", "kappa",
              "6:1: unknown key energy.kappa: write k20 = kappa/2: the energy is INT k20 (H - H0)^2 dS, H the "
@@ -174,7 +174,7 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"tier =", "teir =", "1:1: unknown key teir; did you mean 'tier'? Allowed here: " + tables},
         Edit{"[discretisation]", "[speed]", "18:2: unknown key speed. Allowed here: " + tables},
         Edit{"[[shape.mode]]", "[time.mode]",
-             "13:7: unknown key time.mode. Allowed here: end, output, stationary, limit"},
+             "13:7: unknown key time.mode. Allowed here: end, output, stationary, limit, integrator, max_order"},
         Edit{"title", "tilte", "3:1: unknown key about.tilte; did you mean 'title'? Allowed here: title, source"},
         Edit{"k42", "k24", "6:1: unknown key energy.k24; did you mean 'k42'? Allowed here: k20, k40, k42, H0, term"},
         Edit{"k42", "h0", "6:1: unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
@@ -193,10 +193,10 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
              "energy, relative_to, estimate, r_min"},
         Edit{"order", "oder",
              "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
-             "order, smoothness, time_tolerance, time_order, symmetry, parametrisation"},
+             "order, smoothness, time_tolerance, symmetry, parametrisation"},
         Edit{"end =", "ende =",
              "21:1: unknown key time.ende; did you mean 'end'? Allowed here: end, output, "
-             "stationary, limit"},
+             "stationary, limit, integrator, max_order"},
     });
 }
 
@@ -320,8 +320,12 @@ TEST(CaseRefusal, NumbersOutOfRange) {
              "19:18: discretisation.time_tolerance must be a number > 1e-14 and <= 0.1, not 1e-14"},
         Edit{"order = 5", "time_tolerance = 0.2",
              "19:18: discretisation.time_tolerance must be a number > 1e-14 and <= 0.1, not 0.2"},
-        Edit{"order = 5", "time_order = 0", "19:14: discretisation.time_order must be an integer >= 1 and <= 5, not 0"},
-        Edit{"order = 5", "time_order = 6", "19:14: discretisation.time_order must be an integer >= 1 and <= 5, not 6"},
+        Edit{"order = 5", "time_order = 0", "19:14: time.max_order must be an integer >= 1 and <= 5, not 0"},
+        Edit{"order = 5", "time_order = 6", "19:14: time.max_order must be an integer >= 1 and <= 5, not 6"},
+        Edit{"[0.1, 0.2]", "[]\nmax_order = 2\nintegrator = \"rosenbrock\"",
+             "23:13: time.max_order must be absent: only valid with integrator = \"ida\""},
+        Edit{"[0.1, 0.2]", "[]\nintegrator = \"rodas\"",
+             "23:14: time.integrator must be one of \"ida\", \"rosenbrock\", not \"rodas\""},
         Edit{"end = 1.4", "end = 0", "21:7: time.end must be a number > 0, not 0"},
         Edit{"[0.1, 0.2]", "[-0.1]", "22:11: time.output.0 must be a number >= 0 and <= 1.4 (time.end), not -0.1"},
         Edit{"[0.1, 0.2]", "[1.5]", "22:11: time.output.0 must be a number >= 0 and <= 1.4 (time.end), not 1.5"},
@@ -353,6 +357,10 @@ TEST(CaseRefusal, ValuesThatDoNotGoTogether) {
     const std::string no_energy =
         "energy needs a modulus other than zero: k20, k40, k42, or that of a term [[energy.term]]";
     expect_refused({
+        Edit{"order = 5\n[time]\n", "parametrisation = \"even\"\n[time]\nintegrator = \"rosenbrock\"\n",
+             "21:14: time.integrator must not be \"rosenbrock\": it integrates graphs r(z) alone, the gradient flow of "
+             "a "
+             "tube with free volume and area under constant loads; omit it"},
         Edit{"k20 = 1.0\nk42 = 0.06", "H0 = 1", "4:1: " + no_energy},
         Edit{"[energy]\nk20 = 1.0\nk42 = 0.06", "", "1:1: " + no_energy},
         // 1 + 1.25 cos(pi z) is smallest at z = 1
@@ -521,7 +529,8 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
         Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
         Override{"mode.0.n=1",
-                 "unknown key mode: write [[shape.mode]] or [[shape.noise]]. Allowed here: tier, about, energy, auto, model, equilibrium, "
+                 "unknown key mode: write [[shape.mode]] or [[shape.noise]]. Allowed here: tier, about, energy, auto, "
+                 "model, equilibrium, "
                  "velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
@@ -581,7 +590,8 @@ TEST(Case, DefaultsAreThoseOfThePlainData) {
     EXPECT_EQ(c.accuracy.energy, Accuracy{}.energy);
     EXPECT_EQ(c.accuracy.r_min, Accuracy{}.r_min);
     EXPECT_EQ(c.discretisation.order, Discretisation{}.order);
-    EXPECT_EQ(c.discretisation.time_order, Discretisation{}.time_order);
+    EXPECT_EQ(c.time.integrator, Integrator::ida);
+    EXPECT_EQ(c.time.max_order, 5);
     EXPECT_EQ(c.discretisation.symmetry, Discretisation{}.symmetry);
     EXPECT_FALSE(c.discretisation.elements || c.discretisation.smoothness || c.discretisation.time_tolerance);
     EXPECT_TRUE(c.time.output.empty());
@@ -591,15 +601,15 @@ TEST(Case, DefaultsAreThoseOfThePlainData) {
 }
 
 TEST(Case, AcceptsEveryKeyAtTheEdgeOfItsRange) {
-    const Case c = parse_case(
-        good,
-        {"about.source=Fig. 3", "energy.k40=2", "energy.H0=-2", "model.volume=free", "accuracy.energy=0.1",
-         "accuracy.r_min=0.69", "discretisation.order=7", "discretisation.smoothness=6",
-         "discretisation.elements=100000", "discretisation.time_tolerance=0.1", "discretisation.time_order=1",
-         "discretisation.symmetry=false", "time.output=[0, 1.4]", "time.stationary=1e-9", "time.limit=60",
-         "expect.stop=pinch-off", "expect.stop_time={value = 1.4, rel = 1e-5}", "expect.mode_0={value = 0, abs = 1}",
-         "expect.at.0.time=1.4"},
-        "case.toml");
+    const Case c =
+        parse_case(good,
+                   {"about.source=Fig. 3", "energy.k40=2", "energy.H0=-2", "model.volume=free", "accuracy.energy=0.1",
+                    "accuracy.r_min=0.69", "discretisation.order=7", "discretisation.smoothness=6",
+                    "discretisation.elements=100000", "discretisation.time_tolerance=0.1", "time.max_order=1",
+                    "discretisation.symmetry=false", "time.output=[0, 1.4]", "time.stationary=1e-9", "time.limit=60",
+                    "expect.stop=pinch-off", "expect.stop_time={value = 1.4, rel = 1e-5}",
+                    "expect.mode_0={value = 0, abs = 1}", "expect.at.0.time=1.4"},
+                   "case.toml");
     EXPECT_EQ(c.source, "Fig. 3");
     EXPECT_EQ(c.energy.k[1], 2);
     EXPECT_EQ(c.energy.H0, -2);
@@ -609,7 +619,7 @@ TEST(Case, AcceptsEveryKeyAtTheEdgeOfItsRange) {
     EXPECT_EQ(c.discretisation.smoothness, 6);
     EXPECT_EQ(c.discretisation.elements, 100000);
     EXPECT_EQ(c.discretisation.time_tolerance, 0.1);
-    EXPECT_EQ(c.discretisation.time_order, 1);
+    EXPECT_EQ(c.time.max_order, 1);
     EXPECT_FALSE(c.discretisation.symmetry);
     EXPECT_EQ(c.time.output, (std::vector{0.0, 1.4}));
     EXPECT_EQ(c.time.stationary, 1e-9);
@@ -792,8 +802,8 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
         "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
         "\n[[shape.mode]]\namplitude = 0.3\nn = 1\nm = 0\nphase = 0\n"
         "\n[accuracy]\nenergy = 1e-06\nrelative_to = \"magnitude\"\nr_min = 0.001\n"
-        "\n[discretisation]\norder = 5\ntime_order = 5\nsymmetry = true\n"
-        "\n[time]\nend = 1.4\noutput = [0.1, 0.2]\n"
+        "\n[discretisation]\norder = 5\nsymmetry = true\n"
+        "\n[time]\nend = 1.4\noutput = [0.1, 0.2]\nintegrator = \"ida\"\nmax_order = 5\n"
         "\n[expect]\nstop = \"finished\"\nenergy = {value = 1, rel = 1e-06}\nstop_time = {value = 1.4, abs = 0.5}\n"
         "\n[[expect.at]]\ntime = 0.1\nr_min = {value = 0.7, abs = 0.001}\n");
 }

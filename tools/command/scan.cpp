@@ -115,6 +115,14 @@ std::string between_seeds(const Scan& scan) {
                        (longest + seeds - 1) / seeds, longest);
 }
 
+// Advice for scans of graphs; else empty.
+std::string faster_integrator(const Scan& scan) {
+    const Case c = scan.case_of(0);
+    if (c.tier != Tier::axisym || !c.moves() || !begins_as_graph(c) || c.time.integrator != Integrator::ida) return "";
+    return fmt::format("{}: note: time.integrator = \"rosenbrock\" is about 1.7 times faster for these tubes\n",
+                       scan.path);
+}
+
 void report(const ScanResult& result, const std::filesystem::path& file, bool interrupted, const ScanEffort& effort,
             double seconds) {
     std::array<std::size_t, n_outcomes> counts{};
@@ -148,6 +156,7 @@ int scan_by(const ScanOptions& options, Ranks* ranks) {
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", scan.path, file.string());
         return 0;
     }
+    if (!options.quiet) say(stderr, "{}", faster_integrator(scan));
     bool was_interrupted = false;
     int workers = 0;
     ScanEffort effort;
