@@ -89,6 +89,28 @@ void expect_refused(const std::vector<Override>& overrides) {
     for (const auto& [set, message] : overrides) EXPECT_EQ(refusal(good, {set}), "--set " + set + ": " + message);
 }
 
+TEST(CaseRefusal, ContentsOfAnotherKind) {
+    const std::string text = ": a case is plain text, saved as UTF-8";
+    EXPECT_EQ(refusal("PK\x03\x04..."), "case.toml: is a zip archive, such as a spreadsheet" + text);
+    EXPECT_EQ(refusal({'t', '\0', 'i', '\0'}), "case.toml: is text in UTF-16" + text);
+    EXPECT_EQ(refusal("tier = \"a\x1b[31m\xff\"\n").find_first_of("\x1b\xff"), std::string::npos);
+}
+
+TEST(CaseRefusal, KeysThatStandElsewhere) {
+    std::string late = good.substr(good.find('\n') + 1) + "tier = \"axisym\"\n";
+    EXPECT_EQ(refusal(late.replace(late.find("[expect]"), 0, "tier = \"axisym\"\n").substr(0, late.size() - 16)),
+              "case.toml:22:1: tier stands within [time]; it belongs before the first table");
+    expect_refused({Override{"shape.mode.1.amplitude=0.3",
+                             "missing key shape.mode.1.n: an integer >= 0 and <= 10000; "
+                             "entries count from 0, so shape.mode.1 is a new one"},
+                    Override{"energy.k42=0,1",
+                             "energy.k42 must be a finite number, not the string \"0,1\"; decimals "
+                             "have a point: 0.1"}});
+    EXPECT_EQ(
+        refusal(with("[shape]", "[velocity]\ninitial = \"rotation\"\nomega = 1.0\n[shape]")),
+        "case.toml:10:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
+}
+
 TEST(CaseRefusal, TextThatIsNoToml) {
     const std::string separate = "not valid TOML: a key and its value are joined by a single =, ";
     expect_refused({
@@ -122,7 +144,11 @@ TEST(CaseRefusal, TextThatIsNoToml) {
         Edit{"\"tube\"", "\u201ctube\u201d", "10:8: not valid TOML: quotes are straight: \"text\""},
         Edit{"\"tube\"", "\"tube", "10:8: not valid TOML: this quote is not closed"},
         Edit{"\"test\"", "\"C:\\data\"",
-             "3:12: not valid TOML: \\ begins an escape within \"...\"; '...' takes text as it is"},
+             "3:12: not valid TOML: \\ begins an escape within \"...\": write \\\\, or '...', which takes text as it "
+             "is"},
+        Edit{"title = \"test\"", "title = \"C:\\users\"",
+             "3:12: not valid TOML: \\ begins an escape within \"...\": write \\\\, or '...', which takes text as it "
+             "is"},
         Edit{"[0.1, 0.2]", "[0.1 0.2]", "22:14: not valid TOML: numbers of a list are separated by commas: [1, 2]"},
         Edit{"[0.1, 0.2]", "(0.1, 0.2)", "22:11: not valid TOML: a list stands in square brackets: [0.1, 0.2]"},
         Edit{"[0.1, 0.2]", "0:1:10", "22:10: not valid TOML: a range stands in quotes: \"0:1:10\""},
@@ -262,7 +288,8 @@ TEST(CaseRefusal, WrongTypes) {
         Edit{"[0.1, 0.2]", "[0.1, \"b\"]",
              "22:16: time.output.1 must be a number >= 0 and <= 1.4 (time.end), not the "
              "string \"b\""},
-        Edit{"{value = 1.0, rel = 1e-6}", "1.0", "24:10: expect.energy must be a table, not 1.0"},
+        Edit{"{value = 1.0, rel = 1e-6}", "1.0",
+             "24:10: expect.energy must be a table, such as {value = 1.5, rel = 1e-3}, not 1.0"},
         Edit{"[[expect.at]]", "[expect.at]", "25:1: expect.at must be a list of tables, [[expect.at]], not a table"},
     });
 }
@@ -458,7 +485,7 @@ TEST(CaseRefusal, Files) {
         return "accepted";
     };
     const std::filesystem::path folder = testing::TempDir();
-    EXPECT_EQ(message(folder), folder.string() + ": is a directory, not a file");
+    EXPECT_EQ(message(folder), folder.string() + ": is a directory: give a file in it");
     EXPECT_EQ(message("/dev/zero"), "/dev/zero: is a pipe or a device, not a file: save its contents to a file first");
     const std::filesystem::path pipe = folder / "pipe.toml", huge = folder / "huge.toml";
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
@@ -521,7 +548,8 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42=1\nk20 = 2", "energy.k42 must be a finite number, not the string \"1\\u000ak20 = 2\""},
         Override{"energy.h0=1", "unknown key energy.h0; did you mean 'H0'? Allowed here: k20, k40, k42, H0, term"},
         Override{"mode.0.n=1",
-                 "unknown key mode: write [[shape.mode]] or [[shape.noise]]. Allowed here: tier, about, energy, auto, model, equilibrium, "
+                 "unknown key mode: write [[shape.mode]] or [[shape.noise]]. Allowed here: tier, about, energy, auto, "
+                 "model, equilibrium, "
                  "velocity, "
                  "shape, accuracy, discretisation, time, expect"},
         Override{"model.kind=honey",
