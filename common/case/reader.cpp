@@ -112,7 +112,7 @@ void Reader::refuse_missing(const std::string& key, const std::string& what) con
     for (const auto& [name, inner] : table_)
         if (const toml::table* table = inner.as_table(); table && table->contains(key))
             throw CaseErrors(
-                {{place(table->get(key)->source()), path_of(key),
+                {{place(table->find(key)->first.source()), path_of(key),
                   fmt::format("{} stands within [{}]; it belongs {}", key, path_of(std::string(name.str())),
                               path_.empty() ? "before the first table" : "under [" + path_ + "]"),
                   ""}});

@@ -215,7 +215,7 @@ class Refused(ProgramTest):
         self.assertIn("--output: a value is missing after it: result file", self.refused("run", self.case, "-o"))
         self.assertIn("RESULT: 2 are needed, 1 given", self.refused("compare", "x.hdf"))
         self.assertIn("--csv and --json cannot be given together", self.refused("show", "x.hdf", "--csv", "--json"))
-        self.assertIn("all of it stands in quotes: --set 'time", self.refused("run", self.case, "--set", "time.output=[0.1,", "0.2]"))
+        self.assertIn("a value with blanks stands in quotes: --set 'time", self.refused("run", self.case, "--set", "time.output=[0.1,", "0.2]"))
         words = self.refused("scan", self.case, "--over", "shape.length=4-8")
         self.assertRegex(words, "^--over shape.length=4-8: .*; --over takes a list, 0,0.1,0.2, or a range, lo:hi:n\n")
         for command in ("show", "plot", "view"):

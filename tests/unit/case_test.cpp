@@ -86,7 +86,8 @@ struct Override {
     std::string set, message;
 };
 void expect_refused(const std::vector<Override>& overrides) {
-    for (const auto& [set, message] : overrides) EXPECT_EQ(refusal(good, {set}), "--set " + set + ": " + message);
+    for (const auto& [set, message] : overrides)
+        EXPECT_EQ(refusal(good, {set}), "--set " + printable(set) + ": " + message);
 }
 
 TEST(CaseRefusal, ContentsOfAnotherKind) {
@@ -106,9 +107,9 @@ TEST(CaseRefusal, KeysThatStandElsewhere) {
                     Override{"energy.k42=0,1",
                              "energy.k42 must be a finite number, not the string \"0,1\"; decimals "
                              "have a point: 0.1"}});
-    EXPECT_EQ(
-        refusal(with("[shape]", "[velocity]\ninitial = \"rotation\"\nomega = 1.0\n[shape]")),
-        "case.toml:10:11: velocity.initial must be absent: only model.kind = \"fluid\" has a velocity at the start");
+    EXPECT_EQ(refusal(with("[shape]", "[velocity]\ninitial = \"rotation\"\nomega = 1.0\n[shape]")),
+              "case.toml:10:11: velocity.initial must be absent: only model.kind = \"fluid\" or \"auto\" has a "
+              "velocity at the start");
 }
 
 TEST(CaseRefusal, TextThatIsNoToml) {
@@ -536,7 +537,9 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42", form},
         Override{"=3", form},
         Override{"energy..k42=3", form},
-        Override{"time.output=[0.1", "not valid TOML: this [ is not closed by ]"},
+        Override{"time.output=[0.1",
+                 "not valid TOML: this [ is not closed by ]; a value with blanks stands in quotes: "
+                 "--set 'time.output=[1, 2]'"},
         Override{"about.title=\xff", "not valid TOML: Encountered invalid utf-8 sequence"},
         Override{"time.end.x=1", "time.end is neither a table nor a list, so it has no 'x'"},
         Override{"shape.mode.2.n=1", "shape.mode is a list of 1: '2' must be an index from 0 to 1 (1 adds an entry)"},
@@ -555,7 +558,9 @@ TEST(CaseRefusal, Overrides) {
         Override{"model.kind=honey",
                  "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not "
                  "\"honey\""},
-        Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
+        Override{
+            "shape.mode.1.n=2",
+            "missing key shape.mode.1.amplitude: a finite number; entries count from 0, so shape.mode.1 is a new one"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},
         Override{"time.output.1=0.1",
