@@ -142,7 +142,8 @@ Task task_of(const Case& c) {
     if (is_held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
     if (e.family) {
         if (task.start.topology != Topology::cell)
-            throw CaseError(fmt::format("{}: equilibrium.family: is of closed cells, and [shape] is none", c.path));
+            throw complaint(c, "equilibrium.family",
+                            "is of closed cells, and [shape] is none: leave it out, or start from an ellipsoid");
         task.start = start_of(*e.family, wanted_reduced_volume(held), held.area.value_or(area));
     }
     task.settings.accuracy = c.accuracy.energy;
@@ -154,7 +155,7 @@ Task task_of(const Case& c) {
         branch.from = start_of(*b.parameter, task.problem), branch.to = *b.to;
         branch.shapes = task.settings;
         if (const std::string wrong = wrong_branch(branch.from, branch.to, *b.step); !wrong.empty())
-            throw CaseError(fmt::format("{}: equilibrium.branch {}", c.path, wrong));
+            throw complaint(c, "equilibrium.branch", wrong);
         const double way = branch.to - branch.from;
         const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
         for (int i = 0; i <= steps; ++i)

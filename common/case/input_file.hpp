@@ -11,6 +11,9 @@ namespace tubule {
 // The contents of a regular file of at most `most` bytes. Throws CaseError, "PATH: why".
 std::string read_input(const std::filesystem::path& path, std::size_t most);
 
+// Why a file that is not there may be missing, or what was meant, to follow "PATH: No such file"; else empty.
+std::string why_missing(const std::filesystem::path& path);
+
 constexpr std::size_t megabyte = 1 << 20;
 
 }  // namespace tubule

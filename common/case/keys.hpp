@@ -55,6 +55,7 @@ using Choices = std::vector<std::pair<std::string, typename without_optional<T>:
 struct OpenNames {
     std::vector<std::string> listed;
     bool (*accepts)(std::string_view name);
+    std::string form;  // of each, in words
 };
 
 template <class Keys>
@@ -177,9 +178,11 @@ void keys(Keys& k, Model& model) {
 
 template <class Keys>
 void keys(Keys& k, Velocity& velocity, const Model& model) {
-    if (!model_entry(model.kind).inertia)
-        return k.absent("initial", "must be absent: only model.kind = " + quoted_names(&ModelEntry::inertia) +
-                                       " has a velocity at the start");
+    if (!model_entry(model.kind).inertia) {
+        k.absent("initial", "must be absent: only model.kind = " + quoted_names(&ModelEntry::inertia) +
+                                " has a velocity at the start");
+        return k.absent("omega", "must be absent as well");
+    }
     k.choice("initial", velocity.initial,
              {{"rest", InitialVelocity::rest},
               {"rotation", InitialVelocity::rotation},
@@ -331,8 +334,10 @@ void keys(Keys& k, Expect& expect, double end) {
     k.choice("stop", expect.stop, stops);
 
     // Of series "time", the end has the time of stopping, also called so; at a moment, `time` is that moment.
-    OpenNames in_end{expectable_series(), [](std::string_view n) { return n == "stop_time" || is_expectable(n); }};
-    OpenNames in_moment{expectable_series(), [](std::string_view n) { return n != "time" && is_expectable(n); }};
+    const std::string form = "a table, such as {value = 1.5, rel = 1e-3}";
+    OpenNames in_end{expectable_series(), [](std::string_view n) { return n == "stop_time" || is_expectable(n); },
+                     form};
+    OpenNames in_moment{expectable_series(), [](std::string_view n) { return n != "time" && is_expectable(n); }, form};
     in_end.listed.push_back("stop_time");
     in_moment.listed.erase(in_moment.listed.begin());
     for (Expectation& value : at_end)

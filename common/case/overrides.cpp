@@ -21,8 +21,12 @@ toml::table parse_value(const std::string& text, const std::string& source) {
     try {
         toml::table parsed = parse_toml("value = " + text, source);
         if (parsed.size() == 1) return parsed;  // else the text holds a line break and more keys
-    } catch (const CaseError&) {
-        if (meant_as_toml) throw;
+    } catch (const CaseError& error) {
+        const std::string words = error.what();
+        if (meant_as_toml)
+            throw CaseError(words + (words.find("is not closed by") == words.npos
+                                         ? ""
+                                         : "; a value with blanks stands in quotes: --set 'time.output=[1, 2]'"));
     }
     return parse_toml("value = " + toml_string(text), source);
 }

@@ -152,8 +152,11 @@ SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
     std::error_code error;
     if (!(c.input && !c.input->bytes.empty()) && !std::filesystem::is_regular_file(path, error))
         throw complaint(c, "shape.path", fmt::format("cannot be used: {}: there is no such file", path.string()));
+    const std::string bytes = shape_bytes(c, file.path, most_of_profile);
+    if (const auto other = no_plain_text(bytes); !other.empty())
+        throw CaseError(fmt::format("{}: is {}: save the points as CSV, plain text in UTF-8", path.string(), other));
     try {
-        return read_profile(path, shape_bytes(c, file.path, most_of_profile), file);
+        return read_profile(path, bytes, file);
     } catch (const ProfileError& error) {
         throw CaseError(error.what());
     }

@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/case/text.hpp"
 
 namespace tubule {
 
 // Bad input. The message starts with "file:line:column: " (or "--set key=value: " if an override
 // caused it), and says what is wrong, what is allowed and, for a near miss, what was probably meant.
 struct CaseError : std::runtime_error {
-    using std::runtime_error::runtime_error;
+    explicit CaseError(const std::string& what) : std::runtime_error(printable(what)) {}
 };
 
 // Reads and validates a case; `sets` are overrides "a.b=value" applied to it first. Throws CaseError.

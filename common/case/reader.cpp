@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <regex>
 
 #include "common/case/other_names.hpp"
 #include "common/case/overrides.hpp"
@@ -41,7 +42,14 @@ bool within(double x, const Range& range) {
 
 [[noreturn]] void refuse_value(const std::string& where, const std::string& path, const std::string& what,
                                const toml::node& node) {
-    throw CaseErrors({{where, path, fmt::format("{} must be {}, not {}", path, what, shown(node)), ""}});
+    static const std::regex with_comma(R"(\s*([+-]?\d+),(\d+)\s*)");
+    std::smatch number;
+    const auto* text = node.as_string();
+    const bool comma = text && std::regex_match(text->get(), number, with_comma);
+    throw CaseErrors({{where, path,
+                       fmt::format("{} must be {}, not {}{}", path, what, shown(node),
+                                   comma ? number.format("; decimals have a point: $1.$2") : ""),
+                       ""}});
 }
 
 std::string meant(const std::string& suggestion) {
@@ -96,12 +104,25 @@ const toml::node* Reader::find(const std::string& key, const std::string& what, 
         complaints_.keys_in_doubt = complaints_.keys_in_doubt || in_doubt;
         return nullptr;
     }
-    collect(
-        [&] {
-            throw CaseErrors({{where_, path_of(key), fmt::format("missing key {}: {}", path_of(key), what), ""}});
-        },
-        in_doubt);
+    collect([&] { refuse_missing(key, what); }, in_doubt);
     return nullptr;
+}
+
+void Reader::refuse_missing(const std::string& key, const std::string& what) const {
+    for (const auto& [name, inner] : table_)
+        if (const toml::table* table = inner.as_table(); table && table->contains(key))
+            throw CaseErrors(
+                {{place(table->find(key)->first.source()), path_of(key),
+                  fmt::format("{} stands within [{}]; it belongs {}", key, path_of(std::string(name.str())),
+                              path_.empty() ? "before the first table" : "under [" + path_ + "]"),
+                  ""}});
+    const std::string last = path_.substr(path_.rfind('.') + 1);
+    throw CaseErrors({{where_, path_of(key),
+                       fmt::format("missing key {}: {}{}", path_of(key), what,
+                                   where_.starts_with("--set ") && list_index(last)
+                                       ? fmt::format("; entries count from 0, so {} is a new one", path_)
+                                       : ""),
+                       ""}});
 }
 
 // Whether another word stands where this key was meant: it is not missing.
@@ -316,8 +337,8 @@ std::size_t Reader::one_of(const toml::node& node, const std::string& path,
     return static_cast<std::size_t>(found - names.begin());
 }
 
-const toml::table& Reader::as_table(const toml::node& node, const std::string& path) const {
-    if (!node.is_table()) refuse_value(where(node), path, "a table", node);
+const toml::table& Reader::as_table(const toml::node& node, const std::string& path, const std::string& what) const {
+    if (!node.is_table()) refuse_value(where(node), path, what, node);
     return *node.as_table();
 }
 

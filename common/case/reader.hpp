@@ -107,13 +107,13 @@ public:
 
     // An absent table is read like an empty one: required keys are missing, the rest have their defaults.
     template <class Describe>
-    void table(const std::string& key, const Describe& describe) {
-        const toml::node* node = find(key, "a table", false);
+    void table(const std::string& key, const Describe& describe, const std::string& what = "a table") {
+        const toml::node* node = find(key, what, false);
         if (pass_ == Pass::names || (!node && was_meant(key))) return;
         const toml::table absent;
         collect([&] {
-            read(node ? as_table(*node, path_of(key)) : absent, path_of(key), node ? where(*node) : where_, complaints_,
-                 describe);
+            read(node ? as_table(*node, path_of(key), what) : absent, path_of(key), node ? where(*node) : where_,
+                 complaints_, describe);
         });
     }
 
@@ -156,7 +156,8 @@ public:
             if (!names.accepts(key.str())) continue;
             T entry;
             entry.*name = key.str();
-            table(entry.*name, [&](Reader& k) { describe(k, entry); });
+            table(
+                entry.*name, [&](Reader& k) { describe(k, entry); }, names.form);
             target.push_back(std::move(entry));
         }
     }
@@ -189,6 +190,7 @@ private:
     }
     const toml::node* find(const std::string& key, const std::string& what, bool needed, bool in_doubt = false);
     bool was_meant(const std::string& key) const;
+    [[noreturn]] void refuse_missing(const std::string& key, const std::string& what) const;
     void refuse_unknown();
     void refuse(const std::string& key, const std::string& complaint);
 
@@ -203,7 +205,8 @@ private:
     double number_in(const toml::node& node, const std::string& path, const Range& range) const;
     int integer_in(const toml::node& node, const std::string& path, const Range& range) const;
     std::size_t one_of(const toml::node& node, const std::string& path, const std::vector<std::string>& names) const;
-    const toml::table& as_table(const toml::node& node, const std::string& path) const;
+    const toml::table& as_table(const toml::node& node, const std::string& path,
+                                const std::string& what = "a table") const;
     const toml::array& as_list(const toml::node& node, const std::string& path, const std::string& what) const;
 
     static std::string expected(const std::string& noun, const Range& range);

@@ -46,7 +46,11 @@ std::string toml_string(std::string_view text) {
     return result + '"';
 }
 
-std::string valid_utf8(std::string_view text) {
+namespace {
+
+// The text with something else for each byte that is not part of a UTF-8 character.
+template <class Else>
+std::string in_utf8(std::string_view text, const Else& other) {
     std::string valid;
     for (std::size_t i = 0; i < text.size();) {
         const auto byte = [&](std::size_t k) {
@@ -65,10 +69,36 @@ std::string valid_utf8(std::string_view text) {
         if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) || (first == 0xf0 && second < 0x90) ||
             (first == 0xf4 && second >= 0x90))
             length = 0;
-        valid += length > 0 ? text.substr(i, length) : "?";
+        valid += length > 0 ? std::string(text.substr(i, length)) : other(first);
         i += std::max<std::size_t>(length, 1);
     }
     return valid;
+}
+
+}  // namespace
+
+std::string valid_utf8(std::string_view text) {
+    return in_utf8(text, [](unsigned) { return "?"; });
+}
+
+std::string printable(std::string_view text) {
+    const auto escaped = [](unsigned byte) { return fmt::format("\\x{:02x}", byte); };
+    std::string out;
+    for (const char c : in_utf8(text, escaped)) {
+        const auto byte = static_cast<unsigned char>(c);
+        out += (byte < 0x20 && c != '\n') || byte == 0x7f ? escaped(byte) : std::string(1, c);
+    }
+    return out;
+}
+
+std::string_view no_plain_text(std::string_view bytes) {
+    using namespace std::literals;
+    if (bytes.starts_with("PK\x03\x04")) return "a zip archive, such as a spreadsheet";
+    if (bytes.starts_with("\x89HDF")) return "an HDF5 file, such as a result";
+    if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") ||
+        bytes.substr(std::min<std::size_t>(1, bytes.size())).starts_with("\0"sv))
+        return "text in UTF-16";
+    return bytes.find('\0') != bytes.npos ? "binary" : "";
 }
 
 std::vector<std::string> split(std::string_view text, char separator) {

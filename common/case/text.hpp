@@ -14,6 +14,12 @@ std::string toml_string(std::string_view text);
 // The text with '?' for every byte that is not part of a UTF-8 character: names of files can hold any bytes.
 std::string valid_utf8(std::string_view text);
 
+// The text with what no terminal should be given, control characters and bytes that are no UTF-8, as "\\x1b".
+std::string printable(std::string_view text);
+
+// What bytes are that are no plain text, in words; else empty.
+std::string_view no_plain_text(std::string_view bytes);
+
 // "a.b" gives {"a", "b"}; "" gives {""}.
 std::vector<std::string> split(std::string_view text, char separator);
 

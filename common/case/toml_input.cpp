@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "common/case/read.hpp"
+#include "common/case/text.hpp"
 #include "common/case/toml_mistakes.hpp"
 
 namespace tubule {
@@ -47,6 +48,8 @@ std::string place(const toml::source_region& source) {
 }
 
 toml::table parse_toml(const std::string& text, const std::string& path) {
+    if (const auto other = no_plain_text(text); !other.empty())
+        throw CaseError(fmt::format("{}: is {}: a case is plain text, saved as UTF-8", path, other));
     refuse_long_keys(text, path);
     try {
         return toml::parse(text, std::string_view(path));

@@ -243,9 +243,9 @@ std::optional<TomlMistake> toml_mistake(std::string_view text, std::size_t line,
             ++at;
         while (at < text.size() && !begins_character(text[at]));
     if (description.find("cannot redefine") != description.npos) return twice(text, begin, description);
-    if (description.find("escape sequence") != description.npos)
-        return TomlMistake{line, std::max<std::size_t>(column, 2) - 1,
-                           "\\ begins an escape within \"...\"; '...' takes text as it is"};
+    if (description.find("escape sequence") != description.npos || description.find("scalar seq") != description.npos)
+        return mistake_at(text, std::max(text.rfind('\\', at), begin),
+                          "\\ begins an escape within \"...\": write \\\\, or '...', which takes text as it is");
     if (raw.size() > longest_line) return std::nullopt;
     if (auto bracket = unclosed(text, at)) return bracket;
     std::size_t quote = 0;

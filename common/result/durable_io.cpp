@@ -9,6 +9,8 @@
 #include <cstring>
 #include <utility>
 
+#include "common/case/input_file.hpp"
+
 namespace tubule::durable {
 
 namespace {
@@ -30,7 +32,8 @@ void sync_directory(const std::filesystem::path& directory) {
 }  // namespace
 
 void fail(const char* verb, const std::filesystem::path& path, int error) {
-    throw Error(fmt::format("cannot {} {}: {}", verb, path.string(), std::strerror(error)));
+    throw Error(fmt::format("cannot {} {}: {}{}", verb, path.string(), std::strerror(error),
+                            error == ENOENT ? why_missing(path) : ""));
 }
 
 File::File(const std::filesystem::path& path, int flags) : path_(path) {

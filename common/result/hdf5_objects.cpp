@@ -221,6 +221,9 @@ Handle open_file(const std::filesystem::path& file) {
     while (true) {
         const durable::File looked_at(file, O_RDONLY);
         const bool has_checksums = require_whole(looked_at.descriptor(), file);
+        if (!has_checksums && H5Fis_hdf5(file.c_str()) <= 0)
+            throw std::runtime_error(
+                "is no result of tubule, but not even HDF5: give a file NAME.hdf that tubule wrote");
         const auto access = property_list(H5P_FILE_ACCESS);
         // A result never changes in place, so there is nothing to lock against; and on some file systems locks fail.
         H5Pset_file_locking(access, false, true);

@@ -420,7 +420,10 @@ Verification verify_result(const fs::path& file, const fs::path& rescued) {
     const Wholeness found = examine(file);
     Verification out;
     out.has_checksums = found.kind != Wholeness::Kind::unsealed;
-    if (!out.has_checksums) return out;
+    if (!out.has_checksums) {
+        if (!found.hdf5_size) require_result(file);  // which says what is wrong with it
+        return out;
+    }
     out.damage = found.damage;
     try {
         Contents contents = found.kind == Wholeness::Kind::whole ? read_hdf5(file) : what_is_left(file, found);

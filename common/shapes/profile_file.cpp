@@ -137,11 +137,13 @@ Columns columns_of(const std::filesystem::path& path, int line, const std::vecto
 Point point_of(const std::filesystem::path& path, int line, const std::vector<Cell>& row, const Columns& columns) {
     if (row.size() != columns.count)
         refuse(path, {line, row[std::min(row.size() - 1, columns.count)].column},
-               fmt::format("has {} value{} where {} are expected: r, z{}", row.size(), row.size() == 1 ? "" : "s",
-                           columns.count, columns.H0 ? ", H0" : ""));
+               fmt::format("has {} value{} where {} are expected: r, z{}{}", row.size(), row.size() == 1 ? "" : "s",
+                           columns.count, columns.H0 ? ", H0" : "",
+                           row.size() == 2 * columns.count ? "; decimals have a point, not a comma" : ""));
     const auto value = [&](std::size_t column, const char* name) {
         const auto& [text, at] = row[column];
-        if (text.empty()) refuse(path, {line, at}, fmt::format("{} is missing", name));
+        if (text.empty())
+            refuse(path, {line, at}, fmt::format("{} is missing: complete the line, or leave it out", name));
         const auto found = number_in(text);
         if (!found)
             refuse(path, {line, at},
@@ -216,6 +218,22 @@ void refuse_crossing(const std::filesystem::path& path, const std::vector<Point>
         }
 }
 
+// Points that are none of half a profile, or in no order, are told from profiles that are not closed.
+void refuse_disorder(const std::filesystem::path& path, const std::vector<Point>& points, double size) {
+    const auto negative = std::ranges::find_if(points, [&](const Point& p) { return p.r < -at_end * size; });
+    if (negative != points.end())
+        refuse(path, negative->at,
+               fmt::format("r = {:.6g} is below 0, but it is the distance from the axis: {}", negative->r,
+                           std::ranges::all_of(points, [&](const Point& p) { return p.z > -at_end * size; })
+                               ? "are the columns r and z swapped?"
+                               : "give the half of the outline with r >= 0"));
+    for (std::size_t i = 1; i < points.size(); ++i)
+        if (const double away = std::hypot(points[i].r - points[i - 1].r, points[i].z - points[i - 1].z);
+            away > size / 2)
+            refuse(path, points[i].at,
+                   fmt::format("is {:.3g} from the point before: points must be in order along the profile", away));
+}
+
 // What the ends say, and points that fit: from the south upwards on the outside, with both ends.
 Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points, const ProfileFile& file,
                   double tolerance) {
@@ -244,6 +262,7 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
         kind = Kind::ring;
         points.back().r = points.front().r, points.back().z = points.front().z;
     } else {
+        refuse_disorder(path, points, size);
         refuse(path, points.back().at,
                fmt::format(
                    "the profile is not closed: r = {:.6g} at its first and {:.6g} at its last point; it must begin "

@@ -109,7 +109,8 @@ void check_edges(const ImportedMesh& in, const std::vector<HalfEdge>& edges) {
                                edge, triangle_name(in, e.triangle), open));
     }
     if (count == 2) {
-        refuse(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}",
+        refuse(in, fmt::format("inconsistently oriented: {} and {} traverse the same direction along the {}; turn one "
+                               "of them, or let shape.remesh do so",
                                triangle_name(in, e.triangle), triangle_name(in, edges[first + 1].triangle), edge));
     }
     refuse(in, fmt::format("non-manifold edge: the {} belongs to {} triangles, among them {}, {} and {}", edge, count,

@@ -91,6 +91,11 @@ FileMesh read_off(const std::string& name, std::string_view text) {
     FileMesh mesh;
     for (std::int64_t i = 0; i < points; ++i) {
         if (!reader.next_line()) reader.fail_end(fmt::format("vertex {} of {}", i, points));
+        if (i == faces && reader.words().size() == 4 && reader.words()[0].text == "3")
+            reader.fail_line(
+                fmt::format("vertex {} has four numbers, as a face: are the numbers of vertices and faces, "
+                            "{} and {}, swapped in the header?",
+                            i, points, faces));
         mesh.points.push_back(reader.point(0));  // normals, colours and textures come after
     }
     for (std::int64_t i = 0; i < faces; ++i) {
@@ -99,7 +104,10 @@ FileMesh read_off(const std::string& name, std::string_view text) {
         const std::int64_t n = reader.integer(line[0]);
         if (n < 3) reader.fail(line[0], fmt::format("a face needs three vertices, this one has {}", n));
         if (n > std::int64_t(line.size()) - 1)
-            reader.fail(line[0], fmt::format("the line has fewer than the {} vertices of this face", n));
+            reader.fail(line[0],
+                        fmt::format("the line has fewer than the {} vertices of this face, {} of {}; is the file "
+                                    "complete?",
+                                    n, i, faces));
         std::vector<FileCorner>& face = mesh.faces.emplace_back();
         for (std::int64_t j = 1; j <= n; ++j) face.push_back({reader.integer(line[j]), line[j].place});
     }

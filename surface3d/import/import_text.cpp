@@ -102,7 +102,7 @@ void TextReader::fail_line(const std::string& message) const {
 }
 
 void TextReader::fail_end(const std::string& what) const {
-    throw MeshError(at(name_, {line_ + 1, 1, text_.size()}) + "the file ends; expected " + what);
+    throw MeshError(at(name_, {line_ + 1, 1, text_.size()}) + "the file ends; expected " + what + "; is it complete?");
 }
 
 bool is_keyword(std::string_view word, std::string_view lower) {

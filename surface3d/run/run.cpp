@@ -94,6 +94,7 @@ public:
             if (!measured_) throw;
             summary_.stop = pause_report(pause, 0);
             summary_.stop.message += ", before a finer mesh was measured";
+            summary_.stop.advice = paused_at_start(pause).stop.advice;  // nothing of it is continued
             return summary_;
         }
         const Observables& o = measured_->o;

@@ -130,7 +130,7 @@ TEST(CloseMesh, RefusesMixedOrientation) {
     EXPECT_EQ(refusal_of_obj(corners + "f 1 3 2\nf 1 2 4\nf 2 4 3\nf 3 1 4\n"),
               "a.obj: inconsistently oriented: triangle 1 (line 5) and triangle 3 (line 7) traverse the same direction "
               "along the "
-              "edge from vertex 3 (0, 1, 0) to vertex 2 (1, 0, 0)");
+              "edge from vertex 3 (0, 1, 0) to vertex 2 (1, 0, 0); turn one of them, or let shape.remesh do so");
 }
 
 TEST(CloseMesh, RefusesDegenerateTriangles) {

@@ -137,21 +137,26 @@ TEST(Obj, Refusals) {
 
 TEST(Off, Refusals) {
     const std::string head = "OFF\n# a comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
-    expect_refusals("a.off", {{"3 1 0\n", ":1:1: an OFF file begins with the word OFF"},
-                              {"\n# nothing\n", ":3:1: the file ends; expected the word OFF"},
-                              {"4OFF\n3 1 0\n", ":1:1: only three-dimensional OFF is supported"},
-                              {"OFF BINARY\n", ":1:1: binary OFF is not supported"},
-                              {"OFF\n", ":2:1: the file ends; expected the numbers of vertices and faces"},
-                              {"OFF 3\n", ":1:5: expected the numbers of vertices, faces (and edges)"},
-                              {"OFF\n-3 1 0\n", ":2:1: the number of vertices must not be negative"},
-                              {"OFF\n3 -1 0\n", ":2:3: the number of faces must not be negative"},
-                              {"OFF 3 1 0\n0 0 0\n1 0 0", ":4:1: the file ends; expected vertex 2 of 3"},
-                              {"OFF 3 1 0\n0 0\n", ":2:1: a point needs three coordinates"},
-                              {head, ":7:1: the file ends; expected face 0 of 1"},
-                              {head + "2 0 1\n", ":7:1: a face needs three vertices, this one has 2"},
-                              {head + "4 0 1 2\n", ":7:1: the line has fewer than the 4 vertices of this face"},
-                              {head + "3 0 1 3\n", ":7:7: the face uses vertex 3, but vertices are numbered 0 to 2"},
-                              {head + "3 0 1 2\n3 0 2 1\n", ":8:1: the file continues after its 1 faces"}});
+    expect_refusals("a.off",
+                    {{"3 1 0\n", ":1:1: an OFF file begins with the word OFF"},
+                     {"\n# nothing\n", ":3:1: the file ends; expected the word OFF; is it complete?"},
+                     {"4OFF\n3 1 0\n", ":1:1: only three-dimensional OFF is supported"},
+                     {"OFF BINARY\n", ":1:1: binary OFF is not supported"},
+                     {"OFF\n", ":2:1: the file ends; expected the numbers of vertices and faces; is it complete?"},
+                     {"OFF 3\n", ":1:5: expected the numbers of vertices, faces (and edges)"},
+                     {"OFF\n-3 1 0\n", ":2:1: the number of vertices must not be negative"},
+                     {"OFF\n3 -1 0\n", ":2:3: the number of faces must not be negative"},
+                     {"OFF 3 1 0\n0 0 0\n1 0 0", ":4:1: the file ends; expected vertex 2 of 3; is it complete?"},
+                     {"OFF 3 1 0\n0 0\n", ":2:1: a point needs three coordinates"},
+                     {head, ":7:1: the file ends; expected face 0 of 1; is it complete?"},
+                     {head + "2 0 1\n", ":7:1: a face needs three vertices, this one has 2"},
+                     {head + "4 0 1 2\n",
+                      ":7:1: the line has fewer than the 4 vertices of this face, 0 of 1; is the file complete?"},
+                     {"OFF\n4 2 0\n0 0 0\n1 0 0\n3 0 1 2\n",
+                      ":5:1: vertex 2 has four numbers, as a face: are the numbers of vertices and faces, 4 and 2, "
+                      "swapped in the header?"},
+                     {head + "3 0 1 3\n", ":7:7: the face uses vertex 3, but vertices are numbered 0 to 2"},
+                     {head + "3 0 1 2\n3 0 2 1\n", ":8:1: the file continues after its 1 faces"}});
 }
 
 // A PLY header of three vertices (float x y z) and one face, with one line exchanged.
@@ -167,7 +172,7 @@ TEST(Ply, Refusals) {
     expect_refusals(
         "a.ply",
         {{"solid\n", ":1:1: a PLY file begins with the word ply"},
-         {"ply\nformat ascii 1.0\n", ":3:1: the file ends; expected end_header"},
+         {"ply\nformat ascii 1.0\n", ":3:1: the file ends; expected end_header; is it complete?"},
          {ply_head("ascii", "utf8"),
           ":9:1: the header must name a format (ascii, binary_little_endian or binary_big_endian)"},
          {ply_head("float y", "real y"), ":5:10: unknown type 'real'"},
@@ -183,8 +188,8 @@ TEST(Ply, Refusals) {
           ":9:1: the header needs one element 'face' with one list vertex_indices (or vertex_index)"},
          {ply_head("uchar int", "uchar float"), ":9:1: the vertex indices of faces must have an integer type"},
          {ply_head() + "0 0 0\n1 0 inf\n", ":11:5: 'inf' is not a finite number"},
-         {ply_head() + "0 0 0\n1 0 0\n", ":12:1: the file ends; expected vertex 2 of 3"},
-         {ply_head() + points + "3 0 1\n", ":14:1: the file ends; expected face 0 of 1"},
+         {ply_head() + "0 0 0\n1 0 0\n", ":12:1: the file ends; expected vertex 2 of 3; is it complete?"},
+         {ply_head() + points + "3 0 1\n", ":14:1: the file ends; expected face 0 of 1; is it complete?"},
          {ply_head() + points + "2 0 1\n", ":13:1: a face needs three vertices, this one has 2"},
          {ply_head() + points + "3 0 1 7\n", ":13:7: the face uses vertex 7, but vertices are numbered 0 to 2"},
          {ply_head() + points + "3 0 1 2\n3 0 2 1\n",
@@ -223,8 +228,8 @@ TEST(Stl, Refusals) {
     const std::string begin = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n";
     expect_refusals(
         "a.stl",
-        {{"solid\n", ":2:1: the file ends; expected 'facet' or 'endsolid'"},
-         {begin, ":6:1: the file ends; expected 'vertex'"},
+        {{"solid\n", ":2:1: the file ends; expected 'facet' or 'endsolid'; is it complete?"},
+         {begin, ":6:1: the file ends; expected 'vertex'; is it complete?"},
          {begin + "vertex 0 1 0 1\n", ":6:14: a point has three coordinates"},
          {begin + "vertex 0 1\n", ":6:1: a point needs three coordinates"},
          {begin + "vertex 0 1 0\nvertex 1 1 0\n", ":7:1: expected 'endloop'"},
@@ -281,7 +286,7 @@ TEST(ReadMesh, RefusesWhatIsNoMeshFile) {
     EXPECT_EQ(message("none.obj"), "none.obj: cannot be opened: No such file or directory");
     EXPECT_EQ(message("scan.vtk"), "scan.vtk: the extension must be .obj, .off, .ply or .stl");
     std::filesystem::create_directory(directory.path() / "folder.obj");
-    EXPECT_EQ(message("folder.obj"), "folder.obj: is a directory, not a file");
+    EXPECT_EQ(message("folder.obj"), "folder.obj: is a directory: give a file in it");
     directory.write("empty.ply", "");
     directory.write("bare.off", "OFF 0 1 0\n3 0 1 2\n");
     EXPECT_EQ(message("bare.off"), "bare.off: the file contains no vertices");

@@ -86,7 +86,30 @@ struct Override {
     std::string set, message;
 };
 void expect_refused(const std::vector<Override>& overrides) {
-    for (const auto& [set, message] : overrides) EXPECT_EQ(refusal(good, {set}), "--set " + set + ": " + message);
+    for (const auto& [set, message] : overrides)
+        EXPECT_EQ(refusal(good, {set}), "--set " + printable(set) + ": " + message);
+}
+
+TEST(CaseRefusal, ContentsOfAnotherKind) {
+    const std::string text = ": a case is plain text, saved as UTF-8";
+    EXPECT_EQ(refusal("PK\x03\x04..."), "case.toml: is a zip archive, such as a spreadsheet" + text);
+    EXPECT_EQ(refusal({'t', '\0', 'i', '\0'}), "case.toml: is text in UTF-16" + text);
+    EXPECT_EQ(refusal("tier = \"a\x1b[31m\xff\"\n").find_first_of("\x1b\xff"), std::string::npos);
+}
+
+TEST(CaseRefusal, KeysThatStandElsewhere) {
+    std::string late = good.substr(good.find('\n') + 1) + "tier = \"axisym\"\n";
+    EXPECT_EQ(refusal(late.replace(late.find("[expect]"), 0, "tier = \"axisym\"\n").substr(0, late.size() - 16)),
+              "case.toml:22:1: tier stands within [time]; it belongs before the first table");
+    expect_refused({Override{"shape.mode.1.amplitude=0.3",
+                             "missing key shape.mode.1.n: an integer >= 0 and <= 10000; "
+                             "entries count from 0, so shape.mode.1 is a new one"},
+                    Override{"energy.k42=0,1",
+                             "energy.k42 must be a finite number, not the string \"0,1\"; decimals "
+                             "have a point: 0.1"}});
+    EXPECT_EQ(refusal(with("[shape]", "[velocity]\ninitial = \"rotation\"\nomega = 1.0\n[shape]")),
+              "case.toml:10:11: velocity.initial must be absent: only model.kind = \"fluid\" or \"auto\" has a "
+              "velocity at the start");
 }
 
 TEST(CaseRefusal, TextThatIsNoToml) {
@@ -122,7 +145,11 @@ TEST(CaseRefusal, TextThatIsNoToml) {
         Edit{"\"tube\"", "\u201ctube\u201d", "10:8: not valid TOML: quotes are straight: \"text\""},
         Edit{"\"tube\"", "\"tube", "10:8: not valid TOML: this quote is not closed"},
         Edit{"\"test\"", "\"C:\\data\"",
-             "3:12: not valid TOML: \\ begins an escape within \"...\"; '...' takes text as it is"},
+             "3:12: not valid TOML: \\ begins an escape within \"...\": write \\\\, or '...', which takes text as it "
+             "is"},
+        Edit{"title = \"test\"", "title = \"C:\\users\"",
+             "3:12: not valid TOML: \\ begins an escape within \"...\": write \\\\, or '...', which takes text as it "
+             "is"},
         Edit{"[0.1, 0.2]", "[0.1 0.2]", "22:14: not valid TOML: numbers of a list are separated by commas: [1, 2]"},
         Edit{"[0.1, 0.2]", "(0.1, 0.2)", "22:11: not valid TOML: a list stands in square brackets: [0.1, 0.2]"},
         Edit{"[0.1, 0.2]", "0:1:10", "22:10: not valid TOML: a range stands in quotes: \"0:1:10\""},
@@ -262,7 +289,8 @@ TEST(CaseRefusal, WrongTypes) {
         Edit{"[0.1, 0.2]", "[0.1, \"b\"]",
              "22:16: time.output.1 must be a number >= 0 and <= 1.4 (time.end), not the "
              "string \"b\""},
-        Edit{"{value = 1.0, rel = 1e-6}", "1.0", "24:10: expect.energy must be a table, not 1.0"},
+        Edit{"{value = 1.0, rel = 1e-6}", "1.0",
+             "24:10: expect.energy must be a table, such as {value = 1.5, rel = 1e-3}, not 1.0"},
         Edit{"[[expect.at]]", "[expect.at]", "25:1: expect.at must be a list of tables, [[expect.at]], not a table"},
     });
 }
@@ -466,7 +494,7 @@ TEST(CaseRefusal, Files) {
         return "accepted";
     };
     const std::filesystem::path folder = testing::TempDir();
-    EXPECT_EQ(message(folder), folder.string() + ": is a directory, not a file");
+    EXPECT_EQ(message(folder), folder.string() + ": is a directory: give a file in it");
     EXPECT_EQ(message("/dev/zero"), "/dev/zero: is a pipe or a device, not a file: save its contents to a file first");
     const std::filesystem::path pipe = folder / "pipe.toml", huge = folder / "huge.toml";
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
@@ -517,7 +545,9 @@ TEST(CaseRefusal, Overrides) {
         Override{"energy.k42", form},
         Override{"=3", form},
         Override{"energy..k42=3", form},
-        Override{"time.output=[0.1", "not valid TOML: this [ is not closed by ]"},
+        Override{"time.output=[0.1",
+                 "not valid TOML: this [ is not closed by ]; a value with blanks stands in quotes: "
+                 "--set 'time.output=[1, 2]'"},
         Override{"about.title=\xff", "not valid TOML: Encountered invalid utf-8 sequence"},
         Override{"time.end.x=1", "time.end is neither a table nor a list, so it has no 'x'"},
         Override{"shape.mode.2.n=1", "shape.mode is a list of 1: '2' must be an index from 0 to 1 (1 adds an entry)"},
@@ -536,7 +566,9 @@ TEST(CaseRefusal, Overrides) {
         Override{"model.kind=honey",
                  "model.kind must be one of \"gradient-flow\", \"overdamped\", \"stokes\", \"fluid\", \"auto\", not "
                  "\"honey\""},
-        Override{"shape.mode.1.n=2", "missing key shape.mode.1.amplitude: a finite number"},
+        Override{
+            "shape.mode.1.n=2",
+            "missing key shape.mode.1.amplitude: a finite number; entries count from 0, so shape.mode.1 is a new one"},
         Override{"accuracy.r_min=0.8",
                  "accuracy.r_min must be below the smallest radius of the start (0.7 at z = 1), not 0.8"},
         Override{"time.output.1=0.1",

@@ -574,7 +574,7 @@ TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
         EXPECT_THROW(read_result(file), std::runtime_error);
     };
     std::ofstream(file) << "tier = \"axisym\"\n";
-    expect_refused("HDF5 cannot open it");
+    expect_refused("is no result of tubule");
     EXPECT_EQ(fs::file_size(file), 16u);
 
     python("h5py.File(name, 'w').create_group('series')");

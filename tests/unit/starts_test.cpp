@@ -130,6 +130,16 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     EXPECT_EQ(refusal(half + "1,0,2\n" + rest), "p.csv:4:5: has 3 values where 2 are expected: r, z");
     EXPECT_EQ(refusal("a,b\n" + half + rest), "p.csv:1:1: a heading must name the columns r and z");
     EXPECT_EQ(refusal(half), "p.csv:3:1: 3 points are too few: a profile needs 9");
+    EXPECT_EQ(refusal(half + "1,0;2,0\n" + rest),
+              "p.csv:4:5: has 4 values where 2 are expected: r, z; decimals have a point, not a comma");
+    const std::string open = "0,-1\n.1,-1\n.2,-.9\n.3,-.8\n.4,-.7\n.5,-.6\n.6,-.4\n.5,-.2\n";
+    EXPECT_EQ(refusal(open + "0,9\n.4,0\n"),
+              "p.csv:9:1: is 9.21 from the point before: points must be in order along the profile");
+    EXPECT_EQ(refusal(open + "-.2,0\n"),
+              "p.csv:9:1: r = -0.2 is below 0, but it is the distance from the axis: give the half of the outline with "
+              "r >= 0");
+    EXPECT_EQ(refusal("-1,0\n-1,.1\n-.9,.2\n-.8,.3\n-.7,.4\n-.6,.5\n-.4,.6\n-.2,.5\n.2,0\n"),
+              "p.csv:1:1: r = -1 is below 0, but it is the distance from the axis: are the columns r and z swapped?");
     EXPECT_EQ(refusal(half + "-.1,0\n" + rest), "p.csv:4:1: r = -0.1: the profile meets the axis");
     EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before; remove one of the two");
     EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6:1: the profile crosses itself"), std::string::npos);
@@ -261,7 +271,7 @@ TEST_F(ProfileFiles, BadColumnsOfH0AreRefusedWithTheirPlace) {
         for (int i = 1; i < 5; ++i) from = rows.find('\n', from) + 1;
         return rows.substr(0, from) + line + rows.substr(rows.find('\n', from));
     };
-    EXPECT_EQ(refusal(with_line_5(".5,-.8,")), "p.csv:5:8: H0 is missing");
+    EXPECT_EQ(refusal(with_line_5(".5,-.8,")), "p.csv:5:8: H0 is missing: complete the line, or leave it out");
     EXPECT_EQ(refusal(with_line_5(".5,-.8, , ")), "p.csv:5:10: has 4 values where 3 are expected: r, z, H0");
     EXPECT_EQ(refusal(with_line_5(".5 -.8")), "p.csv:5:4: has 2 values where 3 are expected: r, z, H0");
     EXPECT_EQ(refusal(with_line_5(".5,-.8,nan")), "p.csv:5:8: 'nan' is not a finite number");

@@ -97,8 +97,11 @@ Case chosen_case(const Case& c, const CheckOptions& options, Checked& out) {
 Checked checked(const std::string& path, const CheckOptions& options) {
     Checked out;
     out.path = path;
+    bool chooses = false;
     try {
         const Case given = read_case(path, options.sets);
+        chooses = given.model.kind == ModelKind::automatic;
+        const PauseWatch watch(given.time.limit, interrupted);
         out.toml = effective_toml(given);
         if (const std::string falls = unbounded_below(given.energy); !falls.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
@@ -119,8 +122,8 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         out.complaints = {{"", "", error.what(), ""}};
     } catch (const Paused& pause) {
         if (pause.reason == Stop::interrupted) throw;
-        out.unknown = fmt::format("trial runs that choose the model reach the time limit of {} s (time.limit)",
-                                  pause.limit.value());
+        out.unknown = fmt::format("trial runs {}reach the time limit of {} s (time.limit)",
+                                  chooses ? "that choose the model " : "", pause.limit.value());
     } catch (const std::exception& error) {
         out.unknown = explanation(error);
     }
@@ -130,7 +133,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
 void tell(const Checked& c, bool quick) {
     if (!c.valid()) {
         for (const Complaint& one : c.complaints)
-            say(stderr, "{}{}{}\n", one.place, one.place.empty() ? "" : ": ", one.what);
+            say(stderr, "{}\n", printable(one.place + (one.place.empty() ? "" : ": ") + one.what));
         return;
     }
     std::string answer = fmt::format("# OK {}\n{}", shown_path(c.path), c.toml);

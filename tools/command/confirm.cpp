@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 #include "common/solve/interrupt.hpp"
@@ -176,7 +177,8 @@ void check(const ConfirmOptions& options) {
         refuse(fmt::format("--end must be above 0, not {}", *options.choices.end));
     std::error_code error;
     if (!fs::exists(options.scan, error))
-        throw CaseError(fmt::format("{}: {}", options.scan, error ? error.message() : "no such file"));
+        throw CaseError(
+            fmt::format("{}: {}", options.scan, error ? error.message() : "no such file" + why_missing(options.scan)));
     if (!is_scan(options.scan))
         throw CaseError(options.scan + ": is not a result of tubule scan, which is made with tubule scan FILE");
 }

@@ -9,9 +9,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <exception>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/case/read.hpp"
@@ -41,11 +43,13 @@ std::string version() {
 }
 
 // `tubule help COMMAND` is `tubule COMMAND --help`.
-std::vector<const char*> arguments_of(int argc, char** argv) {
+std::vector<const char*> arguments_of(int argc, char** argv, const CLI::App& app) {
     std::vector<const char*> arguments(argv, argv + argc);
     if (argc < 2 || std::string_view(argv[1]) != "help") return arguments;
     arguments.erase(arguments.begin() + 1);
-    arguments.push_back("--help");
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    const auto known = [&](const CLI::App* one) { return one->get_name() == arguments.back(); };
+    if (argc != 3 || std::ranges::any_of(commands, known)) arguments.push_back("--help");
     return arguments;
 }
 
@@ -83,6 +87,26 @@ std::string unexpected_words(const CLI::App& app) {
                        words.empty() ? "" : meant_by(words.front(), *command), name);
 }
 
+// The complaint of CLI11 about an option or a file, in plain words, with what is meant by it.
+std::string plain_words(const std::string& complaint, const CLI::App& app) {
+    constexpr std::pair<const char*, const char*> forms[]{
+        {R"((\S+): \d+ required \S+ missing)", "$1: a value is missing after it"},
+        {R"((\S+): At least (\d+) required but received (\d+))", "$1: $2 are needed, $3 given"},
+        {R"((\S+): Value (\S+) not in range (\S+) to (\S+))", "$1: $2 is not a number from $3 to $4"},
+        {R"((\S+) is required)", "$1 is missing"},
+        {R"(Could not convert: (\S+) = ?(.*))", "$1: '$2' is not a value that it takes"},
+        {R"((\S+) excludes (\S+))", "$1 and $2 cannot be given together"},
+        {R"((\S+) requires (\S+))", "$1 needs $2"}};
+    const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands().front();
+    std::smatch parts;
+    for (const auto& [form, words] : forms) {
+        if (!std::regex_match(complaint, parts, std::regex(form))) continue;
+        const CLI::Option* option = command.get_option_no_throw(parts[1]);
+        return parts.format(words) + (option ? ": " + option->get_description() : "");
+    }
+    return complaint;
+}
+
 // In all commands: -o without a name would be no -o, and a blank is no name that anybody means.
 void refuse_blank_outputs(CLI::App& app) {
     const auto blank = [](const std::string& name) {
@@ -110,7 +134,7 @@ int run(int argc, char** argv) {
     // Last, since subcommands would inherit it.
     end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {
-        const std::vector<const char*> arguments = arguments_of(argc, argv);
+        const std::vector<const char*> arguments = arguments_of(argc, argv, app);
         app.parse(static_cast<int>(arguments.size()), arguments.data());
     } catch (const CLI::ExtrasError&) {
         put_words(stderr, unexpected_words(app));
@@ -118,7 +142,7 @@ int run(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {  // --help, too
         std::ostringstream out, complaint;
         const bool answers = app.exit(error, out, complaint) == 0;
-        put_words(stderr, complaint.str());
+        if (!answers) put_words(stderr, plain_words(error.what(), app) + "\nRun with --help for more information.\n");
         print_answer(out.str());
         return answers ? 0 : 2;
     }

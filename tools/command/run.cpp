@@ -463,7 +463,9 @@ Job job_of(const std::string& path, const RunOptions& options) {
 
 int run_cases(const RunOptions& options) {
     if (!options.output.empty() && options.cases.size() > 1)
-        throw CaseError("-o names one result file, but there are several cases");
+        throw CaseError(
+            "-o names one result file, but there are several cases: leave it out, and each result has the name of its "
+            "case");
     catch_interrupts();
     std::vector<Job> jobs;  // all are read before any is run: bad input leaves nothing half done
     std::set<std::filesystem::path> files;

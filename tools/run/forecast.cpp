@@ -32,7 +32,7 @@ double memory_in_use() {
 }
 
 Forecast by_its_beginning(Case c) {
-    c.time.limit = pilot_limit;
+    c.time.limit = std::min(pilot_limit, 0.5 * c.time.limit.value_or(pilot_limit / 0.5));
     const auto engine = engine_for(c);
     Pilot pilot;
     const auto begin = std::chrono::steady_clock::now();

@@ -197,6 +197,16 @@ void refuse_doubled_keys(const Scan& scan) {
             throw CaseError(fmt::format("{}: --set {}: the scan varies {}", scan.path, set, key));
 }
 
+// Words about the keys of an axis, which nobody has --set.
+std::string as_over(std::string words, const Axis& axis) {
+    bool found = false;
+    for (const std::string& key : axis.keys)
+        for (std::size_t at; (at = words.find("--set " + key + "=")) != words.npos; found = true)
+            words.replace(at, 5, "--over");
+    const bool is_number = axis.size() > 1 || number_of(axis.values.front().front());
+    return words + (found && !is_number ? "; --over takes a list, 0,0.1,0.2, or a range, lo:hi:n" : "");
+}
+
 // Every value of every axis on its own, the other axes at their first.
 void check_points(const Scan& scan) {
     std::size_t stride = scan.size();
@@ -204,7 +214,13 @@ void check_points(const Scan& scan) {
         stride /= axis.size();
         for (std::size_t i = 0; i < axis.size(); ++i) {
             check_pause();
-            const Case c = scan.case_of(i * stride);
+            const Case c = [&] {
+                try {
+                    return scan.case_of(i * stride);
+                } catch (const CaseError& error) {
+                    throw CaseError(as_over(error.what(), axis));
+                }
+            }();
             if (c.equilibrium && c.equilibrium->branch.parameter)
                 throw CaseError(
                     fmt::format("{}: a point of a scan is one shape: equilibrium.branch must be absent, and "
