@@ -81,7 +81,7 @@ FlowSystem GraphAttempt::system() {
 
 void GraphAttempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step) {
     if (flow_) {
-        past_.dissipated += flow_->dissipated(flow_->time());
+        past_.dissipated = dissipated(flow_->time());
         past_.counters += flow_->counters();
     }
     TimeControl control;
@@ -97,6 +97,7 @@ void GraphAttempt::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v,
         flow_ = std::make_unique<BdfFlow>(system(), x, v, t, control);
     stage_->transport.begin(flow_->x(), flow_->v());
     error_.begin(observe(t, flow_->x(), flow_->v()));
+    dissipated_.begin(t, now_.o.dissipation);
     if (!least_symbol_) least_symbol_ = least_symbol_of(case_.energy, now_.o);
     good_.x = x;
     good_.time = t;
@@ -283,7 +284,10 @@ std::optional<StopReport> GraphAttempt::step() {
     const StopReport given_up{Stop::resolution_lost, t, "the error exceeds the requested accuracy", ""};
     if (outcome == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
     const Observation o = observe(t, flow_->x(), flow_->v());
-    if (t > before) stage_->transport.add_step(*flow_, before, is_one_step());
+    if (t > before) {
+        stage_->transport.add_step(*flow_, before, is_one_step());
+        dissipated_.add(t, o.dissipation);
+    }
     if (const auto rise = find_rise(o)) return rise;
     const bool due = error_.due(o, is_one_step());
     if ((due || outcome != Flow::Outcome::step) && must_give_up(o)) return given_up;

@@ -8,6 +8,7 @@
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_start.hpp"
 #include "axisym/integration/rosenbrock_flow.hpp"
+#include "axisym/integration/step_integral.hpp"
 #include "axisym/splines/band_lu.hpp"
 #include "common/solve/sparse.hpp"
 #include "tests/axisym/runs.hpp"
@@ -117,6 +118,31 @@ TEST(Rosenbrock, leavesDegenerateFlowsToIda) {
     EXPECT_NE(mixed.summary.warnings[0].find("IDA has integrated the run"), std::string::npos);
     EXPECT_LE(mixed.summary.estimated_error, 1e-4);
     EXPECT_NEAR(mixed.summary.energy, other.summary.energy, 1e-4 * mixed.summary.reference_energy);
+}
+
+// INT t^4 dt from where five points are known: exact. Of exp(-t), steps of h: order 5.
+TEST(StepIntegral, isOfOrderFive) {
+    StepIntegral fourth;
+    fourth.begin(0, 0);
+    for (const double t : {0.1, 0.3, 0.4, 0.8}) fourth.add(t, std::pow(t, 4));
+    const double known = fourth.at(0.8) - fourth.at(0.4);
+    EXPECT_NEAR(known, (std::pow(0.8, 5) - std::pow(0.4, 5)) / 5, 1e-15);
+    double last = 0;
+    for (const int n : {20, 40, 80}) {
+        StepIntegral decay;
+        double begin = 0;
+        decay.begin(0, 1);
+        for (int i = 1; i <= n; ++i) {
+            decay.add(2.0 * i / n, std::exp(-2.0 * i / n));
+            if (i == n / 4) begin = decay.at(0.5);
+        }
+        const double error = std::abs(decay.at(2) - begin - (std::exp(-0.5) - std::exp(-2)));
+        if (last > 0) {
+            EXPECT_NEAR(std::log2(last / error), 5, 0.3) << n;
+        }
+        last = error;
+    }
+    EXPECT_LE(last, 1e-9);
 }
 
 // With planes of symmetry and without, against Eigen's dense solver.
