@@ -98,6 +98,12 @@ std::string_view no_plain_text(std::string_view bytes) {
     if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") ||
         bytes.substr(std::min<std::size_t>(1, bytes.size())).starts_with("\0"sv))
         return "text in UTF-16";
+    const auto has_line = [&](std::string_view word) {
+        const std::size_t at = bytes.find(word);
+        return at != bytes.npos && (at == 0 || bytes[at - 1] == '\n') &&
+               bytes.substr(at + word.size()).starts_with("\n");
+    };
+    if (has_line("vertices") && has_line("edges")) return "a file of Surface Evolver (meshes come in by shape.kind = \"file\", as OBJ, OFF, PLY or STL)";
     return bytes.find('\0') != bytes.npos ? "binary" : "";
 }
 

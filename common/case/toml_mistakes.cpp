@@ -180,10 +180,13 @@ std::optional<TomlMistake> twice(std::string_view text, std::size_t at, const st
                           description.end(), match, form))
         return std::nullopt;
     const std::string name = match[2].str();
-    const bool of_a_list = text.substr(at).starts_with("[") && match[1].matched;  // as in [shape.mode]
+    const bool heading = text.substr(at).starts_with("["),
+               of_a_list = heading && match[1].matched;  // as in [shape.mode]
     std::size_t first = 0, line = 1;
     for (std::size_t begin = 0; begin < at; begin = text.find('\n', begin) + 1, ++line) {
         std::string_view left = text.substr(begin, text.find_first_of("\n=]", begin) - begin);
+        left = left.substr(std::min(left.find_first_not_of(" \t"), left.size()));
+        if (left.starts_with("[") != heading) continue;
         left = left.substr(std::min(left.find_first_not_of(" \t["), left.size()));
         left = left.substr(0, left.find_last_not_of(" \t") + 1);
         if (left.ends_with(name) && line < line_of(text, at)) first = line;

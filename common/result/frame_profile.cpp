@@ -36,6 +36,10 @@ Revolution spline_of(const Record& frame) {
 }  // namespace
 
 ProfilePoints profile_points(const Record& frame) {
+    if (kind_of(frame) == RecordKind::surface)
+        refuse_frame(
+            "it holds a surface in three dimensions, but tier \"axisym\" begins with a profile: set tier = "
+            "\"surface3d\"");
     if (!find_array(frame, "r") && !find_array(frame, "z")) refuse_frame("it holds neither a surface nor a profile");
     ProfilePoints out{values(frame, "r"), values(frame, "z"), number(frame, "length")};
     if (out.r.empty() || out.r.size() != out.z.size()) refuse_frame("it is damaged: r and z differ in length");

@@ -156,7 +156,8 @@ class Merged(GrowTest):
         self.write("other.toml", CASE.replace("20.0", "19.0"))
         self.scan("case.toml", f"--over={AMPLITUDE}=0.3", "-o", "scan.hdf")
         self.scan("other.toml", f"--over={AMPLITUDE}=0.5", "-o", "other.hdf")
-        self.assertIn("scans of different cases", self.refused("scan", "scan.hdf", "--merge", "other.hdf"))
+        self.assertRegex(self.refused("scan", "scan.hdf", "--merge", "other.hdf"),
+                         "scans of different cases: line [0-9]+ is '.*20.0' in one, '.*19.0' in the other")  # fmt: skip
         self.scan("case.toml", f"--over={AMPLITUDE}=0.3", "--to-the-end", "-o", "end.hdf")
         self.assertIn("--to-the-end", self.refused("scan", "scan.hdf", "--merge", "end.hdf"))
         self.assertIn("nowhere.hdf", self.refused("scan", "scan.hdf", "--merge", "nowhere.hdf"))

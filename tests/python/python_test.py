@@ -485,7 +485,7 @@ class Answers(Folder):
             np.testing.assert_array_equal(written["points/energy"][:], theirs["points/energy"][:])
         with self.assertRaisesRegex(tubule.CaseError, "energy.k24"):
             tubule.scan(TUBE, {"energy.k24": [1, 2]})
-        for options, words in (({"jobs": 0}, "jobs must be 1 or more"), ({"boundary": "not-run"}, "boundary must be one of"),
+        for options, words in (({"jobs": 0}, "jobs must be 1 or more"), ({"boundary": "not-run"}, "boundary: must be one of"),
                                ({"output": "a.journal"}, "name of the journal")):  # fmt: skip
             with self.assertRaisesRegex(tubule.CaseError, words):
                 tubule.scan(TUBE, {"energy.k42": [0, 0.1]}, **options)

@@ -88,8 +88,8 @@ TEST(Extension, Refuses) {
               "case.toml: its points have no value of discretisation.elements, so it cannot become an axis");
     ScanResult b = a;
     b.scan.case_text += "\n";
-    EXPECT_EQ(message_of([&] { merged(a, b); }),
-              "case.toml and case.toml cannot be merged: they are scans of different cases");
+    EXPECT_NE(message_of([&] { merged(a, b); }).find("cannot be merged: they are scans of different cases: line "),
+              std::string::npos);
     b = a, b.scan.axes = {parse_table("energy.k42,energy.H0\n0,1\n", "table.csv")};
     EXPECT_EQ(message_of([&] { merged(a, b); }),
               "case.toml: a table of other keys cannot be merged: energy.k42, energy.H0");

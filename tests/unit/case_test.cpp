@@ -91,9 +91,11 @@ void expect_refused(const std::vector<Override>& overrides) {
 }
 
 TEST(CaseRefusal, ContentsOfAnotherKind) {
-    const std::string text = ": a case is plain text, saved as UTF-8";
+    const std::string text = ": a case is TOML, plain text saved as UTF-8";
     EXPECT_EQ(refusal("PK\x03\x04..."), "case.toml: is a zip archive, such as a spreadsheet" + text);
     EXPECT_EQ(refusal({'t', '\0', 'i', '\0'}), "case.toml: is text in UTF-16" + text);
+    EXPECT_EQ(refusal("// a cube\nvertices\n1 0 0 0\nedges\n1 1 2\n").substr(0, 43),
+              "case.toml: is a file of Surface Evolver (me");
     EXPECT_EQ(refusal("tier = \"a\x1b[31m\xff\"\n").find_first_of("\x1b\xff"), std::string::npos);
 }
 
@@ -137,6 +139,8 @@ TEST(CaseRefusal, TextThatIsNoToml) {
         Edit{"k20 = 1.0", "k20 = 1.0;", "5:10: not valid TOML: a line ends without ;"},
         Edit{"k20 = 1.0", "k20 = 1.0 // kappa/2", "5:11: not valid TOML: a comment begins with #"},
         Edit{"[energy]", "[energy", "4:1: not valid TOML: the name of a table ends with ], such as [shape]"},
+        Edit{"[expect]", "[energy]",
+             "23:1: not valid TOML: energy is given twice, first in line 4: keep one of the two"},
         Edit{"[energy]", "energy]", "4:7: not valid TOML: the name of a table begins with [, such as [energy]"},
         Edit{"[[shape.mode]]", "[[shape.mode]",
              "13:3: not valid TOML: the name of a list of tables has two brackets on both sides: [[shape.mode]]"},

@@ -373,7 +373,8 @@ void add_confirm(CLI::App& app, int& exit_status) {
     command->add_option("SCAN", o->scan, "result of tubule scan")->required();
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
     command->add_option("--seed", o->seed, "of the random choice (1)");
-    command->add_option("--elements", o->choices.elements, "about how many triangles (200)");
+    command->add_option("--elements", o->choices.elements, "about how many triangles (200)")
+        ->check(CLI::Range(20, 1000000));
     command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)")
         ->check(refuse_infinite);
     command->add_option("--end", o->choices.end, "run until then instead of time.end of the case")

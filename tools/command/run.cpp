@@ -49,11 +49,13 @@ void check_output(const std::filesystem::path& file) {
     if (file.extension() == ".journal")
         throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
                                     std::filesystem::path(file).replace_extension().string()));
-    for (const char* other : {".toml", ".csv", ".json", ".txt", ".png", ".svg", ".pdf", ".gif", ".html"})
+    for (const char* other :
+         {".toml", ".csv", ".json", ".txt", ".png", ".svg", ".pdf", ".gif", ".html", ".vtu", ".vtk",
+          ".vtp",  ".pvd", ".xdmf", ".mat", ".npz", ".npy", ".dat", ".obj", ".stl",  ".ply", ".off"})
         if (file.extension() == other)
             throw CaseError(
                 fmt::format("{}: a result is an HDF5 file: give it a name such as {}; tubule show makes tables "
-                            "of it, tubule plot pictures",
+                            "of it, tubule plot pictures, and ParaView opens it",
                             file.string(), std::filesystem::path(file).replace_extension(".hdf").filename().string()));
     std::error_code error;
     if (std::filesystem::is_directory(file, error))

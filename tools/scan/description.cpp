@@ -148,23 +148,33 @@ ScanFile read_scan_file(const toml::table& root, const std::string& path) {
 
 // ---- putting it together
 
-BoundaryChoice boundary_of(const std::string& name, std::optional<int> seeds, std::optional<int> refine,
-                           const std::string& path) {
+// What messages call a choice: an option of the command, or a key of the scan file.
+std::string named(bool by_option, const Scan& scan, const std::string& key) {
+    return by_option ? "--" + key + ":" : fmt::format("{}: {}", scan.path, key);
+}
+
+BoundaryChoice boundary_of(const Scan& scan, const ScanFile& file, const ScanChoices& given) {
+    const std::string name = given.boundary.empty() ? file.boundary : given.boundary;
     BoundaryChoice choice;
     if (name != "outcome") {
         choice.around = outcome_from_name(name);
         if (!choice.around || choice.around == Outcome::not_run) {
             std::vector<std::string> names = outcome_names();
             names.front() = "outcome";
-            throw CaseError(
-                fmt::format("{}: boundary must be one of {}, not '{}'", path, fmt::join(names, ", "), name));
+            const auto meant = near_miss(name, names);
+            throw CaseError(fmt::format("{} must be one of {}, not '{}'{}",
+                                        named(!given.boundary.empty(), scan, "boundary"), fmt::join(names, ", "), name,
+                                        meant ? fmt::format("; did you mean '{}'?", *meant) : ""));
         }
     }
-    choice.seeds = seeds.value_or(choice.seeds);
-    if (choice.seeds < 1) throw CaseError(fmt::format("{}: seeds must be an integer >= 1", path));
-    choice.refine = refine.value_or(choice.refine);
+    choice.seeds = given.seeds.value_or(file.seeds.value_or(choice.seeds));
+    if (choice.seeds < 1)
+        throw CaseError(fmt::format("{} must be an integer >= 1, not {}", named(given.seeds.has_value(), scan, "seeds"),
+                                    choice.seeds));
+    choice.refine = given.refine.value_or(file.refine.value_or(choice.refine));
     if (choice.refine < 0 || choice.refine > most_halvings)
-        throw CaseError(fmt::format("{}: refine must be an integer from 0 to {}", path, most_halvings));
+        throw CaseError(fmt::format("{} must be an integer from 0 to {}, not {}",
+                                    named(given.refine.has_value(), scan, "refine"), most_halvings, choice.refine));
     return choice;
 }
 
@@ -191,7 +201,10 @@ void refuse_doubled_keys(const Scan& scan) {
     std::set<std::string> keys;
     for (const Axis& axis : scan.axes)
         for (const std::string& key : axis.keys)
-            if (!keys.insert(key).second) throw CaseError(fmt::format("{}: {} varies twice", scan.path, key));
+            if (!keys.insert(key).second)
+                throw CaseError(
+                    fmt::format("{0}: {1} varies twice: give all its values at once, such as --over {1}=0,0.1,0.2",
+                                scan.path, key));
     for (const std::string& set : scan.sets)
         if (const std::string key = set.substr(0, set.find('=')); keys.contains(key))
             throw CaseError(fmt::format("{}: --set {}: the scan varies {}", scan.path, set, key));
@@ -417,17 +430,17 @@ Scan with_choices(Scan scan, const ScanFile& file, const ScanChoices& choices) {
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
     refuse_no_points_and_too_many(scan);  // before anything is done for each of them
 
-    const std::string boundary = choices.boundary.empty() ? file.boundary : choices.boundary;
-    const auto seeds = choices.seeds ? choices.seeds : file.seeds;
-    const auto refine = choices.refine ? choices.refine : file.refine;
-    if (!boundary.empty()) {
+    if (!choices.boundary.empty() || !file.boundary.empty()) {
         if (!points.empty())
-            throw CaseError(scan.path +
-                            ": boundary and points exclude each other: the rows of a table have no neighbours");
-        scan.boundary = boundary_of(boundary, seeds, refine, scan.path);
-    } else if (seeds || refine) {
-        throw CaseError(fmt::format("{}: {} must be absent: it is only valid with boundary", scan.path,
-                                    seeds ? "seeds" : "refine"));
+            throw CaseError(named(!choices.boundary.empty(), scan, "boundary") +
+                            " and points exclude each other: the rows of a table have no neighbours");
+        scan.boundary = boundary_of(scan, file, choices);
+    } else if (choices.seeds || choices.refine || file.seeds || file.refine) {
+        const bool by_option = choices.seeds || choices.refine,
+                   seeds = by_option ? choices.seeds.has_value() : file.seeds.has_value();
+        throw CaseError(fmt::format("{} must be absent: it is only valid with {}",
+                                    named(by_option, scan, seeds ? "seeds" : "refine"),
+                                    by_option ? "--boundary" : "boundary"));
     }
     scan.to_the_end = choices.to_the_end || file.to_the_end;
     check_scan(scan);

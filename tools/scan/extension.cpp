@@ -128,11 +128,22 @@ std::set<std::string> told_apart(const Scan& a, const Scan& b) {
     return keys;
 }
 
+std::string different_lines(const std::string& a, const std::string& b) {
+    const std::vector<std::string> one = split(a, '\n'), other = split(b, '\n');
+    std::size_t i = 0;
+    while (i < std::min(one.size(), other.size()) && one[i] == other[i]) ++i;
+    const auto line = [i](const std::vector<std::string>& lines) { return i < lines.size() ? lines[i] : ""; };
+    return fmt::format(
+        "they are scans of different cases: line {} is '{}' in one, '{}' in the other; scan the same case "
+        "twice, with what differs by --set",
+        i + 1, line(one), line(other));
+}
+
 void refuse_different(const Scan& a, const Scan& b) {
     const auto refuse = [&](const std::string& what) {
         throw CaseError(fmt::format("{} and {} cannot be merged: {}", a.path, b.path, what));
     };
-    if (a.case_text != b.case_text) refuse("they are scans of different cases");
+    if (a.case_text != b.case_text) refuse(different_lines(a.case_text, b.case_text));
     for (const auto& x : a.inputs)
         for (const auto& y : b.inputs)
             if (x->name == y->name && !same_input(*x, *y)) refuse(fmt::format("{} was another file", x->name));
