@@ -155,7 +155,7 @@ int run(int argc, char** argv) {
     return status;
 }
 
-// OpenBLAS begins with a thread for each further processor, which we never use (use_one_blas_thread). Each asks for 128
+// OpenBLAS begins with a thread for each further processor, which we never use (prepare_blas). Each asks for 128
 // MB, forever if there are none, and the process waits for it at its end. Where memory is limited it begins anew
 // without them.
 void do_without_blas_threads(char** argv) {
