@@ -149,7 +149,7 @@ int run(int argc, char** argv) {
     if (asks_version)
         print_answer(version());
     else if (asks_description)
-        print_answer(description(app) + "\n");
+        print_answer(description(app));
     else if (app.get_subcommands().empty())
         print_answer(app.help());
     return status;
