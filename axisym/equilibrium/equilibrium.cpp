@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/graph/graph_start.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"
 
 namespace tubule::axisym {
@@ -177,12 +177,11 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
         hessian.applyOnTheLeft(qr.householderQ().transpose());
         hessian.applyOnTheRight(qr.householderQ());
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-        hessian.bottomRightCorner(free, free), vectors ? Eigen::ComputeEigenvectors : Eigen::EigenvaluesOnly);
-    Variation out{eigen.eigenvalues(), {}};
+    const Eigenpairs eigen = eigenpairs(hessian.bottomRightCorner(free, free), vectors);
+    Variation out{eigen.values, {}};
     if (!vectors) return out;
     out.lowest = Eigen::VectorXd::Zero(n);
-    out.lowest.tail(free) = eigen.eigenvectors().col(0);
+    out.lowest.tail(free) = eigen.vectors.col(0);
     if (constraints > 0) out.lowest.applyOnTheLeft(qr.householderQ());
     return out;
 }

@@ -1,9 +1,6 @@
 #include "axisym/equilibrium/mode_stability.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -11,6 +8,7 @@
 
 #include "axisym/splines/pack.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"
 
 namespace tubule::axisym {
@@ -139,7 +137,7 @@ void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_va
                     p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
         }
     }
-    const Vector force = Eigen::PartialPivLU<Matrix>(mass).solve(load);
+    const Vector force = solve_dense(mass, load);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
         const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
@@ -172,14 +170,10 @@ ModeRates ModeStability::rates(int m, const MotionLaw& law, int count) const {
 
 namespace {
 
-// Columns that span the vectors orthogonal to all of `fixed`.
+// Columns that span the vectors orthogonal to all of `fixed`: area and volume are one constraint for a sphere or a
+// tube, up to the error of the mesh.
 Matrix complement(const Matrix& fixed) {
-    const Eigen::Index n = fixed.rows();
-    if (fixed.cols() == 0) return Matrix::Identity(n, n);
-    Eigen::ColPivHouseholderQR<Matrix> qr(fixed);
-    qr.setThreshold(1e-6);  // area and volume are one constraint for a sphere or a tube, up to the error of the mesh
-    const Matrix q = qr.householderQ();
-    return q.rightCols(n - qr.rank());
+    return orthogonal_complement(fixed, 1e-6);
 }
 
 void append(Matrix& columns, const Vector& column) {
@@ -189,23 +183,19 @@ void append(Matrix& columns, const Vector& column) {
 
 // Smallest eigenvalues of A v = mu M v, with the vectors. By way of the inverse, which finds them to the accuracy
 // of small numbers, however large the others are.
-struct Spectrum {
-    Vector values;
-    Matrix vectors;
-};
-Spectrum smallest(const Matrix& A, const Matrix& M, int count) {
+Eigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
     double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
     for (int k = 0; k < 60; ++k, shift *= 4) {
         const Matrix shifted = A + shift * M;
         check_pause();
-        if (Eigen::LLT<Matrix>(shifted).info() != Eigen::Success) continue;
-        const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> eigen(M, shifted);
-        if (eigen.info() != Eigen::Success) break;
+        if (!is_positive_definite(shifted)) continue;
+        const std::optional<Eigenpairs> eigen = eigenpairs(M, shifted);
+        if (!eigen) break;
         const int n = static_cast<int>(A.rows()), kept = std::min(count, n);
-        Spectrum out{Vector(kept), Matrix(n, kept)};
+        Eigenpairs out{Vector(kept), Matrix(n, kept)};
         for (int i = 0; i < kept; ++i) {
-            out.values[i] = 1 / eigen.eigenvalues()[n - 1 - i] - shift;
-            out.vectors.col(i) = eigen.eigenvectors().col(n - 1 - i);
+            out.values[i] = 1 / eigen->values[n - 1 - i] - shift;
+            out.vectors.col(i) = eigen->vectors.col(n - 1 - i);
         }
         return out;
     }
@@ -353,7 +343,7 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
     const Matrix cross = 2 * law.viscosity * of_psi.transpose() * of_w;
     const Matrix own = 2 * law.viscosity * of_psi.transpose() * of_psi +
                        law.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
-    return M - cross.transpose() * Eigen::CompleteOrthogonalDecomposition<Matrix>(own).solve(cross);
+    return M - cross.transpose() * least_squares(own, cross);
 }
 
 // What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
@@ -398,7 +388,7 @@ void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int co
     check_pause();
     const Matrix fixed = fixed_functionals(m, law, parity, forms, M);
     const Matrix free = basis * complement(basis.transpose() * fixed);
-    const Spectrum found =
+    const Eigenpairs found =
         smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);
 
     const double fastest_before = out.rates.empty() ? -std::numeric_limits<double>::infinity() : out.rates[0];

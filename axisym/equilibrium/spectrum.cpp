@@ -1,6 +1,6 @@
 #include "axisym/equilibrium/spectrum.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -30,18 +31,13 @@ void append(Eigen::VectorXd& v, double value) {
 Eigen::VectorXd multipliers_for(const Eigen::MatrixXd& columns, const Eigen::VectorXd& force,
                                 const StretchBalance& balance) {
     // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's error.
-    const auto least_squares = [](const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
-        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-        solver.setThreshold(1e-6);
-        solver.compute(A);
-        return Eigen::VectorXd(solver.solve(b));
-    };
-    if (balance.slopes.size() == 0) return least_squares(columns, -force);
+    constexpr double mesh_error = 1e-6;
+    if (balance.slopes.size() == 0) return least_squares(columns, -force, mesh_error);
     const Eigen::VectorXd& c = balance.slopes;
     Eigen::VectorXd out = c * (balance.wanted / c.squaredNorm());
     if (c.size() == 1) return out;
     const Eigen::Vector2d along(-c[1], c[0]);
-    return out + along * least_squares(columns * along, -(force + columns * out))[0];
+    return out + along * least_squares(columns * along, -(force + columns * out), mesh_error)(0);
 }
 
 // The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
@@ -88,8 +84,7 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
     const Eigen::MatrixXd hessian =
         Eigen::MatrixXd(forms.hessian({1, e.sigma, e.lambda, gauge}, e.x)) + resistance * mass;
-    const Eigen::VectorXd step =
-        Eigen::PartialPivLU<Eigen::MatrixXd>(hessian).solve(forms.gradient({1, e.sigma, e.lambda, 0}, e.x));
+    const Eigen::VectorXd step = solve_dense(hessian, forms.gradient({1, e.sigma, e.lambda, 0}, e.x));
     unbalanced = std::sqrt(step.dot(mass * step) / e.observed.area) / size;
     e.stop = Stop::finished;
     return e;

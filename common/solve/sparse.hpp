@@ -1,8 +1,7 @@
-// Direct solvers for sparse systems, one interface over three libraries:
+// Direct solvers for sparse systems, one interface over Eigen's modules of three libraries:
 //   SparseLu         KLU      small or banded, unsymmetric
 //   SparseLuLarge    UMFPACK  large, of nearly symmetric pattern: the saddle points of a finite element mesh
 //   SparseCholesky   CHOLMOD  symmetric positive definite
-// The libraries hide in the .cpp files.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -13,7 +12,7 @@
 
 namespace tubule {
 
-class SparseEngine;
+struct SparseEngine;
 
 // A linear system that cannot be solved; what() names the situation (singular, nearly singular, not positive
 // definite, not finite, too large).
@@ -52,10 +51,6 @@ public:
         return X;
     }
 
-    // Estimate of 1/(|A|_1 |A^-1|_1), rarely too large by more than a factor 3; costs a few solves.
-    // std::logic_error without factors.
-    double reciprocal_condition() const;
-
     // Work done so far: orderings found, factorisations, factorisations with the old pivots (KLU alone);
     // and the number of entries in the last factors.
     struct Counters {
@@ -65,13 +60,12 @@ public:
     const Counters& counters() const;
 
 protected:
-    SparseSolver(const char* name, std::unique_ptr<SparseEngine> engine);
+    explicit SparseSolver(std::unique_ptr<SparseEngine> engine);
 
 private:
     void solve_in_place(Eigen::Ref<Eigen::MatrixXd> X, int refinements) const;
 
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    std::unique_ptr<SparseEngine> engine_;
 };
 
 // LU factors of a small or banded matrix. A matrix of the same pattern also reuses the pivots for as long as they stay
@@ -89,12 +83,12 @@ public:
     explicit SparseLuLarge(Ordering ordering = {});
 };
 
-// Cholesky factors. The matrix comes with both triangles. A SolveError names an unsymmetric pair of entries or the
-// unknown whose pivot is not positive. Without an ordering it takes one of minimum degree (AMD), as good on surfaces as
-// dissection for one unknown a node, and found in a tenth of the time.
+// Cholesky factors. The matrix comes with both triangles. A SolveError says that it is not symmetric, or names the
+// unknown whose pivot is not positive. Ordered by minimum degree (AMD), as good on surfaces as dissection for one
+// unknown a node, and found in a tenth of the time.
 class SparseCholesky : public SparseSolver {
 public:
-    explicit SparseCholesky(Ordering ordering = {});
+    SparseCholesky();
 };
 
 }  // namespace tubule

@@ -1,9 +1,9 @@
 // Shared by all uses of CHOLMOD. Private to common/solve.
 #pragma once
 
-#include <cholmod.h>
+#include <Eigen/CholmodSupport>
 
-#include <Eigen/SparseCore>
+#include "common/solve/sparse.hpp"
 
 namespace tubule {
 
@@ -19,7 +19,7 @@ struct CholmodCommon : cholmod_common {
     ~CholmodCommon() { cholmod_finish(this); }
 };
 
-// The lower triangle of A as CHOLMOD sees it, without a copy.
-cholmod_sparse lower_triangle(const Eigen::SparseMatrix<double>& A);
+// std::invalid_argument unless the ordering is a permutation of this many unknowns.
+void require_ordering(const Ordering& ordering, Eigen::Index size);
 
 }  // namespace tubule

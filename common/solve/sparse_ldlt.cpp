@@ -11,10 +11,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/solve/blas.hpp"
 #include "common/solve/memory.hpp"
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
-#include "common/solve/sparse_engine.hpp"
 #include "common/solve/sparse_front.hpp"
 #include "common/solve/sparse_supernodes.hpp"
 
@@ -388,7 +388,6 @@ struct SparseLdlt<Scalar>::Impl {
 template <class Scalar>
 SparseLdlt<Scalar>::SparseLdlt(Ordering ordering, double regularisation)
     : impl_(new Impl(std::move(ordering), regularisation)) {
-    use_one_blas_thread();
     prepare_blas(loop_threads());
 }
 template <class Scalar>

@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "common/solve/sparse_cholmod.hpp"
-#include "common/solve/sparse_engine.hpp"
 
 namespace tubule {
 namespace {
@@ -45,9 +44,9 @@ void link_to_parents(Supernodes& tree) {
 }  // namespace
 
 Supernodes find_supernodes(const Matrix& A, const Ordering& ordering) {
-    require_ordering(ordering, static_cast<int>(A.cols()));
+    if (!ordering.empty()) require_ordering(ordering, A.cols());
     const Matrix both = A + Matrix(A.transpose());
-    cholmod_sparse view = lower_triangle(both);
+    cholmod_sparse view = Eigen::viewAsCholmod(both.selfadjointView<Eigen::Lower>());
     CholmodCommon common;
     common.supernodal = CHOLMOD_SUPERNODAL;
     common.method[0].ordering = ordering.empty() ? CHOLMOD_AMD : CHOLMOD_GIVEN;

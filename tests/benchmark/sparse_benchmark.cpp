@@ -45,7 +45,7 @@ struct Ours : Bench {
     std::optional<Solver> solver;
     explicit Ours(bool nodes) : by_nodes(nodes) {}
     void analyse(const System& s) override {
-        if constexpr (!std::is_same_v<Solver, SparseLu>)
+        if constexpr (std::is_same_v<Solver, SparseLuLarge>)
             solver.emplace(by_nodes ? nested_dissection(s.A, s.node_of_unknown) : Ordering{});
         else
             solver.emplace();

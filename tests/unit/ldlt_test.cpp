@@ -223,7 +223,7 @@ TEST(SparseLdlt, badInputIsRefused) {
     EXPECT_EQ(message_of([&] {
                   SparseLdlt<float>({0, 0}).factor(sparse(Dense::Identity(2, 2)));
               }),
-              "ordering is not a permutation: 0 of 2 is repeated or out of range");
+              "ordering of 2 unknowns is not a permutation of 2");
     factors.factor(sparse(Dense::Identity(2, 2)));
     EXPECT_EQ(message_of([&] { factors.solve(Vector::Ones(3)); }), "right-hand side of size 3 for a matrix of size 2");
     EXPECT_EQ(message_of([&] {

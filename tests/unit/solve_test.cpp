@@ -100,8 +100,6 @@ TEST(SparseLu, refinementGainsDigits) {
     const Vector x = lu.solve(b, 1);
     EXPECT_LT((A * x - b).norm(), 1e-15);
     EXPECT_LT((x - Vector::Ones(6)).norm(), 1.5e7 * 2.5 * std::numeric_limits<double>::epsilon());
-    // 1-norm condition number of that matrix: 29070279 (Higham, Accuracy and Stability, table 28.1).
-    EXPECT_NEAR(lu.reciprocal_condition() * 29070279, 1, 1e-4);
 }
 
 TEST(SparseLu, uncompressedMatricesAreTheSame) {
@@ -131,9 +129,7 @@ TEST(SparseLu, namesSingularMatrices) {
                   lu.factor(matrix(2, {{0, 0, 1}, {0, 1, 1}, {1, 0, 1}, {1, 1, 1 + e}}));
               }).find("matrix of size 2 is nearly singular: condition number about"),
               std::string::npos);
-    EXPECT_EQ(message_of([&] { lu.solve(Vector::Ones(2)); }), "SparseLu::solve needs factors: call factor() first");
-    EXPECT_EQ(message_of([&] { lu.reciprocal_condition(); }),
-              "SparseLu::reciprocal_condition needs factors: call factor() first");
+    EXPECT_EQ(message_of([&] { lu.solve(Vector::Ones(2)); }), "SparseSolver::solve needs factors: call factor() first");
     // It works again afterwards.
     lu.factor(ring(8));
     EXPECT_LT((lu.solve(ring(8) * waves(8)) - waves(8)).norm(), 1e-14);
@@ -141,8 +137,8 @@ TEST(SparseLu, namesSingularMatrices) {
 
 TEST(SparseLu, refusesWhatIsNoSystem) {
     SparseLu lu;
-    EXPECT_EQ(message_of([&] { lu.factor(Matrix(2, 3)); }), "SparseLu needs a square matrix, not 2 x 3");
-    EXPECT_EQ(message_of([&] { lu.factor(Matrix(0, 0)); }), "SparseLu needs a square matrix, not 0 x 0");
+    EXPECT_EQ(message_of([&] { lu.factor(Matrix(2, 3)); }), "a solver needs a square matrix, not 2 x 3");
+    EXPECT_EQ(message_of([&] { lu.factor(Matrix(0, 0)); }), "a solver needs a square matrix, not 0 x 0");
     EXPECT_EQ(message_of([&] {
                   lu.factor(matrix(2, {{0, 0, 1}, {1, 1, std::nan("")}}));
               }),

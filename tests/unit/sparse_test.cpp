@@ -51,18 +51,15 @@ double condition(const Matrix& A) {
     return norm(Dense(A)) * norm(Dense(A).inverse());
 }
 
-// The system solved by solvers that suit it. Expected: the answer of dense LU, and its inverse's norm.
+// The system solved by solvers that suit it. Expected: the answer of dense LU.
 void expect_dense_answers(const Matrix& A, std::vector<SparseSolver*> solvers) {
     for (SparseSolver* const solver : solvers) {
         SCOPED_TRACE(solver - *solvers.begin());
         solver->factor(A);
         // 10: growth of the factors, as pivots need not be the largest.
-        const double c = condition(A), rounding = 10 * c * std::numeric_limits<double>::epsilon();
+        const double rounding = 10 * condition(A) * std::numeric_limits<double>::epsilon();
         EXPECT_LT(difference_from_dense(*solver, A, waves(A.rows(), 1)), rounding);
         EXPECT_LT(difference_from_dense(*solver, A, waves(A.rows(), 7)), rounding);
-        // A lower bound of the condition number, up to rounding, and not ten times below it.
-        EXPECT_LT(solver->reciprocal_condition() * c, 10);
-        EXPECT_GT(solver->reciprocal_condition() * c, 1 - 1e-6);
     }
 }
 
@@ -182,38 +179,25 @@ TEST(Ordering, savesFillAndLeavesTheAnswer) {
     // Dissection has asymptotically less fill, n log n instead of n^(3/2); on so few nodes that is a factor beyond 3.
     EXPECT_LT(3 * dissected.counters().fill, natural.counters().fill);
     EXPECT_LT(3 * chosen.counters().fill, natural.counters().fill);
-    const Matrix A = sphere::helmholtz(sphere::icosphere(2), 2, 1, 1);
-    by_number.resize(A.rows());
-    SparseCholesky ours(nested_dissection(A)), alone, numbered(by_number);
-    for (SparseCholesky* cholesky : {&ours, &alone, &numbered}) cholesky->factor(A);
-    EXPECT_LT(3 * ours.counters().fill, numbered.counters().fill);
-    EXPECT_LT(3 * alone.counters().fill, numbered.counters().fill);
 }
 
 TEST(Ordering, refusesWhatDoesNotFit) {
     const Matrix A = sparse(Dense::Identity(3, 3));
-    EXPECT_EQ(message_of([&] { SparseLuLarge({0, 1}).factor(A); }), "ordering of 2 unknowns for a matrix of size 3");
-    EXPECT_EQ(message_of([&] {
-                  SparseCholesky({0, 1, 1}).factor(A);
-              }),
-              "ordering is not a permutation: 1 of 3 is repeated or out of range");
-    EXPECT_EQ(message_of([&] {
-                  SparseLuLarge({0, 1, 3}).factor(A);
-              }),
-              "ordering is not a permutation: 3 of 3 is repeated or out of range");
-    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 1}); }), "nodes of 2 unknowns for a matrix of size 3");
-    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, -1, 1}); }), "nodes from -1 to 1 for a matrix of size 3");
-    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 3, 1}); }), "nodes from 0 to 3 for a matrix of size 3");
-    EXPECT_EQ(message_of([&] { nested_dissection(Matrix(2, 3)); }),
-              "nested_dissection needs a square matrix, not 2 x 3");
+    for (const Ordering& ordering : {Ordering{0, 1}, Ordering{0, 1, 1}, Ordering{0, 1, 3}})
+        EXPECT_EQ(message_of([&] { SparseLuLarge(ordering).factor(A); }),
+                  "ordering of " + std::to_string(ordering.size()) + " unknowns is not a permutation of 3");
+    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 1}); }), "2 nodes from 0 to 1 for a matrix of size 3");
+    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, -1, 1}); }), "3 nodes from -1 to 1 for a matrix of size 3");
+    EXPECT_EQ(message_of([&] { nested_dissection(A, {0, 3, 1}); }), "3 nodes from 0 to 3 for a matrix of size 3");
+    EXPECT_EQ(message_of([&] { nested_dissection(Matrix(2, 3)); }), "a solver needs a square matrix, not 2 x 3");
     EXPECT_EQ(nested_dissection(A, {0, 0, 0}), Ordering({0, 1, 2}));
 }
 
 template <class Solver>
-void expect_common_refusals(const std::string& name) {
+void expect_common_refusals() {
     Solver solver;
-    EXPECT_EQ(message_of([&] { solver.factor(Matrix(2, 3)); }), name + " needs a square matrix, not 2 x 3");
-    EXPECT_EQ(message_of([&] { solver.factor(Matrix(0, 0)); }), name + " needs a square matrix, not 0 x 0");
+    EXPECT_EQ(message_of([&] { solver.factor(Matrix(2, 3)); }), "a solver needs a square matrix, not 2 x 3");
+    EXPECT_EQ(message_of([&] { solver.factor(Matrix(0, 0)); }), "a solver needs a square matrix, not 0 x 0");
     EXPECT_EQ(message_of([&] {
                   solver.factor(sparse(Dense{{1, 0}, {0, std::nan("")}}));
               }),
@@ -221,9 +205,7 @@ void expect_common_refusals(const std::string& name) {
     // Constants are in the kernel of the stiffness matrix.
     EXPECT_THROW(solver.factor(positive_definite(0)), SolveError);
     EXPECT_EQ(message_of([&] { solver.solve(Vector::Ones(162)); }),
-              name + "::solve needs factors: call factor() first");
-    EXPECT_EQ(message_of([&] { solver.reciprocal_condition(); }),
-              name + "::reciprocal_condition needs factors: call factor() first");
+              "SparseSolver::solve needs factors: call factor() first");
     // Rows differ in the last bit: condition number 8/epsilon.
     const double e = std::numeric_limits<double>::epsilon();
     EXPECT_NE(message_of([&] {
@@ -247,9 +229,9 @@ void expect_common_refusals(const std::string& name) {
 }
 
 TEST(Sparse, refusesWhatHasNoAnswer) {
-    expect_common_refusals<SparseLu>("SparseLu");
-    expect_common_refusals<SparseLuLarge>("SparseLuLarge");
-    expect_common_refusals<SparseCholesky>("SparseCholesky");
+    expect_common_refusals<SparseLu>();
+    expect_common_refusals<SparseLuLarge>();
+    expect_common_refusals<SparseCholesky>();
 }
 
 TEST(SparseLuLarge, countsZeroPivots) {
@@ -267,44 +249,28 @@ TEST(SparseLuLarge, countsZeroPivots) {
 
 TEST(SparseCholesky, namesWhatIsNotSymmetricPositiveDefinite) {
     SparseCholesky cholesky;
-    EXPECT_EQ(message_of([&] {
-                  cholesky.factor(sparse(Dense{{1, 2}, {2.001, 5}}));
-              }),
-              "matrix of size 2 is not symmetric in (1, 0)");
-    EXPECT_EQ(message_of([&] {
-                  cholesky.factor(sparse(Dense{{2, 0, 0}, {0, 2, 1}, {0, 0, 2}}));
-              }),
-              "matrix of size 3 is not symmetric in (2, 1)");
-    EXPECT_EQ(message_of([&] {
-                  cholesky.factor(sparse(Dense{{2, 0, 0}, {1, 2, 0}, {0, 0, 2}}));
-              }),
-              "matrix of size 3 is not symmetric in (1, 0)");
-    EXPECT_EQ(message_of([&] {
-                  cholesky.factor(sparse(Dense{{2, 0, 1}, {1, 2, 0}, {1, 0, 2}}));
-              }),
-              "matrix of size 3 is not symmetric in (1, 0)");
+    for (const Dense& A : {Dense{{1, 2}, {2.001, 5}}, Dense{{2, 0}, {1, 2}}, Dense{{2, 1}, {0, 2}}})
+        EXPECT_EQ(message_of([&] { cholesky.factor(sparse(A)); }), "matrix of size 2 is not symmetric");
     // Rounding in an assembly does not count as asymmetry.
     cholesky.factor(sparse(Dense{{1e8, 1 + 1e-9}, {1, 1}}));
     EXPECT_EQ(message_of([&] {
                   cholesky.factor(sparse(Dense{{1, 0}, {0, -2}}));
               }),
-              "matrix of size 2 is not positive definite: diagonal entry 1 is -2");
-    EXPECT_EQ(message_of([&] {
-                  cholesky.factor(sparse(Dense{{1, 1}, {1, 0}}));
-              }),
-              "matrix of size 2 is not positive definite: diagonal entry 1 is 0");
-    // Eigenvalues 3 and -1; eliminated in this order, unknown 0 is the second one.
-    EXPECT_EQ(message_of([&] {
-                  SparseCholesky({1, 0}).factor(sparse(Dense{{1, 2}, {2, 1}}));
-              }),
-              "matrix of size 2 is not positive definite: no positive pivot for unknown 0");
+              "matrix of size 2 is not positive definite: no positive pivot for unknown 1");
+    // Eigenvalues 3 and -1; eliminated in any order.
+    EXPECT_THROW(cholesky.factor(sparse(Dense{{1, 2}, {2, 1}})), SolveError);
     // Constants have a negative energy, though all diagonal entries are positive; supernodal.
     EXPECT_NE(message_of([&] {
                   cholesky.factor(sphere::helmholtz(sphere::icosphere(3), 2, -1e-3, 1));
               }).find("matrix of size 2562 is not positive definite: no positive pivot for unknown"),
               std::string::npos);
-    EXPECT_EQ(message_of([&] { cholesky.factor(saddle(0).A); }),
-              "matrix of size 648 is not positive definite: diagonal entry 486 is 0");
+    EXPECT_THROW(cholesky.factor(saddle(0).A), SolveError);
+    // Pivots far apart are estimated, and refused from a condition number of 1/epsilon = 4.5e15 on: here 1e15 and 1e16.
+    cholesky.factor(sparse(Dense{{1, 0}, {0, 1e-15}}));
+    EXPECT_EQ(message_of([&] {
+                  cholesky.factor(sparse(Dense{{1, 0}, {0, 1e-16}}));
+              }),
+              "matrix of size 2 is nearly singular: condition number about 1.0e+16");
 }
 
 }  // namespace

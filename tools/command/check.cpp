@@ -151,55 +151,47 @@ void tell(const Checked& c, bool quick) {
 
 // ---- JSON
 
-std::string or_null(const std::string& text) {
-    return text.empty() ? "null" : json(valid_utf8(text));
-}
-
-std::string or_null(const std::optional<double>& number) {
-    return number ? json(*number) : "null";
-}
-
-// "file:line:column" as such, where it has that form.
-std::string place_json(const std::string& place) {
+// Its place also as file, line and column.
+Json json_of(const Complaint& c) {
     static const std::regex form("([^]*):([0-9]+):([0-9]+)");
     std::smatch part;
-    if (place.starts_with("--set ") || !std::regex_match(place, part, form))
-        return "\"file\": null, \"line\": null, \"column\": null";
-    return fmt::format("\"file\": {}, \"line\": {}, \"column\": {}", json(valid_utf8(part[1].str())), part[2].str(),
-                       part[3].str());
+    Json out{{"place", or_null(c.place)}, {"file", {}}, {"line", {}}, {"column", {}}};
+    if (!c.place.starts_with("--set ") && std::regex_match(c.place, part, form))
+        out["file"] = part[1].str(), out["line"] = std::stoi(part[2].str()), out["column"] = std::stoi(part[3].str());
+    out["key"] = or_null(c.key);
+    out["message"] = c.what;
+    out["suggestion"] = or_null(c.suggestion);
+    return out;
 }
 
-std::string json_of(const Complaint& c) {
-    return fmt::format("{{\"place\": {}, {}, \"key\": {}, \"message\": {}, \"suggestion\": {}}}", or_null(c.place),
-                       place_json(c.place), or_null(c.key), json(valid_utf8(c.what)), or_null(c.suggestion));
+Json json_of(const Advice& a) {
+    return {{"tier", a.tier},
+            {"model", a.model},
+            {"elements", or_null(a.elements)},
+            {"accuracy", a.accuracy},
+            {"seconds", or_null(a.seconds)},
+            {"reason", a.reason}};
 }
 
-std::string json_of(const std::optional<Advice>& a) {
-    if (!a) return "null";
-    return fmt::format(
-        "{{\"tier\": {}, \"model\": {}, \"elements\": {}, \"accuracy\": {}, \"seconds\": {}, \"reason\": {}}}",
-        json(a->tier), json(a->model), a->elements ? fmt::format("{}", *a->elements) : "null", json(a->accuracy),
-        or_null(a->seconds), json(a->reason));
-}
-
-std::string json_of(const Checked& c) {
-    std::vector<std::string> errors;
-    for (const Complaint& one : c.complaints) errors.push_back(json_of(one));
-    std::string expected = "null";
-    if (c.expected)
-        expected =
-            fmt::format("{{\"resolution\": {}, \"steps\": {}, \"seconds\": {}, \"bytes\": {}, \"finer_runs\": {}}}",
-                        json(c.expected->resolution), or_null(c.expected->steps), or_null(c.expected->seconds),
-                        json(c.expected->bytes), c.expected->finer_runs);
-    const std::string model = c.model.empty() ? "null"
-                                              : fmt::format("{{\"kind\": {}, \"reason\": {}}}", json(c.model),
-                                                            json(valid_utf8(c.model_reason)));
-    return fmt::format(
-        "{{\"file\": {}, \"valid\": {}, \"errors\": [{}],\n \"toml\": {},\n \"model\": {}, \"chosen\": {}, "
-        "\"expected\": {}, \"advice\": {}, \"unknown\": {}, \"warning\": {}}}",
-        json(valid_utf8(c.path)), c.valid(), fmt::join(errors, ",\n  "), or_null(c.valid() ? c.toml : ""), model,
-        json(c.chosen), expected, json_of(c.advice), or_null(c.unknown),
-        or_null(fmt::format("{}", fmt::join(c.warnings, "\n"))));
+Json json_of(const Checked& c) {
+    Json out{{"file", c.path},
+             {"valid", c.valid()},
+             {"errors", json_list(c.complaints, [](const Complaint& one) { return json_of(one); })},
+             {"toml", or_null(c.valid() ? c.toml : "")},
+             {"model", {}},
+             {"chosen", c.chosen},
+             {"expected", {}},
+             {"advice", c.advice ? json_of(*c.advice) : Json()},
+             {"unknown", or_null(c.unknown)},
+             {"warning", or_null(fmt::format("{}", fmt::join(c.warnings, "\n")))}};
+    if (!c.model.empty()) out["model"] = {{"kind", c.model}, {"reason", c.model_reason}};
+    if (const auto& e = c.expected)
+        out["expected"] = {{"resolution", e->resolution},
+                           {"steps", or_null(e->steps)},
+                           {"seconds", or_null(e->seconds)},
+                           {"bytes", e->bytes},
+                           {"finer_runs", e->finer_runs}};
+    return out;
 }
 
 // All cases are looked at, so that one call tells all that is wrong. The output is itself a case (of one case).
@@ -207,16 +199,16 @@ int check(const CheckOptions& options) {
     catch_interrupts();
     const PauseWatch watch(std::nullopt, interrupted);
     int status = 0;
-    std::vector<std::string> parts;
+    Json cases = Json::array();
     for (const std::string& path : options.cases) {
         const Checked c = checked(path, options);
         if (!c.valid()) status = 2;
         if (options.json)
-            parts.push_back(json_of(c));
+            cases.push_back(json_of(c));
         else
             tell(c, options.quick);
     }
-    if (options.json) print_answer(fmt::format("{{\"cases\": [\n{}\n]}}\n", fmt::join(parts, ",\n")));
+    if (options.json) print_answer(line_of({{"cases", cases}}));
     return status;
 }
 

@@ -286,51 +286,62 @@ Text csv(const Comparison& c) {
     return out;
 }
 
-std::string json_of(const Side& side) {
-    return fmt::format(
-        "{{\"file\": {}, \"stop\": {}, \"stop_time\": {}, \"stated_error\": {}, \"rows\": {}, \"area_drift\": {}, "
-        "\"volume_drift\": {}}}",
-        json(side.path), json(side.outcome.stop), json(side.outcome.time),
-        side.stated_error ? json(*side.stated_error) : "null", json(side.rows), json(side.area_drift),
-        json(side.volume_drift));
+Json json_of(const Side& side) {
+    return {{"file", side.path},
+            {"stop", side.outcome.stop},
+            {"stop_time", side.outcome.time},
+            {"stated_error", or_null(side.stated_error)},
+            {"rows", side.rows},
+            {"area_drift", side.area_drift},
+            {"volume_drift", side.volume_drift}};
 }
 
-std::string json_of(const SeriesDifference& d) {
-    return fmt::format(
-        "{{\"name\": {}, \"scale\": {}, \"largest\": {}, \"when\": {}, \"both_rows\": {}, \"rows_in_both\": {}, "
-        "\"at_end\": {}, \"interpolation\": {},\n \"times\": {},\n \"a\": {},\n \"b\": {},\n \"unsure\": {}}}",
-        json(d.name), json(d.scale), json(d.largest), json(d.when), json(d.largest_in_rows), json(d.rows_in_both),
-        json(d.at_end), json(d.largest_unsure), json(d.times), json(d.a), json(d.b), json(d.unsure));
+Json json_of(const SeriesDifference& d) {
+    return {{"name", d.name},
+            {"scale", d.scale},
+            {"largest", d.largest},
+            {"when", d.when},
+            {"both_rows", d.largest_in_rows},
+            {"rows_in_both", d.rows_in_both},
+            {"at_end", d.at_end},
+            {"interpolation", d.largest_unsure},
+            {"times", d.times},
+            {"a", d.a},
+            {"b", d.b},
+            {"unsure", d.unsure}};
 }
 
-std::string json_of(const ShapeDifference& s) {
-    const auto list = [](const auto& v) { return json(std::vector<double>(v.data(), v.data() + v.size())); };
+Json json_of(const ShapeDifference& s) {
+    const auto list = [](const auto& v) { return std::vector<double>(v.data(), v.data() + v.size()); };
     const Eigen::Matrix3d rows = s.motion.rotation.transpose();  // Eigen stores columns
-    return fmt::format(
-        "{{\"time\": {}, \"frame_a\": {}, \"frame_b\": {}, \"hausdorff\": {}, \"l2\": {}, \"size\": {}, \"where\": {}, "
-        "\"moved\": {}, \"shift\": {}, \"rotation\": {}, \"energy\": {}}}",
-        json(s.time), s.frames.first, s.frames.second, json(s.distance.hausdorff), json(s.distance.l2),
-        json(s.distance.size), list(s.distance.where), list(s.moved), list(s.motion.shift), list(rows),
-        s.energy ? json(*s.energy) : "null");
+    return {{"time", s.time},
+            {"frame_a", s.frames.first},
+            {"frame_b", s.frames.second},
+            {"hausdorff", s.distance.hausdorff},
+            {"l2", s.distance.l2},
+            {"size", s.distance.size},
+            {"where", list(s.distance.where)},
+            {"moved", list(s.moved)},
+            {"shift", list(s.motion.shift)},
+            {"rotation", list(rows)},
+            {"energy", or_null(s.energy)}};
 }
 
-std::string json_of(const Check& check) {
-    return fmt::format("{{\"quantity\": {}, \"value\": {}, \"tolerance\": {}, \"within\": {}}}",
-                       json(check.quantity.name), json(check.quantity.value), json(check.most), check.holds());
+Json json_of(const Check& check) {
+    return {{"quantity", check.quantity.name},
+            {"value", check.quantity.value},
+            {"tolerance", check.most},
+            {"within", check.holds()}};
 }
 
-template <class T>
-std::string json_list(const std::vector<T>& items) {
-    std::string out = "[";
-    for (const T& item : items) out += (out.size() > 1 ? ",\n" : "\n") + json_of(item);
-    return out + "\n]";
-}
-
-Text json_text(const Comparison& c) {
-    Text out;
-    add(out, "{{\n\"a\": {},\n\"b\": {},\n\"aligned\": {},\n\"series\": {},\n\"frames\": {},\n\"checks\": {}\n}}\n",
-        json_of(c.a), json_of(c.b), c.aligned, json_list(c.series), json_list(c.shapes), json_list(c.checks));
-    return out;
+std::string json_text(const Comparison& c) {
+    const auto one = [](const auto& item) { return json_of(item); };
+    return line_of({{"a", json_of(c.a)},
+                    {"b", json_of(c.b)},
+                    {"aligned", c.aligned},
+                    {"series", json_list(c.series, one)},
+                    {"frames", json_list(c.shapes, one)},
+                    {"checks", json_list(c.checks, one)}});
 }
 
 int run_compare(const CompareOptions& options) {
@@ -341,11 +352,9 @@ int run_compare(const CompareOptions& options) {
         say(stderr, "tubule compare: {}\n", explanation(error));
         return bad_input;
     }
-    const Text out = options.json ? json_text(c) : options.csv ? csv(c) : words(c);
-    print_answer({out.data(), out.size()});
+    print_answer(options.json ? json_text(c) : to_string(options.csv ? csv(c) : words(c)));
     if (!options.pictures.empty())
-        if (const int status = draw_by_script("compare", "compare", options.pictures, to_string(json_text(c))))
-            return status;
+        if (const int status = draw_by_script("compare", "compare", options.pictures, json_text(c))) return status;
     const bool agree = std::all_of(c.checks.begin(), c.checks.end(), [](const Check& check) { return check.holds(); });
     return agree ? 0 : beyond_tolerance;
 }
@@ -353,7 +362,7 @@ int run_compare(const CompareOptions& options) {
 }  // namespace
 
 std::string comparison_json(const CompareOptions& options, const Result& a, const Result& b) {
-    return to_string(json_text(compared(options, a, b)));
+    return json_text(compared(options, a, b));
 }
 
 void add_compare(CLI::App& app, int& exit_status) {

@@ -155,13 +155,14 @@ std::string csv(const std::vector<Point>& points) {
 }
 
 std::string json_text(const ConfirmOptions& options, const std::vector<Point>& points) {
-    std::string out;
-    add(out, "{{\"scan\": {}, \"seed\": {}, \"elements\": {}, \"noise\": {},\n\"points\": [", json(options.scan),
-        options.seed, options.choices.elements, json(options.choices.noise));
-    for (std::size_t i = 0; i < points.size(); ++i)
-        add(out, "{}\n{{\"point\": {}, \"set\": {}, \"values\": {}}}", i > 0 ? "," : "", points[i].pick.point,
-            json(points[i].sets), json(columns(points[i])));
-    return out + "\n]}\n";
+    Json list = Json::array();
+    for (const Point& p : points)
+        list.push_back({{"point", p.pick.point}, {"set", p.sets}, {"values", json_object(columns(p))}});
+    return line_of({{"scan", options.scan},
+                    {"seed", options.seed},
+                    {"elements", options.choices.elements},
+                    {"noise", options.choices.noise},
+                    {"points", list}});
 }
 
 // ---- the whole

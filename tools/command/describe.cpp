@@ -1,12 +1,9 @@
 #include "tools/command/describe.hpp"
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <vector>
 
 #include "tools/command/json.hpp"
-#include "tools/command/text.hpp"
 
 namespace tubule {
 namespace {
@@ -18,33 +15,40 @@ std::vector<std::string> choices(const std::string& type) {
     return CLI::detail::split(type.substr(open + 1, close - open - 1), ',');
 }
 
-std::string described(const CLI::Option& option) {
+Json described(const CLI::Option& option) {
     std::vector<std::string> names;
     for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
     for (const std::string& name : option.get_snames()) names.push_back("-" + name);
     const bool positional = names.empty();
     if (positional) names.push_back(option.get_name());
     const bool has_value = option.get_items_expected_max() > 0;
-    return fmt::format(
-        R"({{"names": {}, "positional": {}, "type": {}, "choices": {}, "default": {}, "repeated": {}, "required": {}, )"
-        R"("description": {}}})",
-        json(names), positional, json(has_value ? option.get_type_name() : ""), json(choices(option.get_type_name())),
-        json(option.get_default_str()), has_value && option.get_items_expected_max() > 1, option.get_required(),
-        json(option.get_description()));
+    return {{"names", names},
+            {"positional", positional},
+            {"type", has_value ? option.get_type_name() : ""},
+            {"choices", choices(option.get_type_name())},
+            {"default", option.get_default_str()},
+            {"repeated", has_value && option.get_items_expected_max() > 1},
+            {"required", option.get_required()},
+            {"description", option.get_description()}};
+}
+
+Json described(const CLI::App& app) {
+    Json options = Json::array(), commands = Json::array();
+    for (const CLI::Option* option : app.get_options())
+        if (!option->get_group().empty()) options.push_back(described(*option));  // others --help does not show either
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+        commands.push_back(described(*command));
+    return {{"name", app.get_name()},
+            {"description", app.get_description()},
+            {"footer", app.get_footer()},
+            {"options", options},
+            {"commands", commands}};
 }
 
 }  // namespace
 
 std::string description(const CLI::App& app) {
-    std::string options, commands;
-    for (const CLI::Option* option : app.get_options()) {
-        if (option->get_group().empty()) continue;  // not shown by --help either
-        add(options, "{}\n  {}", options.empty() ? "" : ",", described(*option));
-    }
-    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-        add(commands, "{}\n{}", commands.empty() ? "" : ",", description(*command));
-    return fmt::format(R"({{"name": {}, "description": {}, "footer": {}, "options": [{}], "commands": [{}]}})",
-                       json(app.get_name()), json(app.get_description()), json(app.get_footer()), options, commands);
+    return line_of(described(app));
 }
 
 }  // namespace tubule

@@ -149,13 +149,13 @@ int run(int argc, char** argv) {
     if (asks_version)
         print_answer(version());
     else if (asks_description)
-        print_answer(description(app) + "\n");
+        print_answer(description(app));
     else if (app.get_subcommands().empty())
         print_answer(app.help());
     return status;
 }
 
-// OpenBLAS begins with a thread for each further processor, which we never use (use_one_blas_thread). Each asks for 128
+// OpenBLAS begins with a thread for each further processor, which we never use (prepare_blas). Each asks for 128
 // MB, forever if there are none, and the process waits for it at its end. Where memory is limited it begins anew
 // without them.
 void do_without_blas_threads(char** argv) {

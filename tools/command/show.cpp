@@ -189,42 +189,38 @@ std::vector<Column> frame_columns(const Result& result, std::size_t index) {
 // ---- JSON
 
 // Of arrays only the shapes, unless `data` too is wanted (row-major, in one list).
-std::string json_of(const Record& record, bool data) {
-    std::string arrays;
+Json json_of(const Record& record, bool data) {
+    Json arrays = Json::object();
     for (const Array& array : record.arrays) {
-        arrays += fmt::format("{}{}: {{\"shape\": {}", arrays.empty() ? "" : ", ", json(array.name), json(array.shape));
-        if (data) arrays += fmt::format(", \"data\": {}", json(array.data));
-        arrays += "}";
+        arrays[array.name]["shape"] = array.shape;
+        if (data) arrays[array.name]["data"] = array.data;
     }
-    const std::string mesh = record.mesh ? fmt::format("\"mesh\": {}, ", *record.mesh) : "";
-    return fmt::format("{{\"time\": {}, {}\"numbers\": {}, \"arrays\": {{{}}}}}", json(record.time), mesh,
-                       json(record.numbers), arrays);
+    Json out{{"time", record.time}};
+    if (record.mesh) out["mesh"] = *record.mesh;
+    out["numbers"] = json_object(record.numbers);
+    out["arrays"] = arrays;
+    return out;
 }
 
 // Of cells only the number, unless `data` too is wanted.
-std::string json_of(const SurfaceCells& mesh, bool data) {
-    std::string out = fmt::format("{{\"order\": {}, \"nodes\": {}, \"triangles\": {}, \"period\": {}", mesh.order,
-                                  mesh.nodes, cell_count(mesh), json(mesh.period));
-    if (data) out += fmt::format(", \"cells\": {}, \"shifts\": {}", json(mesh.cells), json(mesh.shifts));
-    return out + "}";
+Json json_of(const SurfaceCells& mesh, bool data) {
+    Json out{{"order", mesh.order}, {"nodes", mesh.nodes}, {"triangles", cell_count(mesh)}, {"period", mesh.period}};
+    if (data) out["cells"] = mesh.cells, out["shifts"] = mesh.shifts;
+    return out;
 }
 
-void add_json(Text& out, const Result& result, std::optional<std::size_t> with_data) {
-    add(out, "{{\n\"case\": {{\"text\": {}, \"set\": {}}},\n", json(result.case_text.text),
-        json(result.case_text.sets));
-    add(out, "\"about\": {},\n\"series\": {{", json(result.about));
-    for (std::size_t j = 0; j < result.series_names.size(); ++j) {
-        const std::string& name = result.series_names[j];
-        add(out, "{}\n{}: {}", j > 0 ? "," : "", json(name), json(result.series.at(name)));
-    }
-    add(out, "\n}},\n\"meshes\": [");
+std::string json_text(const Result& result, std::optional<std::size_t> with_data) {
+    Json series = Json::object(), meshes = Json::array(), frames = Json::array();
+    for (const std::string& name : result.series_names) series[name] = result.series.at(name);
     for (std::size_t i = 0; i < result.meshes.size(); ++i)
-        add(out, "{}\n{}", i > 0 ? "," : "",
-            json_of(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
-    add(out, "\n],\n\"frames\": [");
-    for (std::size_t i = 0; i < result.frames.size(); ++i)
-        add(out, "{}\n{}", i > 0 ? "," : "", json_of(result.frames[i], with_data == i));
-    add(out, "\n],\n\"checkpoint\": {}\n}}\n", result.checkpoint ? json_of(*result.checkpoint, false) : "null");
+        meshes.push_back(json_of(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
+    for (std::size_t i = 0; i < result.frames.size(); ++i) frames.push_back(json_of(result.frames[i], with_data == i));
+    return line_of({{"case", {{"text", result.case_text.text}, {"set", result.case_text.sets}}},
+                    {"about", json_object(result.about)},
+                    {"series", series},
+                    {"meshes", meshes},
+                    {"frames", frames},
+                    {"checkpoint", result.checkpoint ? json_of(*result.checkpoint, false) : Json()}});
 }
 
 // ----
@@ -256,7 +252,7 @@ Text shown(const ShowOptions& options) {
     if (options.frame) frame = frame_index(result, *options.frame);
     Text out;
     if (options.json)
-        add_json(out, result, frame);
+        add(out, "{}", json_text(result, frame));
     else if (options.csv)
         add_table(out, frame ? frame_columns(result, *frame) : series_columns(result));
     else

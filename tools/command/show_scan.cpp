@@ -48,16 +48,17 @@ void add_map(std::string& out, const ScanResult& result) {
     }
 }
 
-// Where energies of two kinds are equal, as entries of a JSON array.
-std::string equal_energies(const ScanResult& result) {
+// Where energies of two kinds are equal.
+Json equal_energies(const ScanResult& result) {
     const Nodes nodes(result.scan);
-    std::string out;
+    Json out = Json::array();
     for (const auto& [number, p] : result.crossings) {
         const EnergyCrossing c = crossing_of(result.scan, number);
-        add(out, "{}\n{{\"points\": [{}, {}], \"key\": {}, \"value\": {}, \"kinds\": [{}, {}], \"energy\": {}}}",
-            out.empty() ? "" : ",", nodes.point_of(c.node, 0), nodes.point_of(c.node + nodes.stride(c.axis), 0),
-            json(result.scan.axes[c.axis].keys.front()), json(p.value), json(std::string(name(c.kinds[0]))),
-            json(std::string(name(c.kinds[1]))), json(p[Measure::energy]));
+        out.push_back({{"points", {nodes.point_of(c.node, 0), nodes.point_of(c.node + nodes.stride(c.axis), 0)}},
+                       {"key", result.scan.axes[c.axis].keys.front()},
+                       {"value", p.value},
+                       {"kinds", {name(c.kinds[0]), name(c.kinds[1])}},
+                       {"energy", p[Measure::energy]}});
     }
     return out;
 }
@@ -133,29 +134,23 @@ std::string scan_csv(const std::filesystem::path& file) {
 std::string scan_json(const std::filesystem::path& file) {
     const ScanResult result = read_scan_result(file);
     const Scan& scan = result.scan;
-    std::string out = fmt::format("{{\n\"case\": {{\"path\": {}, \"text\": {}, \"set\": {}}},\n", json(scan.case_path),
-                                  json(scan.case_text), json(scan.sets));
-    add(out, "\"scan\": {{\"path\": {}, \"title\": {}, \"text\": {}}},\n\"about\": {{", json(scan.path),
-        json(scan.title), json(scan.text));
-    for (std::size_t i = 0; i < result.about.size(); ++i)
-        add(out, "{}{}: {}", i > 0 ? ", " : "", json(result.about[i].first), json(result.about[i].second));
-    add(out, "}},\n\"points\": [");
-    bool first = true;
+    Json points = Json::array();
     for (const PointResult& p : result.points) {
         if (p.outcome == Outcome::not_run) continue;
-        add(out, "{}\n{{\"point\": {}, \"set\": {{", first ? "" : ",", p.point);
-        first = false;
-        std::string sets;
-        for (const auto& [key, value] : keys_of(scan, p.point))
-            add(sets, "{}{}: {}", sets.empty() ? "" : ", ", json(key), json(value));
-        add(out, "{}}}, \"outcome\": {}, \"stop\": {}", sets, json(std::string(name(p.outcome))), json(stop_of(p)));
-        for (std::size_t m = 0; m < n_measures; ++m) add(out, ", \"{}\": {}", measure_names[m], json(p.measures[m]));
-        add(out, ", \"message\": {}}}", json(p.message));
+        Json one{{"point", p.point},
+                 {"set", json_object(keys_of(scan, p.point))},
+                 {"outcome", name(p.outcome)},
+                 {"stop", stop_of(p)}};
+        for (std::size_t m = 0; m < n_measures; ++m) one[measure_names[m]] = p.measures[m];
+        one["message"] = p.message;
+        points.push_back(std::move(one));
     }
-    add(out, "\n]");
-    if (start_axis(scan)) add(out, ",\n\"equal_energies\": [{}\n]", equal_energies(result));
-    add(out, "\n}}\n");
-    return out;
+    Json out{{"case", {{"path", scan.case_path}, {"text", scan.case_text}, {"set", scan.sets}}},
+             {"scan", {{"path", scan.path}, {"title", scan.title}, {"text", scan.text}}},
+             {"about", json_object(result.about)},
+             {"points", points}};
+    if (start_axis(scan)) out["equal_energies"] = equal_energies(result);
+    return line_of(out);
 }
 
 }  // namespace tubule

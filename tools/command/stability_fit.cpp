@@ -108,12 +108,17 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
         return out;
     }
     if (options.json)
-        return fmt::format(
-            "{{\"n\": {}, \"m\": {}, \"source\": {}, \"rate\": {}, \"error\": {}, \"from\": {}, \"to\": {}, "
-            "\"points\": "
-            "{}, \"linear_rate\": {},\n\"time\": {},\n\"amplitude\": {}}}\n",
-            wave.n, wave.m, json(a.source), json(fit.rate), json(fit.error), json(fit.from), json(fit.to), fit.points,
-            linear ? json(*linear) : "null", json(a.times), json(a.values));
+        return line_of({{"n", wave.n},
+                        {"m", wave.m},
+                        {"source", a.source},
+                        {"rate", fit.rate},
+                        {"error", fit.error},
+                        {"from", fit.from},
+                        {"to", fit.to},
+                        {"points", fit.points},
+                        {"linear_rate", or_null(linear)},
+                        {"time", a.times},
+                        {"amplitude", a.values}});
     return words_of(wave, a, fit, linear);
 }
 

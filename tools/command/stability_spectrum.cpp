@@ -64,20 +64,21 @@ std::string csv_of(const std::vector<Found>& found) {
     return out;
 }
 
-std::string json_of(const std::vector<Found>& found) {
-    std::string models;
+std::string json_text(const std::vector<Found>& found) {
+    Json models = Json::array();
     for (const auto& [model, spectrum] : found) {
-        std::string modes;
+        Json modes = Json::array();
         for (const axisym::ModeRates& mode : spectrum.modes)
-            modes += fmt::format("{}\n  {{\"m\": {}, \"rates\": {}, \"shape\": {}}}", modes.empty() ? "" : ",", mode.m,
-                                 json(mode.rates), json(mode.shape));
-        models += fmt::format(
-            "{}\n{{\"model\": {}, \"at_rest\": {}, \"tension\": {}, \"pressure\": {}, \"estimated_error\": {}, "
-            "\"elements\": {}, \"modes\": [{}]}}",
-            models.empty() ? "" : ",", json(name(model)), spectrum.at_rest() ? "true" : "false", json(spectrum.sigma),
-            json(-spectrum.lambda), json(spectrum.estimated_error), spectrum.elements, modes);
+            modes.push_back({{"m", mode.m}, {"rates", mode.rates}, {"shape", mode.shape}});
+        models.push_back({{"model", name(model)},
+                          {"at_rest", spectrum.at_rest()},
+                          {"tension", spectrum.sigma},
+                          {"pressure", -spectrum.lambda},
+                          {"estimated_error", spectrum.estimated_error},
+                          {"elements", spectrum.elements},
+                          {"modes", modes}});
     }
-    return fmt::format("{{\"shape\": \"profile\", \"models\": [{}]}}\n", models);
+    return line_of({{"shape", "profile"}, {"models", models}});
 }
 
 }  // namespace
@@ -105,7 +106,7 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
         case Output::csv:
             return csv_of(found);
         case Output::json:
-            return json_of(found);
+            return json_text(found);
         default:
             return words_of(found) + refused;
     }

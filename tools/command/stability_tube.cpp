@@ -360,61 +360,59 @@ std::string csv_of(const std::vector<ModelReport>& reports) {
     return to_string(out);
 }
 
-std::string json_of(const std::vector<std::complex<double>>& roots) {
-    std::string list;
-    for (const auto& s : roots)
-        list += fmt::format("{}[{}, {}]", list.empty() ? "" : ", ", json(s.real()), json(s.imag()));
-    return "[" + list + "]";
+Json json_of(const std::vector<std::complex<double>>& roots) {
+    return json_list(roots, [](const auto& root) { return Json{root.real(), root.imag()}; });
 }
 
-std::string json_of(const WaveRow& row) {
-    return fmt::format(
-        "{{\"m\": {}, \"n\": {}, \"q\": {}, \"rate\": {}, \"frequency\": {}, \"roots\": {}, \"factor\": {}}}", row.m,
-        row.n ? json(*row.n) : "null", json(row.q), json(row.growth.rate()), json(row.growth.frequency()),
-        json_of(row.growth.roots), row.factor ? json(*row.factor) : "null");
+Json json_of(const WaveRow& row) {
+    return {{"m", row.m},
+            {"n", or_null(row.n)},
+            {"q", row.q},
+            {"rate", row.growth.rate()},
+            {"frequency", row.growth.frequency()},
+            {"roots", json_of(row.growth.roots)},
+            {"factor", or_null(row.factor)}};
 }
 
-std::string json_of(const Threshold& limit) {
-    return fmt::format("{{\"name\": {}, \"m\": {}, \"q\": {}, \"tension\": {}, \"grows\": {}}}", json(limit.name),
-                       limit.m, json(limit.q), json(limit.tension), limit.grows_above ? "\"above\"" : "\"below\"");
+Json json_of(const Threshold& limit) {
+    return {{"name", limit.name},
+            {"m", limit.m},
+            {"q", limit.q},
+            {"tension", limit.tension},
+            {"grows", limit.grows_above ? "above" : "below"}};
 }
 
-template <class T, class Make>
-std::string list_of(const std::vector<T>& items, const Make& make) {
-    std::string text;
-    for (std::size_t i = 0; i < items.size(); ++i) text += fmt::format("{}\n  {}", i > 0 ? "," : "", make(items[i], i));
-    return "[" + text + "]";
+Json json_of(const ModelReport& report) {
+    Json fastest = Json::array(), fitting;
+    for (std::size_t m = 0; m < report.fastest.size(); ++m) {
+        const auto& wave = report.fastest[m];
+        fastest.push_back({{"m", m}, {"q", wave ? Json(wave->q) : Json()}, {"rate", wave ? Json(wave->rate) : Json()}});
+    }
+    if (const auto& f = report.fastest_fitting) fitting = {{"n", f->n}, {"m", f->m}, {"q", f->q}, {"rate", f->rate}};
+    return {{"model", name(report.model)},
+            {"beyond", instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)},
+            {"Re", report.model.Re},
+            {"gamma", motion_law(report.model).friction},
+            {"tension", report.tube.tension},
+            {"tension_source", report.tension_source},
+            {"reduced_tension", theory::reduced_tension(report.tube)},
+            {"radius_rate", radius_rate_of(report)},
+            {"least_k42", or_null(least_k42_of(report.tube))},
+            {"waves", json_list(report.rows, [](const WaveRow& row) { return json_of(row); })},
+            {"fastest", fastest},
+            {"fastest_fitting", fitting}};
 }
 
-std::string json_of(const ModelReport& report) {
-    const auto fastest = list_of(report.fastest, [](const auto& wave, std::size_t m) {
-        return wave ? fmt::format("{{\"m\": {}, \"q\": {}, \"rate\": {}}}", m, json(wave->q), json(wave->rate))
-                    : fmt::format("{{\"m\": {}, \"q\": null, \"rate\": null}}", m);
-    });
-    const auto& fits = report.fastest_fitting;
-    const std::string fitting = fits ? fmt::format("{{\"n\": {}, \"m\": {}, \"q\": {}, \"rate\": {}}}", fits->n,
-                                                   fits->m, json(fits->q), json(fits->rate))
-                                     : "null";
-    const auto least = least_k42_of(report.tube);
-    return fmt::format(
-        "{{\"model\": {}, \"beyond\": {}, \"Re\": {}, \"gamma\": {}, \"tension\": {}, \"tension_source\": {}, "
-        "\"reduced_tension\": {}, \"radius_rate\": {},\n\"least_k42\": {},\n\"waves\": {},\n\"fastest\": "
-        "{},\n\"fastest_fitting\": {}}}",
-        json(name(report.model)), json(instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)),
-        json(report.model.Re), json(motion_law(report.model).friction), json(report.tube.tension), json(report.tension_source),
-        json(theory::reduced_tension(report.tube)), json(radius_rate_of(report)), least ? json(*least) : "null",
-        list_of(report.rows, [](const auto& row, std::size_t) { return json_of(row); }), fastest, fitting);
-}
-
-std::string json_head(const TubeSubject& subject, const std::vector<Threshold>& limits, int last) {
+Json json_of(const TubeSubject& subject, const std::vector<Threshold>& limits, int last, const Json& models) {
     const auto stable = theory::common_stable_tensions(subject.tube, last);
-    const bool ill = theory::ill_posed_along(subject.tube) || theory::ill_posed_around(subject.tube);
-    return fmt::format(
-        "\"shape\": \"tube\", \"radius\": {}, \"length\": {}, \"energy\": {}, \"ill_posed\": {},\n\"thresholds\": "
-        "{},\n\"stable_tensions\": {}",
-        json(subject.tube.radius), json(subject.length), json(moduli(subject.tube.energy)), ill ? "true" : "false",
-        list_of(limits, [](const auto& limit, std::size_t) { return json_of(limit); }),
-        stable ? fmt::format("[{}, {}]", json(stable->lowest), json(stable->highest)) : "null");
+    return {{"shape", "tube"},
+            {"radius", subject.tube.radius},
+            {"length", subject.length},
+            {"energy", moduli(subject.tube.energy)},
+            {"ill_posed", theory::ill_posed_along(subject.tube) || theory::ill_posed_around(subject.tube)},
+            {"thresholds", json_list(limits, [](const Threshold& limit) { return json_of(limit); })},
+            {"stable_tensions", stable ? Json{stable->lowest, stable->highest} : Json()},
+            {"models", models}};
 }
 
 }  // namespace
@@ -427,8 +425,8 @@ std::string tube_report(const StabilityOptions& options, const TubeSubject& subj
         case Output::csv:
             return csv_of(reports);
         case Output::json:
-            return fmt::format("{{{},\n\"models\": {}}}\n", json_head(subject, limits, options.modes),
-                               list_of(reports, [](const auto& report, std::size_t) { return json_of(report); }));
+            return line_of(json_of(subject, limits, options.modes,
+                                   json_list(reports, [](const ModelReport& one) { return json_of(one); })));
         default:
             return words_of(subject, reports, limits, options.modes);
     }
@@ -449,12 +447,12 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
         const std::vector<double> asked = wave_numbers(options.q);
         q_end = std::max(*std::max_element(asked.begin(), asked.end()), 1e-6 / subject.tube.radius);
     }
-    std::string panels;
+    Json panels = Json::array();
     for (const ModelReport& report : reports) {
         Model short_of_volume = report.model;
         short_of_volume.keeps_volume.reset();
         const std::string title = words(short_of_volume);
-        std::string curves;
+        Json curves = Json::array();
         for (int m = 0; m <= options.modes; ++m) {
             std::vector<double> q, rate, neutral;
             constexpr int samples = 400;
@@ -466,21 +464,18 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
             for (const theory::Band& band : theory::growing_bands(report.tube, m))
                 for (const double edge : {band.from, band.to})
                     if (edge > 0 && std::isfinite(edge)) neutral.push_back(edge);
-            curves += fmt::format("{}\n {{\"m\": {}, \"q\": {}, \"rate\": {}, \"neutral\": {}}}", m > 0 ? "," : "", m,
-                                  json(q), json(rate), json(neutral));
+            curves.push_back({{"m", m}, {"q", q}, {"rate", rate}, {"neutral", neutral}});
         }
-        panels += fmt::format("{}\n{{\"title\": {}, \"report\": {},\n\"curves\": [{}]}}", panels.empty() ? "" : ",",
-                              json(title), json_of(report), curves);
+        panels.push_back({{"title", title}, {"report", json_of(report)}, {"curves", curves}});
     }
-    return fmt::format("{{{},\n\"models\": [{}]}}\n",
-                       json_head(subject, thresholds(subject.tube, options.modes), options.modes), panels);
+    return line_of(json_of(subject, thresholds(subject.tube, options.modes), options.modes, panels));
 }
 
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
                           const std::vector<Model>& models) {
     const int last = options.waves.value_or(6);
     Text out;
-    std::string list;
+    Json list = Json::array();
     if (options.csv) add(out, "model,l,rate,frequency\n");
     if (!options.csv) add(out, "sphere of radius {:.8g}; {}; for any m <= l\n", sphere.radius, moduli(sphere.energy));
     for (const Model& model : models) {
@@ -503,13 +498,12 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
                 if (swings) add(out, " {:>14.7g}", found.frequency());
                 add(out, " {:>12}{}\n", e_fold(s), s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
             }
-            list += fmt::format("{}\n  {{\"model\": {}, \"l\": {}, \"rate\": {}, \"roots\": {}}}",
-                                list.empty() ? "" : ",", json(name(model)), l, json(s), json_of(found.roots));
+            list.push_back({{"model", name(model)}, {"l", l}, {"rate", s}, {"roots", json_of(found.roots)}});
         }
     }
     if (options.json)
-        return fmt::format("{{\"shape\": \"sphere\", \"radius\": {}, \"energy\": {}, \"waves\": [{}]}}\n",
-                           json(sphere.radius), json(moduli(sphere.energy)), list);
+        return line_of(
+            {{"shape", "sphere"}, {"radius", sphere.radius}, {"energy", moduli(sphere.energy)}, {"waves", list}});
     return to_string(out);
 }
 

@@ -1,6 +1,5 @@
 #include "tools/scan/point.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -12,6 +11,7 @@
 #include "axisym/graph/graph_frame.hpp"
 #include "common/case/read.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/solve/dense.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/failure.hpp"
 #include "tools/scan/uniform_fate.hpp"
@@ -95,14 +95,15 @@ Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
     const axisym::ProfileSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
     const axisym::Forms forms(space, c.energy, loads_at(motion_law(c.model), 0));
     const Eigen::MatrixXd hessian = forms.hessian(state.coefficients), mass = forms.mass(state.coefficients);
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(hessian, mass);
-    const Eigen::VectorXd& rate = modes.eigenvalues();
+    const std::optional<Eigenpairs> modes = eigenpairs(hessian, mass);
+    if (!modes) return Rest::on_its_way;
+    const Eigen::VectorXd& rate = modes->values;
     const double none = translation * rate.cwiseAbs().maxCoeff();
     if (rate.minCoeff() < -none) return Rest::on_a_saddle;
-    const Eigen::VectorXd force = modes.eigenvectors().transpose() * forms.gradient(state.coefficients);
+    const Eigen::VectorXd force = modes->vectors.transpose() * forms.gradient(state.coefficients);
     Eigen::VectorXd step = Eigen::VectorXd::Zero(force.size());
     for (Eigen::Index i = 0; i < force.size(); ++i)
-        if (rate[i] > none) step += force[i] / rate[i] * modes.eigenvectors().col(i);
+        if (rate[i] > none) step += force[i] / rate[i] * modes->vectors.col(i);
     const double waves = std::max(r_max - r_min, waves_of_uniform_tube * (r_max + r_min)) / 2;
     return step.cwiseAbs().maxCoeff() < near_rest * waves ? Rest::here : Rest::on_its_way;
 }
