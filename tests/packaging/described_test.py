@@ -49,6 +49,9 @@ class Described(unittest.TestCase):
         self.assertEqual(schema.against("describe", DESCRIBED), [])
         self.assertEqual([command["name"] for command in json.loads(DESCRIBED)["commands"]], COMMANDS)
         self.assertGreater(len(COMMANDS), 9)
+        for command in json.loads(DESCRIBED)["commands"]:  # in words of its own, of C++ or Python
+            self.assertRegex(help_of(), rf"(?m)^  {command['name']} +{re.escape(command['description'])}$")
+            self.assertTrue(help_of(command["name"]).startswith(command["description"] + "\n"), command["name"])
 
     def test_manual_pages(self):
         with tempfile.TemporaryDirectory() as folder:

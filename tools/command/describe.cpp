@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <vector>
 
+#include "tools/command/forward.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/python.hpp"
 #include "tools/command/text.hpp"
 
 namespace tubule {
@@ -42,7 +44,8 @@ std::string description(const CLI::App& app) {
         add(options, "{}\n  {}", options.empty() ? "" : ",", described(*option));
     }
     for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-        add(commands, "{}\n{}", commands.empty() ? "" : ",", description(*command));
+        add(commands, "{}\n{}", commands.empty() ? "" : ",",
+            is_forwarded(command->get_name()) ? described_by_script(command->get_name()) : description(*command));
     return fmt::format(R"({{"name": {}, "description": {}, "footer": {}, "options": [{}], "commands": [{}]}})",
                        json(app.get_name()), json(app.get_description()), json(app.get_footer()), options, commands);
 }

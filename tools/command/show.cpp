@@ -18,6 +18,7 @@
 #include "common/case/read.hpp"
 #include "common/result/checksums.hpp"
 #include "common/result/record.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
@@ -210,8 +211,8 @@ std::string json_of(const SurfaceCells& mesh, bool data) {
 }
 
 void add_json(Text& out, const Result& result, std::optional<std::size_t> with_data) {
-    add(out, "{{\n\"case\": {{\"text\": {}, \"set\": {}}},\n", json(result.case_text.text),
-        json(result.case_text.sets));
+    add(out, "{{\n\"case\": {{\"text\": {}, \"set\": {}, \"resolved\": {}}},\n", json(result.case_text.text),
+        json(result.case_text.sets), json(resolved_case(result.case_text)));
     add(out, "\"about\": {},\n\"series\": {{", json(result.about));
     for (std::size_t j = 0; j < result.series_names.size(); ++j) {
         const std::string& name = result.series_names[j];

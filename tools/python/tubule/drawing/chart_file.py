@@ -7,6 +7,7 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .command_line import BadInput
 from .chart_runs import Job, value_text
 from .labels import flatten
 
@@ -16,10 +17,6 @@ REFERENCE_KEYS = ("result", "set", "values", "E_ref", "known_to", "source")
 MAP_KEYS = ("key", "from", "to", "per_decade", "steps")
 MOST_RUNS = 2000
 LARGEST_FILE = 2**20  # bytes
-
-
-class BadChart(Exception):
-    """One line for the user."""
 
 
 @dataclass
@@ -116,18 +113,18 @@ class Reader:
     def __init__(self, path, table, where, keys):
         self.path, self.table, self.where = path, table, where
         if not isinstance(table, dict):
-            raise BadChart(f"{path}: {where}: must be a table")
+            raise BadInput(f"{path}: {where}: must be a table")
         for key in table:
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, 1)
                 meant = f"; did you mean {near[0]!r}?" if near else ""
-                raise BadChart(f"{path}: {self.name(key)}: unknown key; allowed: {', '.join(keys)}{meant}")
+                raise BadInput(f"{path}: {self.name(key)}: unknown key; allowed: {', '.join(keys)}{meant}")
 
     def name(self, key):
         return f"{self.where}.{key}" if self.where else key
 
     def fail(self, key, allowed):
-        raise BadChart(f"{self.path}: {self.name(key)}: must be {allowed}, not {self.table[key]!r}")
+        raise BadInput(f"{self.path}: {self.name(key)}: must be {allowed}, not {self.table[key]!r}")
 
     def text(self, key, default=""):
         if not isinstance(self.table.get(key, default), str):
@@ -161,33 +158,33 @@ class Reader:
         lists = self.sets(key)
         for name, values in lists.items():
             if not isinstance(values, list) or not values:
-                raise BadChart(f"{self.path}: {self.name(key)}.{name}: must be a list of values, not {values!r}")
+                raise BadInput(f"{self.path}: {self.name(key)}.{name}: must be a list of values, not {values!r}")
         return lists
 
 
 def toml_of(path):
-    """Raises BadChart."""
+    """Raises BadInput."""
     try:
         if path.exists() and not path.is_file():
-            raise BadChart(f"{path}: is a directory, a pipe or a device, not a file")
+            raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
         if path.exists() and path.stat().st_size > LARGEST_FILE:
-            raise BadChart(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
+            raise BadInput(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
         return tomllib.loads(path.read_text())
     except OSError as error:
-        raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise BadChart(f"{path}: is not TOML: {error}") from error
+        raise BadInput(f"{path}: is not TOML: {error}") from error
 
 
 def read_chart(path, study):
-    """The chart of a file, without the series marked as a study unless requested. Raises BadChart."""
+    """The chart of a file, without the series marked as a study unless requested. Raises BadInput."""
     path = Path(path)
     root = Reader(path, toml_of(path), "", CHART_KEYS)
     if "case" not in root.table:
-        raise BadChart(f"{path}: case: is missing: the case file, relative to this file")
+        raise BadInput(f"{path}: case: is missing: the case file, relative to this file")
     tables = root.table.get("series", [])
     if not isinstance(tables, list) or not tables:
-        raise BadChart(f"{path}: needs at least one [[series]]")
+        raise BadInput(f"{path}: needs at least one [[series]]")
     chart = Chart(path, path.parent / root.text("case"), root.text("title"), root.text("quantity", "energy"))
     chart.times = root.numbers("times")
     chart.limit = root.number("limit", chart.limit, above=0)
@@ -215,9 +212,9 @@ def read_reference(path, table):
     reader = Reader(path, table, "reference", REFERENCE_KEYS)
     given = [key for key in ("result", "set", "values") if key in table]
     if len(given) != 1:
-        raise BadChart(f"{path}: reference: needs one of result, set, values, not {' and '.join(given) or 'none'}")
+        raise BadInput(f"{path}: reference: needs one of result, set, values, not {' and '.join(given) or 'none'}")
     if "values" in table and "E_ref" not in table:
-        raise BadChart(f"{path}: reference.E_ref: is missing: what the errors are relative to")
+        raise BadInput(f"{path}: reference.E_ref: is missing: what the errors are relative to")
     return Reference(
         path.parent / reader.text("result") if "result" in table else None,
         reader.sets("set") if "set" in table else None,
@@ -232,7 +229,7 @@ def read_map(path, table):
     reader = Reader(path, table, "map", MAP_KEYS)
     for key in ("key", "from", "to"):
         if key not in table:
-            raise BadChart(f"{path}: map.{key}: is missing")
+            raise BadInput(f"{path}: map.{key}: is missing")
     return Map(
         reader.text("key"),
         reader.number("from", above=0),
@@ -268,7 +265,7 @@ def plain(text):
 def assignment(text, option):
     key, equals, value = text.partition("=")
     if not (key and equals and value):
-        raise BadChart(f"{option} {text}: must be key=value, such as discretisation.order=3")
+        raise BadInput(f"{option} {text}: must be key=value, such as discretisation.order=3")
     return key, value
 
 
@@ -277,13 +274,13 @@ def words(sets):
 
 
 def chart_of_case(path, varied, also):
-    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadChart."""
+    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadInput."""
     keys = {}
     for text in varied:
         key, values = assignment(text, "--vary")
         keys[key] = [plain(value) for value in split(values)]
         if "" in keys[key]:
-            raise BadChart(f"--vary {text}: a value is empty")
+            raise BadInput(f"--vary {text}: a value is empty")
     *outer, last = keys
     vary = {last: keys[last]}
     lines = [dict(zip(outer, values)) for values in itertools.product(*(keys[key] for key in outer))]
@@ -296,31 +293,31 @@ def map_option(text):
     key, values = assignment(text, "--map")
     numbers = [plain(value) for value in values.split(":")]
     if len(numbers) not in (2, 3) or not all(type(n) in (int, float) and n > 0 for n in numbers):
-        raise BadChart(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
+        raise BadInput(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
     return Map(key, float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else 6, 60)
 
 
 def check(chart):
-    """Checks that involve several keys. Raises BadChart."""
+    """Checks that involve several keys. Raises BadInput."""
     path = chart.path
     if not chart.case.is_file():
-        raise BadChart(f"{path}: case: {chart.case}: no such file")
+        raise BadInput(f"{path}: case: {chart.case}: no such file")
     if not chart.series:
-        raise BadChart(f"{path}: every series is a study; add --study")
+        raise BadInput(f"{path}: every series is a study; add --study")
     times = chart.times
     if times and (times[0] <= 0 or any(a >= b for a, b in zip(times, times[1:]))):
-        raise BadChart(f"{path}: times: must be growing numbers above 0, not {times}")
+        raise BadInput(f"{path}: times: must be growing numbers above 0, not {times}")
     if chart.reference.values and (not times or len(times) != len(chart.reference.values)):
-        raise BadChart(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
+        raise BadInput(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
     if chart.map:
         if not chart.map.low < chart.map.high:
-            raise BadChart(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
+            raise BadInput(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
         for series in chart.series:
             if len(series.vary) != 1 or list(series.vary) != [chart.against]:
-                raise BadChart(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
+                raise BadInput(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
             if not all(type(value) in (int, float) and value > 0 for value in series.vary[chart.against]):
-                raise BadChart(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
+                raise BadInput(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
         return
     count = len(chart.jobs())
     if count > MOST_RUNS:
-        raise BadChart(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")
+        raise BadInput(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")
