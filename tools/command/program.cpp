@@ -135,7 +135,7 @@ int run(int argc, char** argv) {
     // Last, since subcommands would inherit it.
     end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {
-const std::vector<const char*> arguments = arguments_of(argc, argv, app);
+        const std::vector<const char*> arguments = arguments_of(argc, argv, app);
         if (arguments.size() > 1 && is_forwarded(arguments[1]))
             return forward(arguments[1], {arguments.begin() + 2, arguments.end()});
         app.parse(static_cast<int>(arguments.size()), arguments.data());

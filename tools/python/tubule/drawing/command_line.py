@@ -48,6 +48,13 @@ def number(low=-math.inf, high=math.inf):
     return parse
 
 
+def integer(text):
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not an integer") from None
+
+
 def listed(parse):
     return lambda text: [parse(one) for one in text.split(",") if one]
 
@@ -131,7 +138,10 @@ class Parser(argparse.ArgumentParser):
         return "\n".join([said["description"], usage, "", "Positionals:", *lines[True], "", "Options:", *lines[False], "", self.footer, ""])
 
     def error(self, message):
-        raise BadInput(f"{self.prog}: {message.removeprefix('argument ')}")
+        for words, plain in ((r"argument (\S+): expected one argument", r"\1: a value is missing after it"),
+                             (r"the following arguments are required: (\S+)", r"\1 is missing"), (r"argument (.*)", r"\1")):  # fmt: skip
+            message = re.sub(f"^{words}", plain, message)
+        raise BadInput(f"{self.prog}: {message}")
 
     def parsed(self, words):
         """The options. Raises BadInput, and Help where that is asked for."""
@@ -159,7 +169,10 @@ class Parser(argparse.ArgumentParser):
     def unexpected(self, words):
         names = [name for name in self._option_string_actions if name.startswith("--")]
         near = difflib.get_close_matches(words[0].partition("=")[0], names, 1)
-        meant = f"; did you mean '{near[0]}'?" if near else f"; options are {' '.join(names)}" if words[0].startswith("-") else ""
+        known = f"; options are {' '.join(names)}" if words[0].startswith("-") else ""
+        meant = f"; did you mean '{near[0]}'?" if near else known
+        if words[0].startswith(("\u2013", "\u2014")):
+            meant = "; an option begins with the hyphen of the keyboard, -"
         raise BadInput(f"{self.prog}: not expected: {' '.join(words)}{meant}\nRun `{self.prog} --help` for more information.")
 
 
@@ -223,7 +236,7 @@ def chart():
     option("-o", "--output", type=file_name, **many,
            help="picture, .svg, .png or .pdf; may be repeated (default: FILE.svg, in this directory). The data are written "
                 "beside the first, .csv")  # fmt: skip
-    option("--jobs", type=int, metavar="INT", default="1", help="runs at a time; 1 for times that can be compared")
+    option("--jobs", type=integer, metavar="INT", default="1", help="runs at a time; 1 for times that can be compared")
     option("--limit", type=number(), metavar="FLOAT", help="seconds after which a run is given up (default 600)")
     option("--study", type=None, help="also what the chart marks as a study: long runs")
     option("--again", type=None, help="repeat runs that the data hold already")

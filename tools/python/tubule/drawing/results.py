@@ -1,5 +1,6 @@
 """Reads result files into plain data. Layout: docs/results.md."""
 
+import difflib
 import json
 import os
 import re
@@ -145,13 +146,26 @@ class Result:
 BEST_COMPRESSION = 1032  # of deflate
 
 
+def why_missing(path):
+    """What may have been meant by the name of a file that is not there."""
+    folder, name = os.path.split(path)
+    case = os.path.splitext(name)[0] + ".toml"
+    if path.startswith("~"):
+        return "; ~ does not stand for the home directory here: write the whole path"
+    if name.endswith(".hdf") and os.path.exists(os.path.join(folder, case)):
+        return f"; tubule run {case} makes it"
+    others = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+    near = difflib.get_close_matches(name, [other for other in others if os.path.splitext(other)[1] == os.path.splitext(name)[1]], 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
 @contextmanager
 def opened(path):
     """The HDF5 file, or one in memory. BadInput names it for all that is wrong with it, and for links to other files: what
     lies there may be anything, and anybody's."""
     named = isinstance(path, str)
     if named and not os.path.exists(path):
-        raise BadInput(f"{path}: no such file")
+        raise BadInput(f"{path}: no such file{why_missing(path)}")
     if named and not os.path.isfile(path):
         raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
     if named and path.endswith(".toml"):
