@@ -368,7 +368,8 @@ class Show(ProgramTest):
 
     def test_json_is_the_result(self):
         data = json.loads(self.tubule("show", self.result, "--json", "--frame", "1")[0])
-        self.assertEqual(data["case"], {"text": QUICK, "set": []})
+        self.assertEqual((data["case"]["text"], data["case"]["set"]), (QUICK, []))
+        self.assertIn("k40 = 0", data["case"]["resolved"])
         self.assertEqual(data["about"]["stop"], "finished")
         self.assertEqual({name: list(values) for name, values in series(self.result).items()}, data["series"])
         self.assertEqual([frame["time"] for frame in data["frames"]], [0, 0.01, 0.05, 0.2])
