@@ -28,7 +28,12 @@ PACKAGE = Path(__file__).resolve().parents[2] / "tools/python/tubule"
 PLOT = PACKAGE / "drawing"
 sys.path[:0] = [str(PACKAGE), str(Path(__file__).resolve().parents[1] / "support")]
 import scripts  # noqa: E402
-from drawing import colours, curves, energy, labels, movie, results, tubes, validation, work_precision, work_precision_fluid  # noqa: E402
+import drawing  # noqa: E402
+from drawing import colours, curves, energy, labels, movie, results, tubes  # noqa: E402
+
+FIGURES = Path(__file__).resolve().parents[2] / "docs/figures"
+drawing.__path__.append(str(FIGURES))
+from drawing import validation, work_precision, work_precision_fluid  # noqa: E402
 
 TUBULE = None
 CASE = """tier = "axisym"
@@ -666,7 +671,7 @@ class Validation(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT, "validation", table, "-o", self.folder / "v.svg")
+        return scripts.run_script(PLOT, FIGURES / "validation.py", table, "-o", self.folder / "v.svg")
 
     def test_figure(self):
         rows = [self.ROW.format(name, h, 1e-3 * h) for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2)]
@@ -705,7 +710,7 @@ class WorkPrecision(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT, "work_precision", table, "-o", self.folder / "w.svg")
+        return scripts.run_script(PLOT, FIGURES / "work_precision.py", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         rows = 'series,energy_asked,error,estimate,cpu_ms\n"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
@@ -744,7 +749,7 @@ class StepCosts(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT, "step_costs", table, "-o", self.folder / "s.svg")
+        return scripts.run_script(PLOT, FIGURES / "step_costs.py", table, "-o", self.folder / "s.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS)
@@ -782,7 +787,7 @@ class WorkPrecisionFluid(InFolder):
     def draw(self, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT, "work_precision_fluid", table, "-o", self.folder / "w.svg")
+        return scripts.run_script(PLOT, FIGURES / "work_precision_fluid.py", table, "-o", self.folder / "w.svg")
 
     def test_chart(self):
         done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))

@@ -1,4 +1,4 @@
-"""The scripts of this folder: python3 drawing NAME ARGUMENT...
+"""The scripts of this folder, or of another one: python3 drawing NAME ARGUMENT..., python3 drawing docs/figures/NAME.py ARGUMENT...
 
 The package tubule around this folder is not imported, for it needs its compiled part, and pictures do not.
 """
@@ -54,7 +54,10 @@ def main():
         sys.path.pop(0)  # this folder, whose modules are not to be found under their bare names
         import_as("tubule_drawing")
         lines = importlib.import_module("tubule_drawing.command_line")
-    script = sys.argv.pop(1)
+    path = Path(sys.argv.pop(1))
+    script = path.stem
+    if path.suffix == ".py":
+        sys.modules["tubule_drawing"].__path__.append(str(path.parent))
     return lines.status_of(lambda: prepared(script, lines)())
 
 
