@@ -108,7 +108,7 @@ def truth_of(chart, times, runs, own, program):
     if not whole:
         raise BadInput("no run reached the end of the chart, so errors have no reference")
     best = min(whole, key=lambda run: (run.stated_error or float("inf"), -run.cpu_s))
-    scale = best.scale if "energy" in chart.quantity else max(map(abs, best.values.values()))
+    scale = best.E_ref if "energy" in chart.quantity else max(map(abs, best.values.values()))
     return Truth({time: best.values[time] for time in times}, scale or 1.0, best.stated_error, "own finest run", best.key)
 
 
