@@ -28,6 +28,14 @@ class Truth:
     key: str = ""  # of its run
 
 
+def found(file):
+    """The name of a case; of cases/NAME.toml, where there is none here, that beside the installed program or in its sources."""
+    places = Path(os.environ["TUBULE_PROGRAM"]).parents[1] / "share/tubule", Path(__file__).resolve().parents[4]
+    if not file.startswith("cases/") or os.path.exists(file):
+        return file
+    return next((str(place / file) for place in places if (place / file).exists()), file)
+
+
 def chart_of(options):
     """The chart that the file and the options describe, validated. Raises BadInput."""
     if "series" in toml_of(Path(options.file)):
@@ -334,6 +342,7 @@ def draw_chart(options):
 def main(options):
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
+    options.file = found(options.file)
     try:
         return draw_chart(options)
     except OSError as error:  # a full disk, no more processes
