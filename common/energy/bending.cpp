@@ -52,6 +52,19 @@ std::string term_label(const EnergyTerm& term) {
     return fmt::format("k_{{{}}}{}{}", name, power("(H-H_0)", term.H), power("K", term.K));
 }
 
+std::string term_label(std::string_view name) {
+    std::string label = "k f(H,K)";
+    bool listed = name == "formula";
+    for_each_bending_term([&](std::size_t, const auto& term) {
+        if (name == term.name) label = term.label, listed = true;
+    });
+    if (listed) return label;
+    const std::size_t bar = name.find('_'), digits = bar == name.npos ? 1 : bar;
+    const int order = std::stoi(std::string(name.substr(0, digits))),
+              K = std::stoi(std::string(name.substr(bar == name.npos ? 1 : bar + 1)));
+    return term_label(EnergyTerm{.H = order - 2 * K, .K = K});
+}
+
 std::vector<std::string> term_names(const Bending& bending) {
     std::vector<std::string> out;
     for_each_bending_term([&](std::size_t, const auto& term) { out.emplace_back(term.name); });

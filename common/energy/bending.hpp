@@ -129,8 +129,9 @@ inline double modulus(const Bending& bending, std::size_t term) {
 
 // What follows energy_ in the series of a term: 41 for (H-H0)^2 K, of geometric order 4 with K to the power 1.
 std::string term_name(const EnergyTerm& term);
-// In mathtext for pictures, as BendingTerm::label.
+// In mathtext for pictures, as BendingTerm::label; also by what follows energy_ in the name of its series.
 std::string term_label(const EnergyTerm& term);
+std::string term_label(std::string_view name);
 // Of all terms, in order.
 std::vector<std::string> term_names(const Bending& bending);
 // The modulus of a term in case files: energy.k20, energy.term.0.modulus.

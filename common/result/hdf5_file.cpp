@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/energy/bending.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/result_index.hpp"
@@ -56,6 +57,8 @@ void put_series(hid_t file, const Contents& contents, std::vector<Extent>& exten
         if (const SeriesEntry* entry = find_series(contents.series[j])) {
             put_attribute(data, "unit", std::string(entry->unit));
             put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
+            if (const auto term = energy_part(contents.series[j]); !term.empty())
+                put_attribute(data, "label", term_label(term));
         }
     }
 }
@@ -115,7 +118,7 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
     return record;
 }
 
-std::string get_case_text(hid_t dataset) {
+std::string get_one_text(hid_t dataset) {
     const Handle extent(H5Dget_space(dataset), H5Sclose, "read", "case");
     require(H5Sget_simple_extent_npoints(extent) == 1, "read as one string", "case");
     const auto type = text_type();
@@ -153,7 +156,10 @@ void require_parts(hid_t file) {
 
 CaseText get_case(hid_t file) {
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
-    return {get_case_text(text), get_texts(open_attribute(text, "set"), "set"), get_inputs(file)};
+    CaseText out{get_one_text(text), get_texts(open_attribute(text, "set"), "set"), get_inputs(file)};
+    if (has(file, "resolved_case"))
+        out.resolved = get_one_text(Handle(H5Dopen2(file, "resolved_case", H5P_DEFAULT), H5Dclose, "open", "case"));
+    return out;
 }
 
 Contents get_contents(hid_t file) {
@@ -210,6 +216,8 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     put_attribute(file, "about_begun", contents.about_begun);
     const char* text = contents.case_text.text.c_str();
     put_attribute(put_dataset(file, "case", text_type(), scalar(), &text), "set", contents.case_text.sets);
+    if (const char* resolved = contents.case_text.resolved.c_str(); *resolved)
+        put_dataset(file, "resolved_case", text_type(), scalar(), &resolved);
     put_inputs(file, contents.case_text.inputs);
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)

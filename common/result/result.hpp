@@ -64,6 +64,7 @@ struct CaseText {
     std::string text;               // verbatim
     std::vector<std::string> sets;  // overrides "key=value"
     CaseInputs inputs = {};         // what it reads besides
+    std::string resolved = {};      // effective_toml(); results of earlier versions have none
 };
 
 // Writes a result such that every row and frame passed to it survives a kill at any later moment:

@@ -2,13 +2,15 @@
 
 #include "common/result/contents.hpp"
 #include "common/result/hdf5_file.hpp"
+#include "common/result/start_frame.hpp"
 
 namespace tubule {
 
 std::vector<std::byte> result_image(const Result& result) {
     Contents contents;
     contents.about_begun = result.about.size();
-    contents.case_text = result.case_text, contents.about = result.about, contents.series = result.series_names;
+    contents.case_text = result.case_text, contents.case_text.resolved = resolved_case(result.case_text);
+    contents.about = result.about, contents.series = result.series_names;
     const std::size_t width = contents.series.size(), rows = result.series.at("time").size();
     contents.rows.resize(width * rows);
     for (std::size_t j = 0; j < width; ++j) {

@@ -113,7 +113,16 @@ std::string changed_input(const Case& c, const CaseInputs& of_result) {
 }
 
 CaseText kept_case(const Case& c) {
-    return {c.text, c.sets, inputs_of(c)};
+    return {c.text, c.sets, inputs_of(c), effective_toml(c)};
+}
+
+std::string resolved_case(const CaseText& c) {
+    if (!c.resolved.empty()) return c.resolved;
+    try {
+        return effective_toml(parse_case(c.text, c.sets, "case", c.inputs));
+    } catch (const std::runtime_error&) {
+        return {};
+    }
 }
 
 }  // namespace tubule

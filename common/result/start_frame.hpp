@@ -30,5 +30,7 @@ std::string changed_input(const Case& c, const CaseInputs& of_result);
 
 // The case as a result keeps it.
 CaseText kept_case(const Case& c);
+// The case as TOML that stands alone, also of a result that has none such; empty where that one can no longer be read.
+std::string resolved_case(const CaseText& c);
 
 }  // namespace tubule

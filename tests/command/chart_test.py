@@ -43,12 +43,10 @@ elif command == "run":
 else:
     n, step = json.loads(Path(arguments[0]).read_text())
     stop, end = ("pinch-off", 0.5) if n == 4 else ("finished", 1.0)
-    if arguments[1] == "--json":
-        about = {"stop": stop, "E_ref": 2.0, "estimated_error": 1 / n**2, "elements": n, "steps": 7}
-        print(json.dumps({"about": about}))
-    else:
-        growth = 1 + step * n  # unstable where step * n exceeds 0.1
-        print(f"time,energy\\n0,2\\n0.5,{2 * growth}\\n" + (f"1,{1 + 1 / n**2}" if end == 1 else ""))
+    about = {"stop": stop, "E_ref": 2.0, "estimated_error": 1 / n**2, "elements": n, "steps": 7}
+    rows = [(0, 2), (0.5, 2 * (1 + step * n)), (1, 1 + 1 / n**2)]  # unstable where step * n exceeds 0.1
+    times, energies = zip(*[row for row in rows if row[0] <= end])
+    print(json.dumps({"about": about, "series": {"time": times, "energy": energies}}))
 """
 
 
@@ -300,7 +298,7 @@ class Outcomes(Charts):
 
 class Front(unittest.TestCase):
     def run_of(self, key, cpu_s, error, outcome="finished"):
-        return chart_runs.Run(key, outcome, cpu_s=cpu_s, values={1.0: 1 + 2 * error}, scale=2.0)
+        return chart_runs.Run(key, outcome, cpu_s=cpu_s, values={1.0: 1 + 2 * error}, E_ref=2.0)
 
     def test_front_and_choices(self):
         """Errors relative to E_ref = 2 against 1. c is beaten by b, e failed, and below 1e-5 nothing is known."""

@@ -368,7 +368,8 @@ class Show(ProgramTest):
 
     def test_json_is_the_result(self):
         data = json.loads(self.tubule("show", self.result, "--json", "--frame", "1")[0])
-        self.assertEqual(data["case"], {"text": QUICK, "set": []})
+        self.assertEqual((data["case"]["text"], data["case"]["set"]), (QUICK, []))
+        self.assertIn("k40 = 0", data["case"]["resolved"])
         self.assertEqual(data["about"]["stop"], "finished")
         self.assertEqual({name: list(values) for name, values in series(self.result).items()}, data["series"])
         self.assertEqual([frame["time"] for frame in data["frames"]], [0, 0.01, 0.05, 0.2])
@@ -495,6 +496,17 @@ class Others(ProgramTest):
         self.tubule("run", self.case)
         self.tubule("plot", self.result, "-o", "picture.svg")
         self.assertIn("<svg", (self.folder / "picture.svg").read_text())
+
+    def test_overrides_of_a_result_of_version_0_1(self):
+        """It lacks /resolved_case: the program tells it, and applies what --set was."""
+        self.tubule("run", self.case)
+        self.tubule("run", self.case, "--set", "energy.k42=0.2", "-o", "new.hdf")
+        with h5py.File(self.folder / "new.hdf") as new, h5py.File(self.folder / "old.hdf", "w") as old:
+            old.attrs.update(new.attrs)
+            for name in set(new) - {"resolved_case"}:
+                new.copy(name, old)
+        self.tubule("plot", self.result, "old.hdf", "-o", "picture.svg")
+        self.assertIn("k\u2084\u2082 = 0.2", (self.folder / "picture.svg").read_text())
 
 
 if __name__ == "__main__":

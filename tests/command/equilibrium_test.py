@@ -17,6 +17,7 @@ ENERGIES = (6.3849499091967346, 3.831523408595685, 1.2568365089070843)
 
 
 PLOT = Path(__file__).resolve().parents[2] / "tools/python/tubule/drawing"
+FIGURES = Path(__file__).resolve().parents[2] / "docs/figures"
 
 
 class Equilibrium(ProgramTest):
@@ -92,11 +93,11 @@ class Equilibrium(ProgramTest):
             ("vesicles", [self.folder / "l2.hdf", self.folder / "l3.hdf"], ("reduced volume", "bifurcation")),
         ):
             picture = self.folder / f"{script}.svg"
-            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, script, *inputs, "-o", picture], capture_output=True, text=True)
+            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, FIGURES / f"{script}.py", *inputs, "-o", picture], capture_output=True, text=True)
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             for word in words:
                 self.assertIn(word, picture.read_text())
-            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, script, *inputs, "-o", "picture.txt"], capture_output=True, text=True)
+            done = subprocess.run(["/usr/bin/python3", "-B", PLOT, FIGURES / f"{script}.py", *inputs, "-o", "picture.txt"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 2)
 
     def test_refusals(self):

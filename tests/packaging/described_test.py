@@ -49,6 +49,9 @@ class Described(unittest.TestCase):
         self.assertEqual(schema.against("describe", DESCRIBED), [])
         self.assertEqual([command["name"] for command in json.loads(DESCRIBED)["commands"]], COMMANDS)
         self.assertGreater(len(COMMANDS), 9)
+        for command in json.loads(DESCRIBED)["commands"]:  # in words of its own, of C++ or Python
+            self.assertRegex(help_of(), rf"(?m)^  {command['name']} +{re.escape(command['description'])}$")
+            self.assertTrue(help_of(command["name"]).startswith(command["description"] + "\n"), command["name"])
 
     def test_manual_pages(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -104,6 +107,8 @@ class Described(unittest.TestCase):
     def test_installed_cases_are_found_from_anywhere(self):
         with tempfile.TemporaryDirectory() as folder:
             self.assertIn("k42 = 0.06", run(TUBULE, "check", "--quick", "cases/figure_k42_006.toml", cwd=folder))
+            chart = subprocess.run([TUBULE, "chart", "cases/decay.toml"], cwd=folder, capture_output=True, text=True)
+            self.assertIn("is a case: it needs --vary", chart.stderr)
             missing = subprocess.run([TUBULE, "check", "cases/none.toml"], cwd=folder, capture_output=True, text=True)
             self.assertEqual(missing.returncode, 2)
             self.assertIn("cases/none.toml: cannot be opened", missing.stdout + missing.stderr)

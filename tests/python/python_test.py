@@ -561,7 +561,7 @@ class Drawing(Folder):
         for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "is not one of"),
                                ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame"),
                                ({"dpi": 5}, "not between 30 and 1200"), ({"colour": ["T"]}, "is not one of u_n"),
-                               ({"plane": ("w", 0)}, "is not one of x"), ({"times": [float("nan")]}, "must be finite"),
+                               ({"plane": ("w", 0)}, "is not x, y or z"), ({"times": [float("nan")]}, "not a list of numbers"),
                                ({"quantity": "energy"}, "belong to scans")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, words):
                 tubule.draw(result, **options)

@@ -16,7 +16,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 from plot_surface_test import octasphere
-from plot_test import PACKAGE, InFolder
+from plot_test import PACKAGE, InFolder, resolved
 
 from drawing import balance, cuts, flow, raster, results, style, surfaces  # found by way of plot_test
 from drawing.tubes import Column
@@ -49,8 +49,9 @@ def write(path, times=(0, 1, 2), pressure=True, sets=()):
     """A result with moving_sphere() as its frames; energy 10 + exp(-t), dissipation exp(-t), defect 1e-3 t (t - 1)."""
     with h5py.File(path, "w") as file:
         text = h5py.string_dtype()
-        case = file.create_dataset("case", data='tier = "surface3d"\n[about]\ntitle = "A sphere"\n', dtype=text)
-        case.attrs.create("set", np.array(["model.kind=fluid", *sets], dtype=object), dtype=text)
+        file["case"] = ""
+        case = resolved('tier = "surface3d"\n[about]\ntitle = "A sphere"\n', ['model.kind="fluid"', *sets])
+        file.create_dataset("resolved_case", data=case, dtype=text)
         file.create_group("about").attrs["stop"] = "finished"
         t = np.concatenate([[0], np.geomspace(1e-3, times[-1], 50)])
         rows = {"time": t, "energy": 10 + np.exp(-t), "energy_20": 10 + np.exp(-t), "dissipation": np.exp(-t)}

@@ -129,7 +129,7 @@ class Pages(Folder):
         subprocess.run([TUBULE, "run", "cases/surface_ellipsoid.toml", "--set", "discretisation.elements=320",
                         "--set", "discretisation.order=4", "--quiet", "-o", result], cwd=ROOT, check=True,
                        capture_output=True)  # fmt: skip
-        shape = view.read_shapes(result)[-1]
+        shape = view.Shape(view.read_result(str(result)).surfaces[-1])
         self.assertGreaterEqual(len(shape.cells), 300)
         shape.u = np.random.default_rng(1).normal(size=shape.points.shape)  # as of a fluid
         shape.fields |= {name: shape.u[:, 0] for name in ("u_n", "p", "energy_density")}

@@ -44,7 +44,7 @@ install(DIRECTORY docs/schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule FILES
 install(DIRECTORY tools/python/tubule/drawing DESTINATION ${TUBULE_PYTHON_DIR}/tubule
         FILES_MATCHING PATTERN "*.py" PATTERN "view.*")  # by itself, too, where there is no Python package
 install(FILES README.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tubule)
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tubule PATTERN figures.json EXCLUDE)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tubule PATTERN figures.json EXCLUDE PATTERN figures EXCLUDE)
 
 # Manual pages and completion of the command line, from what the program says of itself.
 set(TUBULE_ZSH_DIR ${CMAKE_INSTALL_DATADIR}/zsh/site-functions CACHE STRING "Where zsh looks for completions")

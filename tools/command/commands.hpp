@@ -5,7 +5,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/case/case.hpp"
@@ -47,9 +46,6 @@ struct RunOptions {
 };
 int run_cases(const RunOptions& options);
 std::filesystem::path result_path(const RunOptions& options, const std::filesystem::path& case_path);
-
-// Names and formulas of the terms of the energy, for pictures: all listed ones, and those that a case adds.
-std::vector<std::pair<std::string, std::string>> term_labels(const Bending& bending);
 
 // Refuses, before anything is computed, a name that no result can have, or a folder that is not there. Throws
 // CaseError.

@@ -3,7 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <vector>
 
+#include "tools/command/forward.hpp"
 #include "tools/command/json.hpp"
+#include "tools/command/python.hpp"
 
 namespace tubule {
 namespace {
@@ -37,7 +39,8 @@ Json described(const CLI::App& app) {
     for (const CLI::Option* option : app.get_options())
         if (!option->get_group().empty()) options.push_back(described(*option));  // others --help does not show either
     for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-        commands.push_back(described(*command));
+        commands.push_back(is_forwarded(command->get_name()) ? Json::parse(described_by_script(command->get_name()))
+                                                             : described(*command));
     return {{"name", app.get_name()},
             {"description", app.get_description()},
             {"footer", app.get_footer()},

@@ -25,6 +25,7 @@
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/describe.hpp"
+#include "tools/command/forward.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
@@ -135,6 +136,8 @@ int run(int argc, char** argv) {
     end_help(app, {}, {{0}, {1}, {2}, {3}, {4}, {5}, {130}}, {"case_files", "results"});
     try {
         const std::vector<const char*> arguments = arguments_of(argc, argv, app);
+        if (arguments.size() > 1 && is_forwarded(arguments[1]))
+            return forward(arguments[1], {arguments.begin() + 2, arguments.end()});
         app.parse(static_cast<int>(arguments.size()), arguments.data());
     } catch (const CLI::ExtrasError&) {
         put_words(stderr, unexpected_words(app));

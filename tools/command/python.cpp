@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -43,8 +44,18 @@ private:
     sigset_t before_;
 };
 
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+File temporary_file(const std::string& subcommand, const std::string& content) {
+    File file(std::tmpfile(), std::fclose);
+    if (!file || std::fwrite(content.data(), 1, content.size(), file.get()) != content.size() ||
+        std::fflush(file.get()) != 0)
+        throw std::runtime_error(fmt::format("tubule {}: cannot write a temporary file", subcommand));
+    return file;
+}
+
 // Waits for the command, which reads the file from its beginning. Its exit status.
-int wait_for(const std::string& subcommand, std::vector<std::string> command, std::FILE* input) {
+int wait_for(const std::string& subcommand, std::vector<std::string> command, std::FILE* input, int output) {
     std::vector<char*> argv;
     for (std::string& word : command) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -52,7 +63,7 @@ int wait_for(const std::string& subcommand, std::vector<std::string> command, st
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, fileno(input), STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
     pid_t child = 0;
     const int error = [&] {
         const Withheld interrupts;
@@ -85,13 +96,23 @@ int draw_by_script(const std::string& subcommand, const std::string& script, con
     std::vector<std::string> command = plot_command(subcommand, script);
     command.insert(command.end(), arguments.begin(), arguments.end());
     // A file, not a pipe: a script that ends before it has read everything is then no trouble.
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), std::fclose);
-    if (!file || std::fwrite(input.data(), 1, input.size(), file.get()) != input.size() || std::fflush(file.get()) != 0)
-        throw std::runtime_error(fmt::format("tubule {}: cannot write a temporary file for the picture", subcommand));
-    return wait_for(subcommand, std::move(command), file.get());
+    const File file = temporary_file(subcommand, input);
+    return wait_for(subcommand, std::move(command), file.get(), STDERR_FILENO);
 } catch (const std::runtime_error& error) {
     say(stderr, "{}\n", error.what());
     return no_picture;
+}
+
+std::string described_by_script(const std::string& subcommand) {
+    std::vector<std::string> command = plot_command(subcommand, subcommand);
+    command.emplace_back("--describe");
+    const File nothing = temporary_file(subcommand, ""), words = temporary_file(subcommand, "");
+    if (wait_for(subcommand, std::move(command), nothing.get(), fileno(words.get())) != 0)
+        throw std::runtime_error(fmt::format("tubule {}: its script cannot describe itself", subcommand));
+    std::rewind(words.get());
+    std::string out;
+    for (int c = 0; (c = std::fgetc(words.get())) != EOF;) out += static_cast<char>(c);
+    return out;
 }
 
 int become(const std::string& subcommand, std::vector<std::string> command) {
@@ -99,6 +120,7 @@ int become(const std::string& subcommand, std::vector<std::string> command) {
     for (std::string& argument : command) argv.push_back(argument.data());
     argv.push_back(nullptr);
     std::fflush(nullptr);
+    setenv("TUBULE_PROGRAM", std::filesystem::read_symlink("/proc/self/exe").c_str(), 1);
     const Withheld interrupts;
     execv(argv[0], argv.data());
     say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));

@@ -15,6 +15,9 @@ std::vector<std::string> plot_command(const std::string& subcommand, const std::
 int draw_by_script(const std::string& subcommand, const std::string& script, const std::vector<std::string>& arguments,
                    const std::string& input);
 
+// What the script of the subcommand says of its options, as JSON: docs/schemas/describe.json. Throws as above.
+std::string described_by_script(const std::string& subcommand);
+
 // Python takes this process' place, so that its exit status is ours. Returns an exit status only if that is impossible.
 int become(const std::string& subcommand, std::vector<std::string> command);
 

@@ -18,6 +18,7 @@
 #include "common/case/read.hpp"
 #include "common/result/checksums.hpp"
 #include "common/result/record.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
@@ -215,7 +216,10 @@ std::string json_text(const Result& result, std::optional<std::size_t> with_data
     for (std::size_t i = 0; i < result.meshes.size(); ++i)
         meshes.push_back(json_of(result.meshes[i], with_data && result.frames[*with_data].mesh == i));
     for (std::size_t i = 0; i < result.frames.size(); ++i) frames.push_back(json_of(result.frames[i], with_data == i));
-    return line_of({{"case", {{"text", result.case_text.text}, {"set", result.case_text.sets}}},
+    return line_of({{"case",
+                     {{"text", result.case_text.text},
+                      {"set", result.case_text.sets},
+                      {"resolved", or_null(resolved_case(result.case_text))}}},
                     {"about", json_object(result.about)},
                     {"series", series},
                     {"meshes", meshes},

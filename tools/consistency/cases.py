@@ -1,7 +1,6 @@
-"""Cases as nested dicts: reads, changes and writes them as text for the program. Standard library only."""
+"""Cases as nested dicts."""
 
 import copy
-import json
 import tomllib
 from pathlib import Path
 
@@ -25,21 +24,3 @@ def changed(original, **changes):
         else:
             out[key] = value
     return out
-
-
-def text(node, path=()):
-    """As TOML."""
-    plain = {key: value for key, value in node.items() if not _is_table(value)}
-    lines = [f"{key} = {json.dumps(value)}" for key, value in plain.items()]
-    for key, value in node.items():
-        name = ".".join((*path, key))
-        if isinstance(value, dict):
-            lines += ["", f"[{name}]", text(value, (*path, key))]
-        elif _is_table(value):
-            for entry in value:
-                lines += ["", f"[[{name}]]", text(entry, (*path, key))]
-    return "\n".join(lines)
-
-
-def _is_table(value):
-    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))

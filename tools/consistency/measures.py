@@ -120,7 +120,7 @@ def drives(tools, run, names, end, per):
     out = {}
     for name in names:
         if name.startswith("wave "):
-            amplitude = tools.program.amplitudes(run, name.removeprefix("wave "))
+            amplitude = tools.program.amplitudes(run, (int(name.removeprefix("wave ")),))
             out[name] = (amplitude[-1] - amplitude[0]) / per
         elif name == "acceleration squared":
             out[name] = run.at("kinetic_energy", end) / per
@@ -145,9 +145,9 @@ def rates(start, waves, bounds, step, finest=None):
         for elements in (*tools.elements, *([finest] if finest else [])):
             run = surface(tools, cost, waved(begun, waves), elements, step=step)
             for (n, m), row in zip(waves, rows):
-                row.found[run.elements] = [tools.program.fitted(run, f"{n},{m}")]
+                row.found[run.elements] = [tools.program.fitted(run, (n, m))]
         if (1, 0) in waves:
-            fitted, exact = tools.program.fitted(axisym(tools, cost, waved(begun, [(1, 0)]), 1e-10), "1,0"), linear[1, 0]
+            fitted, exact = tools.program.fitted(axisym(tools, cost, waved(begun, [(1, 0)]), 1e-10), (1, 0)), linear[1, 0]
             rows.append(Row("(1, 0), run of tier 1", [fitted], abs(exact), bounds["tier 1"], abs(fitted / exact - 1)))
         return rows
 
@@ -159,7 +159,7 @@ def waved(start, waves):
 
 
 def closed_form(tools, start):
-    (model,) = tools.program.stability(waved(start, []), "--waves", 1, "--modes", 2)["models"]
+    (model,) = tools.program.stability(waved(start, []), waves=1, modes=2)["models"]
     return {(wave["n"], wave["m"]): wave["rate"] for wave in model["waves"]}
 
 
@@ -167,8 +167,8 @@ def spectra(tools, start):
     """Rates of tier 1 by m. With fixed area and volume the tension of a tube is undetermined; this uses that with free volume."""
     volume = "free" if start["model"]["kind"] == "gradient-flow" else "fixed"
     straight = waved(changed(start, model={"volume": volume}, accuracy={"energy": 1e-9}), [])
-    tension = tools.program.stability(waved(start, []), "--waves", 1)["models"][0]["tension"]
-    (model,) = tools.program.stability(straight, "--numerical", "--modes", 2, "--rates", 8, "--tension", tension)["models"]
+    tension = tools.program.stability(waved(start, []), waves=1)["models"][0]["tension"]
+    (model,) = tools.program.stability(straight, numerical=True, modes=2, rates=8, tension=tension)["models"]
     return {entry["m"]: entry["rates"] for entry in model["modes"]}
 
 
@@ -217,7 +217,7 @@ def at_equilibrium(resting, moving, bounds, tolerance):
     run of tier 1 from the stationary shape at that time."""
 
     def measure(tools, cost):
-        rest = tools.program.run(resting, "tier 1, at rest", command="equilibrium")
+        rest = tools.program.run(resting, "tier 1, at rest")
         cost.axisym += rest.cpu_s
         end = moving["time"]["end"]
         moved = axisym(tools, cost, moving)

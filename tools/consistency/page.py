@@ -5,8 +5,6 @@ import io
 import textwrap
 from pathlib import Path
 
-from runs import keep
-
 
 def table(scene):
     """The table of a scene in Markdown."""
@@ -94,8 +92,8 @@ def write(path, tables):
     parts = [head(tables)]
     for scene in tables:
         parts.append(f"## {scene.title}\n\n{textwrap.fill(scene.words, 118)}\n\n{table(scene)}\n")
-    keep(path, "\n".join(parts))
-    keep(path.with_suffix(".csv"), numbers(tables))
+    path.write_text("\n".join(parts))
+    path.with_suffix(".csv").write_text(numbers(tables))
     import picture  # needs matplotlib, unlike the tables
 
     picture.draw(tables, path.with_suffix(".svg"))

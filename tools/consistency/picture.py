@@ -1,7 +1,7 @@
 """Differences against triangles: shapes at rest, rates, and the energies of what moves."""
 
-from drawing import style  # on the path since runs.py
 from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
+from tubule.drawing import style  # on the path since runs.Program
 
 HEIGHT = 3.6  # inches
 COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7")  # of Okabe and Ito; then dashed

@@ -1,38 +1,33 @@
-"""Runs of both tiers, each in its own process, and access to their results. Results that the same program made from the
-same case are reused, so that a suite that was stopped continues."""
+"""Runs of both tiers by the Python package `tubule`, each on one thread, and their results. Those that the same program made
+of the same case are reused, so that a suite that was stopped continues."""
 
 import hashlib
 import json
 import os
-import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-import cases
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "python/tubule"))  # last: it has other modules of our names
-from drawing.raster import division, lagrange  # noqa: E402
-from drawing.results import read_result  # noqa: E402
-
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # CPU times are then comparable
 PIECES = 8  # subdivision of a triangle side in the search for extremes
 
 
 class Failed(Exception):
-    """A run or another call of the program failed."""
+    """A run or another call failed."""
 
 
 @dataclass
 class Run:
     """One result. Times are those of its rows."""
 
-    path: Path
+    result: object  # tubule.Result
     cpu_s: float
-    about: dict
-    series: dict
+    path: Path
+
+    def __getattr__(self, name):  # about, series
+        return getattr(self.result, name)
 
     def at(self, name, time):
         """The row of an output time."""
@@ -63,13 +58,13 @@ class Run:
 
     def extremes(self, name):
         """Smallest and largest H or K of the first frame; on a surface also inside the triangles."""
-        drawn = read_result(self.path)
-        if drawn.surfaces:
-            places, _ = division(PIECES)
-            values = getattr(drawn.surfaces[0], name) @ lagrange(drawn.surfaces[0].order, places).T
+        from tubule.drawing.raster import division, lagrange
+
+        frame = self.result.frames[0]
+        if frame.kind == "surface":
+            values = frame[name][frame.cells] @ lagrange(frame.order, division(PIECES)[0]).T
             return float(values.min()), float(values.max())
-        values = getattr(drawn.frames[0], name)
-        return -_largest(-values), _largest(values)
+        return -_largest(-frame[name]), _largest(frame[name])
 
 
 def _largest(values):
@@ -82,70 +77,45 @@ def _largest(values):
     return float(here - (after - before) ** 2 / (8 * bend)) if bend < 0 else float(here)
 
 
-def keep(path, text):
-    """Writes the file completely or not at all."""
-    aside = path.with_name(path.name + ".part")
-    aside.write_text(text)
-    os.replace(aside, path)
-
-
 class Program:
     def __init__(self, path, folder, say=print):
-        self.path, self.folder, self.say = Path(path).resolve(), Path(folder), say
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"  # CPU times are then comparable
+        sys.path.insert(0, str(path.resolve().parent / "python"))
+        import tubule
+
+        self.tubule, self.folder, self.say = tubule, Path(folder), say
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.made_by = hashlib.sha256(self.path.read_bytes()).hexdigest()
+        self.made_by = hashlib.sha256(Path(tubule._core.__file__).read_bytes()).hexdigest()
 
-    def ask(self, *arguments):
-        """JSON output of the program. File names identify the contents, so answers can be cached."""
-        words = [Path(word).name if isinstance(word, Path) else str(word) for word in arguments]
-        answer = self.folder / f"{hashlib.sha256(' '.join([self.made_by, *words]).encode()).hexdigest()[:16]}.answer"
-        if answer.exists():
-            return json.loads(answer.read_text())
-        done = subprocess.run([self.path, *map(str, arguments)], capture_output=True, text=True, env={**os.environ, **ONE_THREAD})
-        if done.returncode != 0:
-            raise Failed(f"tubule {' '.join(map(str, arguments))}: status {done.returncode}: {done.stderr.strip()}")
-        keep(answer, done.stdout)
-        return json.loads(done.stdout)
-
-    def case_file(self, case):
-        content = cases.text(case)
-        path = self.folder / f"{hashlib.sha256((self.made_by + content).encode()).hexdigest()[:16]}.toml"
-        path.write_text(content)
-        return path
-
-    def run(self, case, label, command="run"):
-        """Runs a case; raises Failed unless it finishes."""
-        path = self.case_file(case)
-        result, note = path.with_suffix(".hdf"), path.with_suffix(".json")
-        if not (result.exists() and note.exists()):
+    def run(self, case, label):
+        """Runs a case, or finds its equilibria; raises Failed unless it finishes."""
+        name = hashlib.sha256((self.made_by + json.dumps(case)).encode()).hexdigest()[:16]
+        path, note = self.folder / f"{name}.hdf", self.folder / f"{name}.json"
+        if not note.exists():
             self.say(f"  {label} ...", end="", flush=True)
-            words = [self.path, command, "--quiet", path, "-o", result]
-            with open(path.with_suffix(".log"), "w") as log:
-                process = subprocess.Popen(words, stdout=log, stderr=log, env={**os.environ, **ONE_THREAD})
-                _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode != 0:
-                said = path.with_suffix(".log").read_text().strip()
-                raise Failed(f"{label}: {path} ended with status {process.returncode}: {said}")
-            cpu_s = usage.ru_utime + usage.ru_stime
-            keep(note, json.dumps({"label": label, "cpu_s": cpu_s}))
-            self.say(f" {cpu_s:.2f} s")
-        cpu_s = json.loads(note.read_text())["cpu_s"]
-        said = read_result(result)
-        return Run(result, cpu_s, said.about, said.series)
+            begun = time.process_time()
+            try:
+                result = self.tubule.run(case, output=path, overwrite=True, threads=1)
+            except (ValueError, RuntimeError) as error:
+                raise Failed(f"{label}: {error}") from error
+            if result.stop not in ("finished", "stationary"):
+                raise Failed(f"{label}: {path} ended: {result.stop}: {result.about.get('stop_message', '')}")
+            note.write_text(json.dumps({"label": label, "cpu_s": time.process_time() - begun}))
+            self.say(f" {time.process_time() - begun:.2f} s")
+        return Run(self.tubule.read(path), json.loads(note.read_text())["cpu_s"], path)
 
     def frames(self, a, b):
         """Distances of two results at their common output times: (time, Hausdorff, L2, size)."""
-        found = self.ask("compare", a.path, b.path, "--json")["frames"]
+        found = self.tubule.compare(a.result, b.result)["frames"]
         return [(frame["time"], frame["hausdorff"], frame["l2"], frame["size"]) for frame in found]
 
     def fitted(self, run, wave):
-        """Rate of a wave "n,m" in a run."""
-        return self.ask("stability", run.path, "--fit", wave, "--json")["rate"]
+        """Rate of a wave (n, m) in a run."""
+        return self.tubule.stability(run.result, fit=wave)["rate"]
 
     def amplitudes(self, run, wave):
         """Of its frames, in time."""
-        return self.ask("stability", run.path, "--fit", wave, "--json")["amplitude"]
+        return self.tubule.stability(run.result, fit=wave)["amplitude"]
 
-    def stability(self, case, *options):
-        return self.ask("stability", self.case_file(case), *options, "--json")
+    def stability(self, case, **options):
+        return self.tubule.stability(case, **options)

@@ -321,12 +321,6 @@ void add_cases(py::module_& m) {
         .def_readonly("sets", &Case::sets)
         .def_readonly("title", &Case::title)
         .def_property_readonly("toml", &effective_toml)
-        .def_property_readonly("term_labels",
-                               [](const Case& c) {
-                                   py::dict out;
-                                   for (const auto& [name, label] : term_labels(c.energy)) out[py::str(name)] = label;
-                                   return out;
-                               })
         .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
     m.def(
         "parse_case",
@@ -350,8 +344,6 @@ void add_results(py::module_& m) {
                  if (found == r.result->series.end()) throw py::key_error(name);
                  return numpy(found->second);
              })
-        .def_property_readonly("case_text", [](const Results& r) { return r.result->case_text.text; })
-        .def_property_readonly("case_sets", [](const Results& r) { return r.result->case_text.sets; })
         .def("case", [](const Results& r, const std::string& name) { return case_of_result(*r.result, name, {}); })
         .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
         .def("frame", &frame_dictionary)
@@ -371,10 +363,6 @@ void add_results(py::module_& m) {
 }
 
 void add_closed_forms(py::module_& m) {
-    m.def("series_meaning", [](const std::string& name) {
-        const SeriesEntry* entry = find_series(name);
-        return entry ? meaning_of(*entry, name) : name;
-    });
     m.def("density", &density_at);
     m.def("growth_rates", &growth_rates);
     m.def("profile_curvatures",

@@ -1,15 +1,17 @@
-"""The scripts of this folder: python3 drawing NAME ARGUMENT...
+"""The scripts of this folder, or of another one: python3 drawing NAME ARGUMENT..., python3 drawing docs/figures/NAME.py ARGUMENT...
 
 The package tubule around this folder is not imported, for it needs its compiled part, and pictures do not.
 """
 
+import functools
+import importlib
 import importlib.util
 import os
 import signal
 import sys
 from pathlib import Path
 
-EXIT_INTERRUPTED, EXIT_UNAVAILABLE = 130, 4
+EXIT_INTERRUPTED = 130
 FOLDER = Path(__file__).resolve().parent
 
 
@@ -34,27 +36,29 @@ class EndedByInterrupts:
         signal.signal(signal.SIGINT, self.before)
 
 
-def module_to_run():
-    sys.path.pop(0)  # this folder, whose modules are not to be found under their bare names
-    import_as("tubule_drawing")
-    script = sys.argv.pop(1)
-    if script != "chart":  # which looks for them when it has read its arguments
-        command_line = importlib.import_module("tubule_drawing.command_line")
-        command_line.require_libraries("tubule stability --plot" if script == "stability" else f"tubule {script}")
-        importlib.import_module("tubule_drawing.style").apply()
-    return importlib.import_module(f"tubule_drawing.{script}")
+def prepared(script, lines):
+    """The script's main(), with its arguments read and its modules imported."""
+    with EndedByInterrupts():
+        options = [lines.COMMANDS[script](sys.argv[1:])] if script in lines.COMMANDS else []
+        program = "tubule stability --plot" if script == "stability" else f"tubule {script}"
+        if script == "chart":  # it draws last, and much is refused before that
+            lines.require_libraries(program, importlib.util.find_spec)
+        else:
+            lines.require_libraries(program)
+            importlib.import_module("tubule_drawing.style").apply()
+        return functools.partial(importlib.import_module(f"tubule_drawing.{script}").main, *options)
 
 
 def main():
     with EndedByInterrupts():
-        module = module_to_run()
-    try:
-        return module.main()
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
-    except MemoryError:
-        print("out of memory", file=sys.stderr)
-        return EXIT_UNAVAILABLE
+        sys.path.pop(0)  # this folder, whose modules are not to be found under their bare names
+        import_as("tubule_drawing")
+        lines = importlib.import_module("tubule_drawing.command_line")
+    path = Path(sys.argv.pop(1))
+    script = path.stem
+    if path.suffix == ".py":
+        sys.modules["tubule_drawing"].__path__.append(str(path.parent))
+    return lines.status_of(lambda: prepared(script, lines)())
 
 
 if __name__ == "__main__":

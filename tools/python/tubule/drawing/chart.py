@@ -1,8 +1,6 @@
 """Error against CPU time of many runs of a case, or a map of its largest stable steps. See `tubule chart --help`."""
 
-import argparse
 import csv
-import importlib.util
 import os
 import signal
 import sys
@@ -11,13 +9,12 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from .chart_file import BadChart, Reference, Series, assignment, chart_of_case, check, map_option, plain, read_chart, split
+from .chart_file import Reference, Series, assignment, chart_of_case, check, map_option, plain, read_chart, split
 from .chart_file import toml_of
 from .chart_ranks import ranks_of
 from .chart_runs import Program, Runner, Table
-from .command_line import say
+from .command_line import BadInput, Unavailable, say
 
-EXIT_BAD_INPUT, EXIT_UNAVAILABLE, EXIT_INTERRUPTED = 2, 4, 130
 TARGETS = (1e-3, 1e-4, 1e-6)
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -31,30 +28,24 @@ class Truth:
     key: str = ""  # of its run
 
 
-def read_options():
-    parser = argparse.ArgumentParser(prog="tubule chart")
-    parser.add_argument("file")
-    for name in ("vary", "also", "set", "output"):
-        parser.add_argument(f"--{name}", action="append", default=[])
-    for name in ("tubule", "map", "reference", "quantity", "times"):
-        parser.add_argument(f"--{name}")
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--limit", type=float)
-    for name in ("study", "again", "draw", "quiet"):
-        parser.add_argument(f"--{name}", action="store_true")
-    return parser.parse_args()
+def found(file):
+    """The name of a case; of cases/NAME.toml, where there is none here, that beside the installed program or in its sources."""
+    places = Path(os.environ["TUBULE_PROGRAM"]).parents[1] / "share/tubule", Path(__file__).resolve().parents[4]
+    if not file.startswith("cases/") or os.path.exists(file):
+        return file
+    return next((str(place / file) for place in places if (place / file).exists()), file)
 
 
 def chart_of(options):
-    """The chart that the file and the options describe, validated. Raises BadChart."""
+    """The chart that the file and the options describe, validated. Raises BadInput."""
     if "series" in toml_of(Path(options.file)):
         for name in ("vary", "also", "map"):
             if getattr(options, name):
-                raise BadChart(f"{options.file}: is a chart file; --{name} applies only to a case")
+                raise BadInput(f"{options.file}: is a chart file; --{name} applies only to a case")
         chart = read_chart(options.file, options.study)
     else:
         if not options.vary:
-            raise BadChart(f"{options.file}: is a case: it needs --vary, such as --vary discretisation.elements=20,40")
+            raise BadInput(f"{options.file}: is a case: it needs --vary, such as --vary discretisation.elements=20,40")
         chart = chart_of_case(options.file, options.vary, options.also)
         chart.map = map_option(options.map) if options.map else None
     chart.sets |= {key: plain(value) for key, value in (assignment(text, "--set") for text in options.set)}
@@ -63,46 +54,46 @@ def chart_of(options):
     if options.times:
         chart.times = [plain(text) for text in split(options.times)]
         if not all(type(time) in (int, float) for time in chart.times):
-            raise BadChart(f"--times {options.times}: must be numbers, such as 0.05,0.1")
+            raise BadInput(f"--times {options.times}: must be numbers, such as 0.05,0.1")
     chart.quantity = options.quantity or chart.quantity
     chart.limit = chart.limit if options.limit is None else options.limit
     if not chart.limit > 0:
-        raise BadChart(f"--limit {chart.limit:g}: must be above 0 seconds")
+        raise BadInput(f"--limit {chart.limit:g}: must be above 0 seconds")
     if options.jobs < 1:
-        raise BadChart(f"--jobs {options.jobs}: must be 1 or more")
+        raise BadInput(f"--jobs {options.jobs}: must be 1 or more")
     check(chart)
     return chart
 
 
 def outputs_of(options):
-    """Pictures to write. Raises BadChart, before any run, for a picture that cannot be written."""
+    """Pictures to write. Raises BadInput, before any run, for a picture that cannot be written."""
     outputs = [Path(text) for text in options.output] or [Path(Path(options.file).stem + ".svg")]
     for path in outputs:
         if path.suffix.lower() not in FORMATS:
-            raise BadChart(f"{path}: a picture is written as one of {', '.join(FORMATS)}")
+            raise BadInput(f"{path}: a picture is written as one of {', '.join(FORMATS)}")
         if not path.parent.is_dir():
-            raise BadChart(f"{path}: the folder {path.parent} does not exist")
+            raise BadInput(f"{path}: the folder {path.parent} does not exist")
         if not os.access(path.parent, os.W_OK):
-            raise BadChart(f"{path}: the folder {path.parent} cannot be written to")
+            raise BadInput(f"{path}: the folder {path.parent} cannot be written to")
     return outputs
 
 
 def checked(program, jobs):
-    """Validates all cases and the quantity before any run; returns the first case as TOML. Raises BadChart."""
+    """Validates all cases and the quantity before any run; returns the first case as TOML. Raises BadInput."""
     first = None
     if jobs and (error := program.check_quantity(jobs[0])):
-        raise BadChart(error)
+        raise BadInput(error)
     for job in jobs:
         text, error = program.check(job)
         if error:
-            raise BadChart(f"{error}\n    in series {job.series!r}: {' '.join(job.sets)}")
+            raise BadInput(f"{error}\n    in series {job.series!r}: {' '.join(job.sets)}")
         first = first or tomllib.loads(text)
     return first
 
 
 def times_of(case):
     if "time" not in case:
-        raise BadChart("the case has no [time]; a chart needs runs in time")
+        raise BadInput("the case has no [time]; a chart needs runs in time")
     output, end = case["time"].get("output", []), case["time"]["end"]
     return sorted({float(t) for t in [*output, end] if t > 0})
 
@@ -111,7 +102,7 @@ def times_of(case):
 
 
 def truth_of(chart, times, runs, own, program):
-    """The reference for errors. Raises BadChart if there is none."""
+    """The reference for errors. Raises BadInput if there is none."""
     reference = chart.reference
     if reference.values:
         return Truth(dict(zip(times, reference.values)), reference.scale, reference.known_to, reference.source)
@@ -121,29 +112,26 @@ def truth_of(chart, times, runs, own, program):
     if reference.sets is not None:
         whole = [run for run in whole if run.key == own.key]
     if not whole and any(run.finished and not run.values for run in runs):
-        raise BadChart(f"no run has a series {chart.quantity} at the times of the chart")
+        raise BadInput(f"no run has a series {chart.quantity} at the times of the chart")
     if not whole:
-        raise BadChart("no run reached the end of the chart, so errors have no reference")
+        raise BadInput("no run reached the end of the chart, so errors have no reference")
     best = min(whole, key=lambda run: (run.stated_error or float("inf"), -run.cpu_s))
-    scale = best.scale if "energy" in chart.quantity else max(map(abs, best.values.values()))
+    scale = best.E_ref if "energy" in chart.quantity else max(map(abs, best.values.values()))
     return Truth({time: best.values[time] for time in times}, scale or 1.0, best.stated_error, "own finest run", best.key)
 
 
 def truth_of_result(path, quantity, times, program):
-    """Raises BadChart."""
-    from .results import BadInput, read_result
+    """Raises BadInput."""
+    from .results import read_result
 
-    try:
-        result = read_result(str(path))
-    except BadInput as error:
-        raise BadChart(str(error)) from error
+    result = read_result(str(path))
     if quantity not in result.series:
-        raise BadChart(f"{path}: has no series {quantity}")
+        raise BadInput(f"{path}: has no series {quantity}")
     at = dict(zip(result.series["time"], result.series[quantity]))
     missing = [time for time in times if time not in at]
     if missing:
         listed = ", ".join(f"{time:g}" for time in missing)
-        raise BadChart(f"{path}: has no row at t = {listed}: compute it with these output times")
+        raise BadInput(f"{path}: has no row at t = {listed}: compute it with these output times")
     values = {time: float(at[time]) for time in times}
     about = result.about
     scale = float(about.get("E_ref", 0)) if "energy" in quantity else max(map(abs, values.values()))
@@ -226,9 +214,8 @@ def work_precision(chart, options, outputs, program, tell):
     runs = list({job.key: table.runs[job.key] for job in jobs}.values())
     try:
         truth = truth_of(chart, times, runs, own, program)
-    except BadChart as error:
-        say(f"tubule chart: {error}")
-        return EXIT_UNAVAILABLE
+    except BadInput as error:
+        raise Unavailable(f"tubule chart: {error}") from error
     judged, front, chosen = judge(jobs, runs, truth)
     table.write(jobs, judged)
     lines, named = report(jobs, front, chosen, truth)
@@ -309,13 +296,13 @@ def stability_map(chart, options, outputs, program, tell):
 def open_table(chart, options, outputs, times):
     path = outputs[0].with_suffix(".csv")
     if path.exists() and not path.is_file():
-        raise BadChart(f"{path}: is no file, so the data of the chart cannot be written there; choose another -o")
+        raise BadInput(f"{path}: is no file, so the data of the chart cannot be written there; choose another -o")
     try:
         return Table(path, chart.quantity, times, options.again)
     except OSError as error:
-        raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, csv.Error) as error:
-        raise BadChart(f"{path}: is no table of a chart ({error}); move it or choose another -o") from error
+        raise BadInput(f"{path}: is no table of a chart ({error}); move it or choose another -o") from error
 
 
 def join_ranks(options, table):
@@ -336,7 +323,7 @@ def draws(ranks):
 
 
 def draw_chart(options):
-    """The exit status. Raises BadChart."""
+    """The exit status. Raises BadInput."""
 
     def tell(words):
         if not options.quiet:
@@ -344,7 +331,7 @@ def draw_chart(options):
 
     chart, outputs = chart_of(options), outputs_of(options)
     with tempfile.TemporaryDirectory(prefix="tubule-chart-") as folder:
-        program = Program(options.tubule, Path(folder), chart.limit, chart.quantity)
+        program = Program(os.environ["TUBULE_PROGRAM"], Path(folder), chart.limit, chart.quantity)
         draw = stability_map if chart.map else work_precision
         status = draw(chart, options, outputs, program, tell)  # None: another rank draws
     if status == 0:
@@ -352,25 +339,14 @@ def draw_chart(options):
     return status or 0
 
 
-def main():
+def main(options):
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
-    options = read_options()
-    missing = [name for name in ("numpy", "matplotlib", "h5py") if importlib.util.find_spec(name) is None]
-    if missing:  # reported before any run
-        packages = " ".join(f"python3-{name}" for name in missing)
-        say(f"tubule chart: {sys.executable} lacks {', '.join(missing)}; install {packages}")
-        return EXIT_UNAVAILABLE
-    from .results import BadInput
-
+    options.file = found(options.file)
     try:
         return draw_chart(options)
-    except (BadChart, BadInput) as error:
-        say(error)
-        return EXIT_BAD_INPUT
     except OSError as error:  # a full disk, no more processes
-        say(f"tubule chart: {error}")
-        return EXIT_UNAVAILABLE
+        raise Unavailable(f"tubule chart: {error}") from error
     except KeyboardInterrupt:
         say("tubule chart: interrupted; run the same command to continue")
-        return EXIT_INTERRUPTED
+        raise

@@ -7,19 +7,12 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .command_line import BadInput
 from .chart_runs import Job, value_text
 from .labels import flatten
 
-CHART_KEYS = ("title", "case", "quantity", "times", "limit", "repeats", "set", "reference", "map", "series")
-SERIES_KEYS = ("name", "set", "vary", "study")
-REFERENCE_KEYS = ("result", "set", "values", "E_ref", "known_to", "source")
-MAP_KEYS = ("key", "from", "to", "per_decade", "steps")
 MOST_RUNS = 2000
 LARGEST_FILE = 2**20  # bytes
-
-
-class BadChart(Exception):
-    """One line for the user."""
 
 
 @dataclass
@@ -107,139 +100,127 @@ class Chart:
         return self.job(series, [*varied, (self.map.key, value)], more.items())
 
 
-# ---- a chart file
+# ---- a chart file: what each key may be. A kind is a function from the value, which raises Wrong with what is allowed
 
 
-class Reader:
-    """A table of the file, with its place for messages."""
+class Wrong(Exception):
+    pass
 
-    def __init__(self, path, table, where, keys):
-        self.path, self.table, self.where = path, table, where
-        if not isinstance(table, dict):
-            raise BadChart(f"{path}: {where}: must be a table")
-        for key in table:
-            if key not in keys:
-                near = difflib.get_close_matches(key, keys, 1)
-                meant = f"; did you mean {near[0]!r}?" if near else ""
-                raise BadChart(f"{path}: {self.name(key)}: unknown key; allowed: {', '.join(keys)}{meant}")
 
-    def name(self, key):
-        return f"{self.where}.{key}" if self.where else key
+def text(value):
+    if not isinstance(value, str):
+        raise Wrong("must be text")
+    return value
 
-    def fail(self, key, allowed):
-        raise BadChart(f"{self.path}: {self.name(key)}: must be {allowed}, not {self.table[key]!r}")
 
-    def text(self, key, default=""):
-        if not isinstance(self.table.get(key, default), str):
-            self.fail(key, "text")
-        return self.table.get(key, default)
-
-    def number(self, key, default=None, above=-math.inf, kind=float):
-        value = self.table.get(key, default)
-        if key not in self.table:
-            return value
+def number(above=-math.inf, kind=float):
+    def parse(value):
         if isinstance(value, bool) or not isinstance(value, (int, kind)) or not above < value < math.inf:
-            self.fail(key, f"{'an integer' if kind is int else 'a number'} above {above:g}")
+            raise Wrong(f"must be {'an integer' if kind is int else 'a number'} above {above:g}")
         return kind(value)
 
-    def numbers(self, key):
-        values = self.table.get(key)
-        if values is None:
-            return None
-        good = isinstance(values, list) and values and all(type(value) in (int, float) for value in values)
-        if not good:
-            self.fail(key, "a list of numbers")
-        return [float(value) for value in values]
+    return parse
 
-    def sets(self, key):
-        table = self.table.get(key, {})
-        if not isinstance(table, dict):
-            self.fail(key, "a table of case keys, such as { discretisation.order = 3 }")
-        return flatten(table)
 
-    def vary(self, key):
-        lists = self.sets(key)
-        for name, values in lists.items():
-            if not isinstance(values, list) or not values:
-                raise BadChart(f"{self.path}: {self.name(key)}.{name}: must be a list of values, not {values!r}")
-        return lists
+def numbers(value):
+    if not (isinstance(value, list) and value and all(type(one) in (int, float) for one in value)):
+        raise Wrong("must be a list of numbers")
+    return [float(one) for one in value]
+
+
+def sets(value):
+    if not isinstance(value, dict):
+        raise Wrong("must be a table of case keys, such as { discretisation.order = 3 }")
+    return flatten(value)
+
+
+def flag(value):
+    if type(value) is not bool:
+        raise Wrong("must be true or false")
+    return value
+
+
+POSITIVE, COUNT = number(0), number(0, int)
+CHART = {"title": text, "case": text, "quantity": text, "times": numbers, "limit": POSITIVE, "repeats": COUNT, "set": sets,
+         "reference": dict, "map": dict, "series": list}  # fmt: skip
+SERIES = {"name": text, "set": sets, "vary": sets, "study": flag}
+REFERENCE = {"result": text, "set": sets, "values": numbers, "E_ref": POSITIVE, "known_to": POSITIVE, "source": text}
+MAP = {"key": text, "from": POSITIVE, "to": POSITIVE, "per_decade": COUNT, "steps": COUNT}
+
+
+def checked(path, table, where, kinds, required=()):
+    """The values of a table of the file, converted. Raises BadInput with their place."""
+    place = f"{path}: {where}." if where else f"{path}: "
+    if not isinstance(table, dict):
+        raise BadInput(f"{path}: {where}: must be a table")
+    for key in required:
+        if key not in table:
+            raise BadInput(f"{place}{key}: is missing")
+    out = {}
+    for key, value in table.items():
+        if key not in kinds:
+            near = difflib.get_close_matches(key, kinds, 1)
+            meant = f"; did you mean {near[0]!r}?" if near else ""
+            raise BadInput(f"{place}{key}: unknown key; allowed: {', '.join(kinds)}{meant}")
+        try:
+            out[key] = value if kinds[key] in (dict, list) else kinds[key](value)
+        except Wrong as error:
+            raise BadInput(f"{place}{key}: {error}, not {value!r}") from error
+    return out
 
 
 def toml_of(path):
-    """Raises BadChart."""
+    """Raises BadInput."""
     try:
         if path.exists() and not path.is_file():
-            raise BadChart(f"{path}: is a directory, a pipe or a device, not a file")
+            raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
         if path.exists() and path.stat().st_size > LARGEST_FILE:
-            raise BadChart(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
+            raise BadInput(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
         return tomllib.loads(path.read_text())
     except OSError as error:
-        raise BadChart(f"{path}: cannot be read: {error.strerror}") from error
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise BadChart(f"{path}: is not TOML: {error}") from error
+        raise BadInput(f"{path}: is not TOML: {error}") from error
 
 
 def read_chart(path, study):
-    """The chart of a file, without the series marked as a study unless requested. Raises BadChart."""
+    """The chart of a file, without the series marked as a study unless requested. Raises BadInput."""
     path = Path(path)
-    root = Reader(path, toml_of(path), "", CHART_KEYS)
-    if "case" not in root.table:
-        raise BadChart(f"{path}: case: is missing: the case file, relative to this file")
-    tables = root.table.get("series", [])
+    given = checked(path, toml_of(path), "", CHART)
+    if "case" not in given:
+        raise BadInput(f"{path}: case: is missing: the case file, relative to this file")
+    tables = given.pop("series", [])
     if not isinstance(tables, list) or not tables:
-        raise BadChart(f"{path}: needs at least one [[series]]")
-    chart = Chart(path, path.parent / root.text("case"), root.text("title"), root.text("quantity", "energy"))
-    chart.times = root.numbers("times")
-    chart.limit = root.number("limit", chart.limit, above=0)
-    chart.repeats = root.number("repeats", chart.repeats, above=0, kind=int)
-    chart.sets = root.sets("set")
-    chart.series = [one for i, table in enumerate(tables) if (one := read_series(path, table, i, study))]
-    chart.reference = read_reference(path, root.table.get("reference"))
-    if "map" in root.table:
-        chart.map = read_map(path, root.table["map"])
-    return chart
+        raise BadInput(f"{path}: needs at least one [[series]]")
+    series = [one for i, table in enumerate(tables) if (one := read_series(path, table, i, study))]
+    parts = {"case": path.parent / given.pop("case"), "sets": given.pop("set", {}), "series": series}
+    if "reference" in given:
+        parts["reference"] = read_reference(path, given.pop("reference"))
+    if "map" in given:
+        read = checked(path, given.pop("map"), "map", MAP, ("key", "from", "to"))
+        parts["map"] = Map(read.pop("key"), read.pop("from"), read.pop("to"), **read)
+    return Chart(path, **parts, **given)
 
 
 def read_series(path, table, index, study):
-    reader = Reader(path, table, f"series.{index}", SERIES_KEYS)
-    if table.get("study") not in (None, True, False):
-        reader.fail("study", "true or false")
-    sets, vary = reader.sets("set"), reader.vary("vary")
-    name = reader.text("name") or words(sets) or "settings of the case"
-    return None if table.get("study") and not study else Series(name, sets, vary)
+    given = checked(path, table, f"series.{index}", SERIES)
+    sets, vary = given.get("set", {}), given.get("vary", {})
+    for name, values in vary.items():
+        if not isinstance(values, list) or not values:
+            raise BadInput(f"{path}: series.{index}.vary.{name}: must be a list of values, not {values!r}")
+    name = given.get("name") or words(sets) or "settings of the case"
+    return None if given.get("study") and not study else Series(name, sets, vary)
 
 
 def read_reference(path, table):
-    if table is None:
-        return Reference()
-    reader = Reader(path, table, "reference", REFERENCE_KEYS)
-    given = [key for key in ("result", "set", "values") if key in table]
-    if len(given) != 1:
-        raise BadChart(f"{path}: reference: needs one of result, set, values, not {' and '.join(given) or 'none'}")
-    if "values" in table and "E_ref" not in table:
-        raise BadChart(f"{path}: reference.E_ref: is missing: what the errors are relative to")
-    return Reference(
-        path.parent / reader.text("result") if "result" in table else None,
-        reader.sets("set") if "set" in table else None,
-        reader.numbers("values"),
-        reader.number("E_ref", 0.0, above=0),
-        reader.number("known_to", 0.0, above=0),
-        reader.text("source"),
-    )
-
-
-def read_map(path, table):
-    reader = Reader(path, table, "map", MAP_KEYS)
-    for key in ("key", "from", "to"):
-        if key not in table:
-            raise BadChart(f"{path}: map.{key}: is missing")
-    return Map(
-        reader.text("key"),
-        reader.number("from", above=0),
-        reader.number("to", above=0),
-        reader.number("per_decade", 6, above=0, kind=int),
-        reader.number("steps", None, above=0, kind=int),
-    )
+    given = checked(path, table, "reference", REFERENCE)
+    kinds = [key for key in ("result", "set", "values") if key in given]
+    if len(kinds) != 1:
+        raise BadInput(f"{path}: reference: needs one of result, set, values, not {' and '.join(kinds) or 'none'}")
+    if "values" in given and "E_ref" not in given:
+        raise BadInput(f"{path}: reference.E_ref: is missing: what the errors are relative to")
+    result = {"result": path.parent / given.pop("result")} if "result" in given else {}
+    return Reference(**result, sets=given.pop("set", None), scale=given.pop("E_ref", 0.0), **given)
 
 
 # ---- options
@@ -268,7 +249,7 @@ def plain(text):
 def assignment(text, option):
     key, equals, value = text.partition("=")
     if not (key and equals and value):
-        raise BadChart(f"{option} {text}: must be key=value, such as discretisation.order=3")
+        raise BadInput(f"{option} {text}: must be key=value, such as discretisation.order=3")
     return key, value
 
 
@@ -277,13 +258,13 @@ def words(sets):
 
 
 def chart_of_case(path, varied, also):
-    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadChart."""
+    """Lines: all combinations of the varied keys except the last, and those of --also. Raises BadInput."""
     keys = {}
     for text in varied:
         key, values = assignment(text, "--vary")
         keys[key] = [plain(value) for value in split(values)]
         if "" in keys[key]:
-            raise BadChart(f"--vary {text}: a value is empty")
+            raise BadInput(f"--vary {text}: a value is empty")
     *outer, last = keys
     vary = {last: keys[last]}
     lines = [dict(zip(outer, values)) for values in itertools.product(*(keys[key] for key in outer))]
@@ -296,31 +277,31 @@ def map_option(text):
     key, values = assignment(text, "--map")
     numbers = [plain(value) for value in values.split(":")]
     if len(numbers) not in (2, 3) or not all(type(n) in (int, float) and n > 0 for n in numbers):
-        raise BadChart(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
+        raise BadInput(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
     return Map(key, float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else 6, 60)
 
 
 def check(chart):
-    """Checks that involve several keys. Raises BadChart."""
+    """Checks that involve several keys. Raises BadInput."""
     path = chart.path
     if not chart.case.is_file():
-        raise BadChart(f"{path}: case: {chart.case}: no such file")
+        raise BadInput(f"{path}: case: {chart.case}: no such file")
     if not chart.series:
-        raise BadChart(f"{path}: every series is a study; add --study")
+        raise BadInput(f"{path}: every series is a study; add --study")
     times = chart.times
     if times and (times[0] <= 0 or any(a >= b for a, b in zip(times, times[1:]))):
-        raise BadChart(f"{path}: times: must be growing numbers above 0, not {times}")
+        raise BadInput(f"{path}: times: must be growing numbers above 0, not {times}")
     if chart.reference.values and (not times or len(times) != len(chart.reference.values)):
-        raise BadChart(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
+        raise BadInput(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
     if chart.map:
         if not chart.map.low < chart.map.high:
-            raise BadChart(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
+            raise BadInput(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
         for series in chart.series:
             if len(series.vary) != 1 or list(series.vary) != [chart.against]:
-                raise BadChart(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
+                raise BadInput(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
             if not all(type(value) in (int, float) and value > 0 for value in series.vary[chart.against]):
-                raise BadChart(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
+                raise BadInput(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
         return
     count = len(chart.jobs())
     if count > MOST_RUNS:
-        raise BadChart(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")
+        raise BadInput(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")

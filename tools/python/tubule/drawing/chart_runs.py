@@ -7,7 +7,6 @@ stopped goes on where it was.
 import csv
 import ctypes
 import hashlib
-import io
 import json
 import math
 import os
@@ -15,7 +14,7 @@ import re
 import signal
 import subprocess
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 LARGEST_GROWTH = 1.1  # of the total energy over that of the start; more counts as unstable
@@ -50,7 +49,7 @@ class Run:
     stop_time: float = 0.0
     cpu_s: float = 0.0
     values: dict = field(default_factory=dict)  # time -> value
-    scale: float = 0.0  # E_ref
+    E_ref: float = 0.0
     stated_error: float = 0.0
     elements: int = 0
     steps: int = 0
@@ -145,22 +144,23 @@ class Program:
 
     def read(self, going, run):
         """Content of the result, journal included; empty if there is none."""
-        shown = [self.printed("show", going.result, form) for form in ("--json", "--csv")]
-        if not going.result.exists() or any(done.returncode != 0 for done in shown):
+        shown = self.printed("show", going.result, "--json")
+        if shown.returncode != 0:
             return
-        about = json.loads(shown[0].stdout)["about"]
-        rows = [{k: float(v) for k, v in row.items() if v} for row in csv.DictReader(io.StringIO(shown[1].stdout))]
+        result = json.loads(shown.stdout)
+        about, series = result["about"], result["series"]
         run.outcome, run.message = about.get("stop", ""), about.get("stop_message", "")
-        run.scale, run.stated_error = about.get("E_ref", 0.0), rounded(about.get("estimated_error", 1.0))
+        run.E_ref, run.stated_error = about.get("E_ref", 0.0), rounded(about.get("estimated_error", 1.0))
         run.elements, run.steps = about.get("elements", 0), about.get("steps", 0)
-        if not rows:
+        if not series["time"]:
             return
-        run.stop_time = rows[-1]["time"]
-        run.values = {row["time"]: row[self.quantity] for row in rows if self.quantity in row}
-        totals = [row.get("free_energy", row["energy"]) + row.get("kinetic_energy", 0.0) for row in rows]
+        run.stop_time = series["time"][-1]
+        run.values = dict(zip(series["time"], series.get(self.quantity, [])))
+        kinetic = series.get("kinetic_energy", [0.0] * len(series["time"]))
+        totals = [sum(row) for row in zip(series.get("free_energy", series["energy"]), kinetic)]
         run.growth = rounded(max(totals) / totals[0]) if totals[0] > 0 else 1.0
-        if "integral_K" in rows[0] and run.elements:
-            run.width = rounded(math.sqrt(4 / math.sqrt(3) * rows[0]["area"] / run.elements))
+        if "integral_K" in series and run.elements:
+            run.width = rounded(math.sqrt(4 / math.sqrt(3) * series["area"][0] / run.elements))
 
 
 def rounded(value):
@@ -190,6 +190,7 @@ class Table:
 
     COLUMNS = ("series", "settings", "outcome", "stop_time", "error", "front", "chosen_for", "cpu_s", "stated_error",
                "elements", "steps", "width", "growth", "E_ref")  # fmt: skip
+    STORED = {each.name: each.type for each in fields(Run) if each.name != "values"}
 
     def __init__(self, path, quantity, times, again=False):
         self.path, self.quantity, self.times = path, quantity, times
@@ -198,7 +199,7 @@ class Table:
             self.runs = self.read(path)
 
     def _value_columns(self):
-        return [f"{self.quantity}@{time:g}" for time in self.times]
+        return {time: f"{self.quantity}@{time:g}" for time in self.times}
 
     def read(self, path):
         """Runs of an earlier call, or of another rank. Raises ValueError or csv.Error if the file is something else."""
@@ -206,15 +207,10 @@ class Table:
         with open(path, newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 try:
-                    values = {}
-                    for name, text in row.items():
-                        if name.startswith(self.quantity + "@") and text:
-                            values[float(name.partition("@")[2])] = float(text)
+                    values = {float(name.partition("@")[2]): float(text) for name, text in row.items()
+                              if name.startswith(self.quantity + "@") and text}  # fmt: skip
                     self.names[row["key"]] = row["series"], row["settings"]
-                    runs[row["key"]] = Run(
-                        row["key"], row["outcome"], row["message"], float(row["stop_time"]), float(row["cpu_s"]), values,
-                        float(row["E_ref"]), float(row["stated_error"]), int(row["elements"]), int(row["steps"]),
-                        float(row["width"]), float(row["growth"]))  # fmt: skip
+                    runs[row["key"]] = Run(**{name: kind(row[name]) for name, kind in self.STORED.items()}, values=values)
                 except (KeyError, TypeError, AttributeError) as error:
                     raise ValueError(error) from error
         return runs
@@ -232,33 +228,15 @@ class Table:
         rows += [self._row(*self.names.get(key, ("", "")), run, {}) for key, run in self.runs.items() if key not in seen]
         aside = path.with_name(path.name + ".part")
         with open(aside, "w", newline="", encoding="utf-8", errors="backslashreplace") as file:
-            columns = [*self.COLUMNS, *self._value_columns(), "message", "key"]
+            columns = [*self.COLUMNS, *self._value_columns().values(), "message", "key"]
             writer = csv.DictWriter(file, columns, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
         os.replace(aside, path)
 
     def _row(self, series, settings, run, judged):
-        row = {
-            "series": series,
-            "settings": settings,
-            "outcome": run.outcome,
-            "stop_time": run.stop_time,
-            "cpu_s": run.cpu_s,
-            "stated_error": run.stated_error,
-            "elements": run.elements,
-            "steps": run.steps,
-            "width": run.width,
-            "growth": run.growth,
-            "E_ref": run.scale,
-            "message": run.message,
-            "key": run.key,
-            **judged,
-        }
-        for at, column in zip(self.times, self._value_columns()):
-            if at in run.values:
-                row[column] = run.values[at]
-        return row
+        values = {column: run.values[at] for at, column in self._value_columns().items() if at in run.values}
+        return {"series": series, "settings": settings, **{name: getattr(run, name) for name in self.STORED}, **judged, **values}
 
 
 class Runner:

@@ -60,9 +60,9 @@ def settling_time(result):
     return time[min(late[-1] + 1, time.size - 1)] if late.size else time[0]
 
 
-def visible_terms(results, known):
+def visible_terms(results):
     """Terms to draw: above VISIBLE of the total in some result."""
-    names = list(dict.fromkeys(name for result in results for name in result.terms(known)))
+    names = list(dict.fromkeys(name for result in results for name in result.terms))
     return [name for name in names if any(_matters(result, name) for result in results)]
 
 
@@ -92,8 +92,9 @@ def relative_ticks(axis, name):
 class EnergyPanel:
     """Lines of `results` (all with an energy series); one label per result; `times` marked on them."""
 
-    def __init__(self, results, labels, times, term_labels):
-        self.results, self.times, self.term_labels = results, times, term_labels
+    def __init__(self, results, labels, times):
+        self.results, self.times = results, times
+        self.term_labels = {name: label for result in results for name, label in result.term_labels.items()}
         lone = len(results) == 1
         self.numbered = all(result.is_equilibrium for result in results)
         self.kinetic = any(result.has_inertia for result in results)
@@ -101,7 +102,7 @@ class EnergyPanel:
         self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
-        self.terms = [] if self._terms_hide_change() else visible_terms(results, term_labels)
+        self.terms = [] if self._terms_hide_change() else visible_terms(results)
         self.height = HEIGHT + 0.62
 
     def _terms_hide_change(self):

@@ -1,7 +1,6 @@
 """The differences between cases, in words short enough for a picture. Standard library only."""
 
 import textwrap
-import tomllib
 
 SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
 SUPERSCRIPT = dict(zip("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b"))
@@ -28,51 +27,6 @@ def shortened(words):
 def as_label(words):
     """A name given by a user or a file, as text of a picture: "$" is no mathematics, undecodable bytes become "?"."""
     return shortened(words.encode(errors="replace").decode()).replace("$", r"\$")
-
-
-class BadCase(ValueError):
-    """The case text or one of its overrides cannot be read."""
-
-
-def effective_case(text, sets):
-    """The case as nested dicts after its overrides "a.b=value", applied in order; array entries by index."""
-    try:
-        case = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise BadCase(f"its case is not valid TOML: {error}") from error
-    for override in sets:
-        path, equals, value = override.partition("=")
-        if not equals:
-            raise BadCase(f"its override '{override}' is not of the form key=value")
-        *parents, leaf = path.strip().split(".")
-        node = case
-        try:
-            for step, following in zip(parents, [*parents[1:], leaf]):
-                node = _entry(node, step, [] if following.isdigit() else {})
-            if isinstance(node, list):
-                _entry(node, leaf, None)
-                leaf = int(leaf)
-            node[leaf] = _toml_value(value.strip())
-        except (IndexError, TypeError, ValueError) as error:
-            raise BadCase(f"its override '{override}' does not fit the case") from error
-    return case
-
-
-def _entry(node, step, fresh):
-    """node[step], made from `fresh` if a dict lacks it or the index is the next of a list."""
-    if isinstance(node, list):
-        index = int(step)
-        if index == len(node):
-            node.append(fresh)
-        return node[index]
-    return node.setdefault(step, fresh)
-
-
-def _toml_value(text):
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text  # a bare word: --set model.kind=gradient-flow
 
 
 def flatten(node, prefix=""):

@@ -1,9 +1,6 @@
 """Draws results of tubule: shapes and cuts at the output times, energies over time. See `tubule plot --help`."""
 
-import argparse
-import math
 import os
-import re
 import sys
 from operator import attrgetter
 
@@ -20,8 +17,6 @@ from .series import Choice, SeriesPanel
 from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, choose_columns
 
-COLOURS = ("u_n", "H", "K", "p")
-SCALES = ("run", "shape")
 NOTHING = {
     "profiles": "no profiles",
     "surface": "no surfaces",
@@ -30,32 +25,6 @@ NOTHING = {
     "balance": "no dissipation over time",
     "all": "neither frames nor an energy series",
 }
-
-
-def arguments():
-    parser = argparse.ArgumentParser(prog="tubule plot", description=__doc__)
-    parser.add_argument("results", nargs="+")
-    parser.add_argument("-o", "--output", action="append", default=[])
-    parser.add_argument("--times", default="")
-    parser.add_argument("--colour", default="", help="quantities to colour surfaces by: u_n,H,K,p")
-    parser.add_argument("--plane", default="z=0", help="plane of the cuts")
-    parser.add_argument("--kind", choices=NOTHING, default="all")
-    parser.add_argument("--label", action="append", default=[], help="of each result, instead of what its case differs by")
-    parser.add_argument("--scale", choices=SCALES, default="run",
-                        help="velocities relative to the largest of")  # fmt: skip
-    parser.add_argument("--series", default="", help="series to draw, and nothing else")
-    parser.add_argument("--x", default="time", help="the series they are drawn against")
-    parser.add_argument("--from", type=float, dest="low", help="from this value of it")
-    parser.add_argument("--to", type=float, dest="high", help="up to this one")
-    parser.add_argument("--logy", action="store_true", help="with a logarithmic axis")
-    parser.add_argument("--dpi", type=float, default=style.DPI, help="pixels per inch")
-    parser.add_argument("--movie", default="", help="film to write, .mp4 or .gif, and nothing else")
-    parser.add_argument("--fps", type=float, default=10.0, help="of a film: frames per second, 0.1 to 100")
-    parser.add_argument("--confirmed", help="of a scan: the JSON of `tubule confirm`, whose points are marked")
-    parser.add_argument("--quantity", default="", help="of a scan: what its map shows")
-    parser.add_argument("--slice", action="append", default=[], help="of a scan: KEY=VALUE of an axis that is cut")
-    parser.add_argument("--term", action="append", default=[], help="NAME=LABEL of an energy term")
-    return parser.parse_args()
 
 
 class Page:
@@ -97,7 +66,7 @@ class Page:
             least = [2 if everything and (r.surfaces or r.is_equilibrium) else 1 for r in self.results]
             shown = [i for i, r in enumerate(self.results) if r.has_energy(least[i])]
             if shown:
-                yield EnergyPanel(*self._of(shown), self.marked, self.options.terms)
+                yield EnergyPanel(*self._of(shown), self.marked)
         if self.wants("balance"):
             shown = [i for i, r in enumerate(self.results) if has_balance(r) and (r.moves or not everything)]
             if shown:
@@ -108,7 +77,8 @@ class Page:
 
     def panels(self):
         if self.options.series:
-            return [SeriesPanel(self.results, self.labels, self.options.series)]
+            o = self.options
+            return [SeriesPanel(self.results, self.labels, Choice(o.series, o.x, o.low, o.high, o.logy))]
         return [*self.profiles(), *self.surfaces(), *self.series()]
 
 
@@ -149,36 +119,6 @@ def figure_of(results, options):
     return figure
 
 
-def require_valid(options):
-    """Raises ValueError for what no picture can show, on the command line and in draw()."""
-    for option, value, allowed in (("kind", options.kind, NOTHING), ("scale", options.scale, SCALES), ("plane", options.plane[0], "xyz"),
-                                   *(("colour", name, COLOURS) for name in options.colour)):  # fmt: skip
-        if not isinstance(value, str) or value not in [*allowed]:
-            raise ValueError(f"--{option}: {value!r} is not one of {', '.join(allowed)}")
-    if not all(map(math.isfinite, [options.plane[1], *options.times])):
-        raise ValueError("--times and --plane: a number must be finite")
-
-
-def read_arguments(options):
-    """Converts the texts to values; raises ValueError with the reason."""
-    try:
-        options.times = [float(time) for time in options.times.split(",") if time]
-    except ValueError:
-        raise ValueError(f"--times: '{options.times}' is not a list of numbers t1,t2,...") from None
-    options.colour = [name for name in options.colour.split(",") if name]
-    plane = re.fullmatch(r"([xyz])=([-+.\deE]+)", options.plane)
-    try:
-        options.plane = plane[1], float(plane[2])
-    except (TypeError, ValueError):
-        raise ValueError(f"--plane: '{options.plane}' is not x, y or z = number, such as z=0") from None
-    require_valid(options)
-    names = [name for name in options.series.split(",") if name]
-    if not names and (options.low is not None or options.high is not None or options.logy or options.x != "time"):
-        raise ValueError("--x, --from, --to and --logy belong to --series")
-    options.series = Choice(names, options.x, options.low, options.high, options.logy) if names else None
-    options.terms = dict(term.split("=", 1) for term in options.term)
-
-
 def draw_movie(options):
     from . import movie  # no picture needs it
 
@@ -209,29 +149,15 @@ def draw_any(options, outputs):
     style.save(scan.figure_of(options.results[0], options.quantity, options.slice, options.confirmed), outputs)
 
 
-def main():
-    options = arguments()
-    base = os.path.splitext(options.results[0])[0]
-    outputs = options.output or [base + ".png", base + ".svg"]
-    try:
-        read_arguments(options)
-    except ValueError as error:
-        command_line.say(f"tubule plot: {error}")
-        return command_line.EXIT_BAD_INPUT
+def main(options):
     if options.movie:
-        try:
-            draw_movie(options)
-        except BadInput as error:
-            command_line.say(error)
-            return command_line.EXIT_BAD_INPUT
-        except command_line.Unavailable as error:
-            command_line.say(error)
-            return command_line.EXIT_UNAVAILABLE
+        draw_movie(options)
         command_line.say(options.movie, sys.stdout)
         return 0
+    base = os.path.splitext(options.results[0])[0]
 
     def draw(pictures):
         with style.resolution(options.dpi):
             draw_any(options, pictures)
 
-    return command_line.run(draw, outputs, str)
+    return command_line.run(draw, options.output or [base + ".png", base + ".svg"], str)

@@ -1,18 +1,19 @@
 """Reads result files into plain data. Layout: docs/results.md."""
 
+import difflib
+import json
 import os
 import re
+import subprocess
+import tomllib
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import h5py
 import numpy as np
 
-from .labels import BadCase, as_label, effective_case, flatten
-
-
-class BadInput(Exception):
-    """One line for the user: which file or argument is wrong, and why."""
+from .command_line import BadInput
+from .labels import as_label, flatten
 
 
 @dataclass
@@ -25,7 +26,9 @@ class Frame:
     u_n: np.ndarray | None = None  # velocity: outward,
     u_t: np.ndarray | None = None  # along the profile in the order of the points,
     u_theta: np.ndarray | None = None  # and around the axis
+    energy_density: np.ndarray | None = None
     parameter: float | None = None  # on a branch of equilibria
+    period: float = 0.0  # of a tube
 
     @property
     def length(self):
@@ -61,6 +64,12 @@ class Surface:
     u: np.ndarray | None = None  # of a surface that moves: velocity, three components,
     u_n: np.ndarray | None = None  # outward,
     p: np.ndarray | None = None  # and pressure, where there is one
+    # As the file has them:
+    period: float = 0.0
+    mesh: int = 0  # its number
+    cells: np.ndarray | None = None
+    nodes: dict = field(default_factory=dict)  # arrays of nodes, by name
+    parameter = None
 
     @property
     def size(self):
@@ -81,7 +90,8 @@ class Result:
     series: dict  # name -> 1-D array, times strictly increasing
     frames: list  # of Frame, times strictly increasing
     surfaces: list  # of Surface, likewise
-    meanings: dict = field(default_factory=dict)  # name -> what the series is; missing in older files
+    meanings: dict = field(default_factory=dict)  # name -> what the series is
+    term_labels: dict = field(default_factory=dict)  # "20" -> the formula of an energy term; missing in older files
 
     @property
     def title(self):
@@ -127,23 +137,40 @@ class Result:
     def has_energy(self, least):
         return "energy" in self.series and self.series["energy"].size >= least
 
-    def terms(self, known):
-        """Names of the energy terms in the series, "20" for energy_20: the known ones first, in their order."""
-        others = [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula)", name)]
-        return list(dict.fromkeys([*(name for name in known if f"energy_{name}" in self.series), *others]))
+    @property
+    def terms(self):
+        """Names of the energy terms in the series, "20" for energy_20."""
+        return [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula)", name)]
 
 
 BEST_COMPRESSION = 1032  # of deflate
 
 
+def why_missing(path):
+    """What may have been meant by the name of a file that is not there."""
+    folder, name = os.path.split(path)
+    case = os.path.splitext(name)[0] + ".toml"
+    if path.startswith("~"):
+        return "; ~ does not stand for the home directory here: write the whole path"
+    if name.endswith(".hdf") and os.path.exists(os.path.join(folder, case)):
+        return f"; tubule run {case} makes it"
+    others = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+    near = difflib.get_close_matches(name, [other for other in others if os.path.splitext(other)[1] == os.path.splitext(name)[1]], 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
 @contextmanager
 def opened(path):
-    """The HDF5 file. BadInput names it for all that is wrong with it, and for links to other files: what lies there may be
-    anything, and anybody's."""
-    if not os.path.exists(path):
-        raise BadInput(f"{path}: no such file")
-    if not os.path.isfile(path):
+    """The HDF5 file, or one in memory. BadInput names it for all that is wrong with it, and for links to other files: what
+    lies there may be anything, and anybody's."""
+    named = isinstance(path, str)
+    if named and not os.path.exists(path):
+        raise BadInput(f"{path}: no such file{why_missing(path)}")
+    if named and not os.path.isfile(path):
         raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
+    if named and path.endswith(".toml"):
+        raise BadInput(f"{path}: is a case file, not a result: run it first (tubule run {path}; tubule scan for a scan), then give "
+                       f"its result, {os.path.basename(path)[:-5]}.hdf")  # fmt: skip
     try:
         file = h5py.File(path, "r")
     except OSError as error:
@@ -154,8 +181,6 @@ def opened(path):
             raise BadInput(f"{path}: /{elsewhere.decode(errors='replace')} is a link to another file: not followed")
         try:
             yield file
-        except BadCase as error:
-            raise BadInput(f"{path}: {error}") from error
         except (OSError, KeyError, TypeError, ValueError, AttributeError, MemoryError) as error:
             raise BadInput(f"{path}: damaged or not a result of tubule ({error})") from error
 
@@ -178,27 +203,37 @@ def finite_values(data):
     return array
 
 
-def read_result(path):
-    """Raises BadInput naming the file if it is not a result or a record is damaged."""
+def read_result(path, name=""):
+    """Of a file, or of one in memory with this name. Raises BadInput naming it if it is not a result or a record is
+    damaged."""
     with opened(path) as file:
         if "case" not in file:
             raise BadInput(f"{path}: is not a result of tubule (it has no /case)")
-        case = effective_case(_plain(values(file["case"])), _strings(file["case"].attrs.get("set")))
         about = {key: _plain(value) for key, value in file["about"].attrs.items()} if "about" in file else {}
         group = file.get("series", {})
-        series = {name: finite_values(data) for name, data in group.items()}
-        meanings = {name: str(_plain(data.attrs.get("meaning", name))) for name, data in group.items()}
-        return Result(path, case, about, series_in_time(series), *_frames(path, file), meanings)
+        names = [_plain(name) for name in group.attrs.get("order", group)] if group else []
+        series = {name: finite_values(group[name]) for name in names}
+        told = {key: {name: str(_plain(group[name].attrs[key])) for name in names if key in group[name].attrs} for key in ("meaning", "label")}
+        labels = {name.removeprefix("energy_"): label for name, label in told["label"].items()}
+        return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), told["meaning"], labels)
+
+
+def _case(path, file):
+    """As the program has resolved it: overrides applied, defaults written out. Of an older result the program is asked."""
+    program, text = os.environ.get("TUBULE_PROGRAM"), ""
+    if "resolved_case" in file:
+        text = _plain(values(file["resolved_case"]))
+    elif program:
+        done = subprocess.run([program, "show", path, "--json"], capture_output=True, text=True)
+        text = json.loads(done.stdout)["case"]["resolved"] if done.returncode == 0 else ""
+    try:
+        return tomllib.loads(text or _plain(values(file["case"])))
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path}: its case is not valid TOML: {error}") from error
 
 
 def _plain(value):
     return value.decode() if isinstance(value, bytes) else value
-
-
-def _strings(attribute):
-    if attribute is None or isinstance(attribute, h5py.Empty):
-        return []
-    return [_plain(entry) for entry in np.atleast_1d(attribute)]
 
 
 def series_in_time(group):
@@ -227,13 +262,13 @@ def _frames(path, file):
         if not np.isfinite(record.attrs["time"]):
             raise BadInput(f"{path}: frame {name}: its time is not finite")
         if "mesh" in record.attrs:
-            surfaces.append(_surface(path, name, record, file[f"meshes/{record.attrs['mesh']:06d}"]))
+            surfaces.append(_surface(path, name, record, file["meshes"]))
         else:
             frames.append(_profile(path, name, record))
-    return in_time(frames), in_time(surfaces)
+    return _in_time(frames), _in_time(surfaces)
 
 
-def in_time(frames):
+def _in_time(frames):
     return [frames[i] for i in _increasing(np.array([frame.time for frame in frames]))] if frames else []
 
 
@@ -245,20 +280,21 @@ def _arrays(path, name, group, keys):
 
 
 def _profile(path, name, record):
-    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta") if key in record)]
+    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta", "energy_density") if key in record)]
     arrays = dict(zip(keys, _arrays(path, name, record, keys)))
     if any(array.ndim != 1 or array.shape != arrays["z"].shape or array.size < 2 for array in arrays.values()):
         raise BadInput(f"{path}: frame {name}: {', '.join(keys)} must be lists of one length, 2 or more")
     parameter = float(record.attrs["parameter"]) if "parameter" in record.attrs else None
-    return Frame(float(record.attrs["time"]), **arrays, parameter=parameter)
+    return Frame(float(record.attrs["time"]), **arrays, parameter=parameter, period=float(record.attrs.get("length", 0)))
 
 
-def _surface(path, name, record, mesh):
-    order = int(mesh.attrs["order"])
+def _surface(path, name, record, meshes):
+    number = int(record.attrs["mesh"])
+    order, period = (meshes[f"{number:06d}"].attrs[key] for key in ("order", "period"))
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     (points,) = _arrays(path, name, record, ("Points",))
     data = record["PointData"]
-    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p") if key in data)]
+    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p", "energy_density") if key in data)]
     arrays = dict(zip(keys, _arrays(path, name, data, keys)))
     vectors = [array for key, array in arrays.items() if key in ("normal", "u")]
     numbers = [array for key, array in arrays.items() if key not in ("normal", "u")]
@@ -267,5 +303,6 @@ def _surface(path, name, record, mesh):
         raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
     if ("u" in arrays) != ("u_n" in arrays):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
-    of_cells = {key: array[cells] for key, array in arrays.items()}
-    return Surface(float(record.attrs["time"]), order, mesh.attrs["period"] == 0, points[cells], **of_cells)
+    nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p")
+    of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
+    return Surface(float(record.attrs["time"]), int(order), period == 0, **of_cells, period=float(period), mesh=number, cells=cells, nodes=nodes)

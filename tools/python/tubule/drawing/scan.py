@@ -1,6 +1,7 @@
 """Maps of scans: the outcome of each point, the boundaries between outcomes, and closed forms."""
 
 import json
+import os
 import re
 
 import h5py
@@ -115,6 +116,8 @@ class Axis:
 
 
 def is_scan(path):
+    if not os.path.isfile(path):
+        return False  # reported where it is read
     try:
         with h5py.File(path) as file:
             return "scan" in file and "points" in file

@@ -1,6 +1,5 @@
 """Writes one HTML page that shows a result of tubule in any browser, without a network. See `tubule view --help`."""
 
-import argparse
 import base64
 import json
 import os
@@ -10,10 +9,10 @@ import sys
 import matplotlib
 import numpy as np
 
-from . import command_line, scan, style
+from . import command_line, scan
 from .labels import as_label, flatten
 from .raster import lattice
-from .results import BadInput, finite_values, opened, read_result, values
+from .results import BadInput, Surface, opened, read_result
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 THREE = "/usr/share/javascript/three/three.min.js"
@@ -59,27 +58,15 @@ def node_triangles(cells, order):
 class Shape:
     """A frame: points [n, 2] of a profile (r, z) or [n, 3] of a surface, and numbers for each point."""
 
-    def __init__(self, record, meshes):
-        self.time = float(record.attrs["time"])
-        self.parameter = float(record.attrs["parameter"]) if "parameter" in record.attrs else None
-        self.mesh = int(record.attrs["mesh"]) if "mesh" in record.attrs else None
-        if self.mesh is None:
-            self.points = np.column_stack([finite_values(record["r"]), finite_values(record["z"])])
-            data, self.period = record, float(record.attrs.get("length", 0))
+    def __init__(self, frame):
+        self.time, self.parameter, self.period = frame.time, frame.parameter, frame.period
+        if isinstance(frame, Surface):
+            self.mesh, self.points, data = frame.mesh, frame.nodes["points"], frame.nodes
+            self.cells, self.order = frame.cells, frame.order
         else:
-            self.points, data = finite_values(record["Points"]), record["PointData"]
-            self.period = float(meshes[f"{self.mesh:06d}"].attrs["period"])
-            order = int(meshes[f"{self.mesh:06d}"].attrs["order"])
-            self.cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
-            self.order = order
-        self.fields = {name: finite_values(data[name]) for name in WORDS if name in data}
-        self.u = finite_values(data["u"]) if "u" in data else None
-
-
-def read_shapes(path):
-    with opened(path) as file:
-        meshes = file.get("meshes", {})
-        return [Shape(record, meshes) for _, record in sorted(file.get("frames", {}).items())]
+            self.mesh, self.points, data = None, np.column_stack([frame.r, frame.z]), vars(frame)
+        self.fields = {name: data[name] for name in WORDS if data.get(name) is not None}
+        self.u = data.get("u")
 
 
 def colour_table(name):
@@ -135,7 +122,8 @@ def told(about):
 
 
 def run_page(path):
-    result, shapes = read_result(path), read_shapes(path)
+    result = read_result(path)
+    shapes = [Shape(frame) for frame in sorted([*result.frames, *result.surfaces], key=lambda frame: frame.time)]
     if not shapes:
         raise BadInput(f"{path}: no shapes to show")
     fields = described_fields(shapes)
@@ -187,8 +175,7 @@ def page_of(data):
         with open(THREE, encoding="utf-8") as file:
             three = file.read() if data["kind"] == "shapes" else ""
     except OSError:
-        command_line.say(f"tubule view needs {THREE}; install the package libjs-three")
-        sys.exit(command_line.EXIT_UNAVAILABLE)
+        raise command_line.Unavailable(f"tubule view needs {THREE}; install the package libjs-three") from None
     try:  # without "<", no words of the data end their element or change how the rest of the page is read
         script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     except ValueError:
@@ -210,16 +197,8 @@ def write(path, output):
         raise BadInput(f"{output}: cannot be written: {error.strerror}") from error
 
 
-def main():
-    parser = argparse.ArgumentParser(prog="tubule view", description=__doc__)
-    parser.add_argument("result")
-    parser.add_argument("-o", "--output")
-    options = parser.parse_args()
+def main(options):
     output = options.output or os.path.splitext(options.result)[0] + ".html"
-    try:
-        write(options.result, output)
-    except style.BadInput as error:
-        command_line.say(error)
-        return command_line.EXIT_BAD_INPUT
+    write(options.result, output)
     command_line.say(output, sys.stdout)
     return 0
