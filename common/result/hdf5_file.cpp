@@ -11,9 +11,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/result/checksums.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
-#include "common/result/result_index.hpp"
 #include "common/result/vtk_grid.hpp"
 #include "common/series/catalogue.hpp"
 
@@ -27,23 +27,20 @@ std::mutex library;  // HDF5 may be built without thread safety
 
 // ---- writing
 
-void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes,
-                std::vector<Extent>& extents) {
+void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes) {
     const auto group = make_group(parent, name);
     put_attribute(group, "time", record.time);
     if (record.kind) put_attribute(group, "kind", std::string(tubule::name(*record.kind)));
     for (const auto& [key, value] : record.numbers) put_attribute(group, key, value);
     if (record.mesh) {
-        put_grid(group, record, meshes[*record.mesh], extents);
+        put_grid(group, record, meshes[*record.mesh]);
         return;
     }
     for (const Array& array : record.arrays)
-        extents.push_back(
-            extent_of(put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data()),
-                      std::as_bytes(std::span(array.data))));
+        put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data());
 }
 
-void put_series(hid_t file, const Contents& contents, std::vector<Extent>& extents) {
+void put_series(hid_t file, const Contents& contents) {
     const auto group = make_group(file, "series");
     put_attribute(group, "order", contents.series);
     const std::size_t width = contents.series.size();
@@ -52,7 +49,6 @@ void put_series(hid_t file, const Contents& contents, std::vector<Extent>& exten
         for (std::size_t i = 0; i < column.size(); ++i) column[i] = contents.rows[i * width + j];
         const auto data =
             put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
-        extents.push_back(extent_of(data, std::as_bytes(std::span(column))));
         if (const SeriesEntry* entry = find_series(contents.series[j])) {
             put_attribute(data, "unit", std::string(entry->unit));
             put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
@@ -214,16 +210,15 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
-    std::vector<Extent> extents;
-    put_series(file, contents, extents);
-    const auto meshes = put_meshes(file, contents.meshes, extents);
+    put_series(file, contents);
+    const auto meshes = put_meshes(file, contents.meshes);
     const auto frames = make_group(file, "frames");
     for (std::size_t i = 0; i < contents.frames.size(); ++i)
-        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes, extents);
-    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes, extents);
+        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes);
+    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes);
     put_steps(file, contents, meshes);
     auto bytes = bytes_of(file);
-    seal(bytes, index_of(contents, extents));
+    seal(bytes);
     return bytes;
 }
 
@@ -239,14 +234,6 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
 
 Contents read_hdf5(const std::filesystem::path& file) {
     return with_result(file, get_contents);
-}
-
-Contents read_hdf5(std::vector<std::byte> bytes) {
-    const std::lock_guard lock(library);
-    const Quiet quiet;
-    const auto image = open_image(bytes);
-    require_parts(image);
-    return get_contents(image);
 }
 
 CaseText read_hdf5_case(const std::filesystem::path& file) {

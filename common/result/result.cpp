@@ -1,25 +1,20 @@
 #include "common/result/result.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
-#include "common/result/checksums.hpp"
 #include "common/result/contents.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_file.hpp"
 #include "common/result/journal.hpp"
 #include "common/result/record.hpp"
-#include "common/result/result_index.hpp"
 #include "common/result/view.hpp"
 #include "common/result/vtk_grid.hpp"
 
@@ -399,43 +394,6 @@ Result read_result(const fs::path& file) {
 
 CaseText read_case_text(const fs::path& file) {
     return read_hdf5_case(file);
-}
-
-namespace {
-
-// Of a damaged file. Numbers that are lost are NaN.
-Contents what_is_left(const fs::path& file, const Wholeness& found) {
-    std::ifstream in(file, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
-    const auto bytes = std::as_bytes(std::span(text));
-    if (found.hdf5_size) return read_hdf5(std::vector(bytes.begin(), bytes.begin() + *found.hdf5_size));
-    if (found.index.empty()) throw std::runtime_error("its checksums are lost, too, so nothing of it can be rescued");
-    return contents_by_index(found.index, bytes);
-}
-
-}  // namespace
-
-Verification verify_result(const fs::path& file, const fs::path& rescued) {
-    const auto journal = read_journal(file);
-    const Wholeness found = examine(file);
-    Verification out;
-    out.has_checksums = found.kind != Wholeness::Kind::unsealed;
-    if (!out.has_checksums) return out;
-    out.damage = found.damage;
-    try {
-        Contents contents = found.kind == Wholeness::Kind::whole ? read_hdf5(file) : what_is_left(file, found);
-        warn_of_rest(replay(journal, contents), file);
-        out.lost = drop_what_is_lost(contents);
-        out.rows = contents.rows.size() / contents.series.size(), out.frames = contents.frames.size();
-        if (rescued.empty()) return out;
-        if (fs::exists(fs::symlink_status(rescued)))
-            throw std::runtime_error(fmt::format("{} exists already", rescued.string()));
-        if (!out.lost.empty()) contents.about.emplace_back("lost", fmt::format("{}", fmt::join(out.lost, "\n")));
-        durable::replace(rescued, hdf5_image(contents));
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
-    }
-    return out;
 }
 
 void repair_result(const fs::path& file) {

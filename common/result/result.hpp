@@ -123,19 +123,6 @@ Result read_result(const std::filesystem::path& file);
 // The case alone, without rows and frames: quick for large results, too. Throws as read_result.
 CaseText read_case_text(const std::filesystem::path& file);
 
-// What is good of a result, whatever has happened to the file (not to its journal, which is included as far as it is
-// good). HDF5 sees none of what is damaged.
-struct Verification {
-    bool has_checksums = true;
-    std::string damage;                // in words; empty: all is as it was written
-    std::vector<std::string> lost;     // rows, frames and the checkpoint that are not, a line each
-    std::size_t rows = 0, frames = 0;  // that are
-};
-
-// Writes what is good as a new result `rescued`, if that is given: it must not exist. Throws std::runtime_error where
-// nothing can be said of the file.
-Verification verify_result(const std::filesystem::path& file, const std::filesystem::path& rescued = {});
-
 // Merges a left-over journal into the file, so that it can be read by any HDF5 program, and into the folder `view`.
 void repair_result(const std::filesystem::path& file);
 

@@ -90,7 +90,7 @@ VtkPoints vtk_points(const SurfaceCells& mesh) {
     return points;
 }
 
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes, std::vector<Extent>& extents) {
+std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes) {
     std::vector<WrittenMesh> written;
     if (meshes.empty()) return written;
     const auto parent = make_group(file, "meshes");
@@ -102,21 +102,18 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
         put_attribute(group, "order", std::int64_t{mesh.order});
         put_attribute(group, "nodes", static_cast<std::int64_t>(mesh.nodes));
         put_attribute(group, "period", mesh.period);
-        const auto put_and_list = [&](const char* part, const std::vector<std::int64_t>& values) {
-            extents.push_back(extent_of(put_dataset(group, part, values), std::as_bytes(std::span(values))));
-        };
         put_dataset(group, "NumberOfPoints", {static_cast<std::int64_t>(points.node.size())});
         put_dataset(group, "NumberOfCells", {static_cast<std::int64_t>(cells)});
         put_dataset(group, "NumberOfConnectivityIds", {static_cast<std::int64_t>(mesh.cells.size())});
-        put_and_list("Connectivity", points.connectivity);
+        put_dataset(group, "Connectivity", points.connectivity);
         std::vector<std::int64_t> offsets;
         for (std::size_t c = 0; c <= cells; ++c) offsets.push_back(static_cast<std::int64_t>(c * nodes_per_cell(mesh)));
         put_dataset(group, "Offsets", offsets);
         const std::vector<std::uint8_t> types(cells, lagrange_triangle);
         put_dataset(group, "Types", H5T_NATIVE_UINT8, space({cells}), types.data());
         if (mesh.period > 0) {
-            put_and_list("point_node", points.node);
-            put_and_list("point_shift", points.shift);
+            put_dataset(group, "point_node", points.node);
+            put_dataset(group, "point_shift", points.shift);
         }
         written.push_back({mesh, std::move(points), "/meshes/" + name});
     }
@@ -134,27 +131,22 @@ SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     mesh.period = get_attribute<double>(open_attribute(group, "period"), H5T_NATIVE_DOUBLE, "period");
     if (mesh.order < 1 || mesh.order > 4)
         throw std::runtime_error(fmt::format("mesh {}: its order is {}, not 1 to 4", name, mesh.order));
-    std::vector<std::int64_t> node, shift;
-    if (mesh.period > 0) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
-    set_cells(mesh, get_integers(group, "Connectivity"), node, shift, name);
-    return mesh;
-}
-
-void set_cells(SurfaceCells& mesh, const std::vector<std::int64_t>& connectivity, const std::vector<std::int64_t>& node,
-               const std::vector<std::int64_t>& shift, const std::string& where) {
     const bool tube = mesh.period > 0;
+    std::vector<std::int64_t> node, shift;
+    if (tube) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
     const std::size_t points = tube ? std::min(node.size(), shift.size()) : mesh.nodes;
-    for (const std::int64_t point : connectivity) {
+    for (const std::int64_t point : get_integers(group, "Connectivity")) {
         const auto p = static_cast<std::size_t>(point);
         if (p >= points)
             throw std::runtime_error(
-                fmt::format("mesh {}: a cell uses point {}, but there are {}", where, point, points));
+                fmt::format("mesh {}: a cell uses point {}, but there are {}", name, point, points));
         mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
         if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
     }
+    return mesh;
 }
 
-void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std::vector<Extent>& extents) {
+void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
     put_format(group, {1, 0});
     put_attribute(group, "mesh", static_cast<std::int64_t>(*record.mesh));
     std::vector<std::string> names;
@@ -176,8 +168,7 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std
         return put_doubles(data, values.name, values.shape, values.data);
     };
     // The numbers of the nodes come first, whatever points follow.
-    for (const Array& array : record.arrays)
-        extents.push_back(extent_of(put_one(array), std::as_bytes(std::span(array.data))));
+    for (const Array& array : record.arrays) put_one(array);
 }
 
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh) {

@@ -12,7 +12,6 @@
 #include "common/result/hdf5_file.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/journal.hpp"
-#include "common/result/result_index.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace tubule::fuzz {
@@ -252,27 +251,9 @@ std::vector<std::string> journal_byte_seeds() {
 void result_parts(Input input) {
     static const std::vector<std::byte> sound = hdf5_image(sample());
     try {
-        look_at(read_hdf5(edited(sound, input)));
+        look_at(read_hdf5(file_of(edited(sound, input), "hdf")));
     } catch (const std::runtime_error&) {
     }
-}
-
-// The index from which the good part of a damaged result is rescued, with numbers that are all in the input.
-void result_index(Input input) {
-    try {
-        Contents contents = contents_by_index(input, input);
-        drop_what_is_lost(contents);
-        look_at(contents);
-    } catch (const std::runtime_error&) {
-    }
-}
-
-// As it is behind the HDF5 part of the sample, between two seals of 32 bytes.
-std::vector<std::string> index_seeds() {
-    const std::vector<std::byte> image = hdf5_image(sample());
-    const std::string all(reinterpret_cast<const char*>(image.data()), image.size());
-    const auto end = all.rfind("TUBULEC1"), begin = all.rfind("TUBULEC1", end - 1);
-    return {all.substr(begin + 32, end - begin - 32)};
 }
 
 std::vector<std::string> result_seeds() {

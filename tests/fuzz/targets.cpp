@@ -213,8 +213,7 @@ const std::vector<Target>& targets() {
                                          {"formula", formula_text, formula_seeds},
                                          {"journal", journal_records, journal_seeds},
                                          {"journal_bytes", journal_bytes, journal_byte_seeds},
-                                         {"result", result_parts, result_seeds},
-                                         {"result_index", result_index, index_seeds}};
+                                         {"result", result_parts, result_seeds}};
     return all;
 }
 

@@ -19,7 +19,6 @@
 #include <string>
 #include <vector>
 
-#include "common/result/checksums.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/journal.hpp"
 #include "common/result/result.hpp"
@@ -696,15 +695,6 @@ TEST_F(Durability, AFlippedBitOfTheJournalChangesNoRowAndIsReported) {
         for (std::size_t k = 0; k < rows; ++k) EXPECT_EQ(times[k], static_cast<double>(k));
         EXPECT_EQ(warning.find("are no whole record") != std::string::npos, rows < 4) << "byte " << i;
     }
-}
-
-TEST(Crc32, CheckValue) {
-    // The check value of CRC-32/ISO-HDLC in the catalogue of parametrised CRC algorithms.
-    const std::string digits = "123456789";
-    EXPECT_EQ(crc32(0, std::as_bytes(std::span(digits))), 0xCBF43926u);
-    // Continued over two parts it is the same.
-    const std::uint32_t first = crc32(0, std::as_bytes(std::span(digits).first(4)));
-    EXPECT_EQ(crc32(first, std::as_bytes(std::span(digits).subspan(4))), 0xCBF43926u);
 }
 
 }  // namespace
