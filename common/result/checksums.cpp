@@ -20,7 +20,7 @@ namespace tubule {
 
 namespace {
 
-// Eight tables take eight bytes a turn: a bytewise CRC would cost more than the write of a row.
+// Eight tables take eight bytes a turn.
 constexpr auto crc_tables = [] {
     std::array<std::array<std::uint32_t, 256>, 8> t{};
     for (std::uint32_t i = 0; i < 256; ++i) {

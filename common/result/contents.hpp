@@ -1,4 +1,4 @@
-// All that a result file holds, in memory, and where in the stream of calls it stands.
+// All that a result file holds, in memory.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,6 @@
 namespace tubule {
 
 struct Contents {
-    std::uint64_t id = 0;           // of this result: a journal with another id belongs to a file that is gone
-    std::uint64_t sequence = 0;     // number of journal records these contents include
     std::uint64_t about_begun = 0;  // how many of `about` were there when the run began; the rest came at its end
     CaseText case_text;
     About about;

@@ -142,9 +142,8 @@ void require_parts(hid_t file) {
         throw std::runtime_error("is the result of a scan: this needs the result of a run");
     for (const char* part : {"case", "about", "series", "frames"})
         if (!has(file, part)) throw std::runtime_error(fmt::format("not a Tubule result: /{} is missing", part));
-    for (const char* part : {"id", "sequence", "about_begun"})
-        if (H5Aexists(file, part) <= 0)
-            throw std::runtime_error(fmt::format("not a Tubule result: the attribute {} is missing", part));
+    if (H5Aexists(file, "about_begun") <= 0)
+        throw std::runtime_error("not a Tubule result: the attribute about_begun is missing");
 }
 
 CaseText get_case(hid_t file) {
@@ -154,8 +153,6 @@ CaseText get_case(hid_t file) {
 
 Contents get_contents(hid_t file) {
     Contents contents;
-    contents.id = get_attribute<std::uint64_t>(open_attribute(file, "id"), H5T_NATIVE_UINT64, "id");
-    contents.sequence = get_attribute<std::uint64_t>(open_attribute(file, "sequence"), H5T_NATIVE_UINT64, "sequence");
     contents.about_begun =
         get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
     contents.case_text = get_case(file);
@@ -201,8 +198,6 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     const Quiet quiet;
     // Grows in steps of the expected size, so that it is rarely reallocated.
     const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
-    put_attribute(file, "id", contents.id);
-    put_attribute(file, "sequence", contents.sequence);
     put_attribute(file, "about_begun", contents.about_begun);
     const char* text = contents.case_text.text.c_str();
     put_attribute(put_dataset(file, "case", text_type(), scalar(), &text), "set", contents.case_text.sets);

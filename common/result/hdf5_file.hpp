@@ -19,6 +19,5 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
 // All throw std::runtime_error naming the file, and what is missing if it is HDF5 but not a result.
 Contents read_hdf5(const std::filesystem::path& file);
 CaseText read_hdf5_case(const std::filesystem::path& file);
-void require_result(const std::filesystem::path& file);  // looks for the parts without reading them
 
 }  // namespace tubule

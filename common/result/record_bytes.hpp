@@ -1,4 +1,4 @@
-// Records and meshes as bytes, for the journal, ranks and what a case reads.
+// Records and meshes as bytes, for ranks and for what a case reads.
 #pragma once
 
 #include "common/result/bytes.hpp"

@@ -22,11 +22,7 @@ struct Target {
 const std::vector<Target>& targets();
 
 // Those of result_targets.cpp.
-void journal_records(Input input);
-void journal_bytes(Input input);
 void result_parts(Input input);
-std::vector<std::string> journal_seeds();
-std::vector<std::string> journal_byte_seeds();
 std::vector<std::string> result_seeds();
 
 // A file with these bytes, for readers that want one; the same path for every input.

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "common/result/journal.hpp"
+#include "common/result/file_writer.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
@@ -89,8 +89,12 @@ protected:
         ASSERT_NE(mkdtemp(pattern.data()), nullptr);
         directory = pattern;
         file = directory / "run.hdf";
+        FileWriter::seconds_between_writes = 0;
     }
-    void TearDown() override { fs::remove_all(directory); }
+    void TearDown() override {
+        FileWriter::seconds_between_writes.reset();
+        fs::remove_all(directory);
+    }
 
     ResultWriter create() const { return ResultWriter::create(file, {"x = 1\n", {}}, {}, series); }
     // Runs Debian's Python with h5py and gives back what it prints.
@@ -119,11 +123,9 @@ TEST_F(ResultFile, RoundTrip) {
     writer.frame(record_at(6));
     writer.checkpoint(record_at(3));
     writer.checkpoint(record_at(4));
-    // The same through the journal, and from the file alone.
     for (const bool finished : {false, true}) {
         SCOPED_TRACE(finished);
         if (finished) writer.finish({{"E_ref", 0.2}, {"stop", "finished"}});
-        EXPECT_EQ(fs::exists(journal_path(file)), !finished);
         const Result result = read_result(file);
         EXPECT_EQ(result.case_text.text, c.text);
         EXPECT_EQ(result.case_text.sets, c.sets);
@@ -198,7 +200,7 @@ TEST_F(ResultFile, CreateReplacesAnOldResult) {
         auto old = create();
         old.row(row_at(0));
         old.frame(record_at(0));
-    }  // not finished: its journal lies there
+    }  // not finished
     auto writer = ResultWriter::create(file, {"y = 2\n", {}}, {}, {"time"});
     EXPECT_EQ(read_result(file).case_text.text, "x = 1\n");
     writer.row(std::vector<double>{7});
@@ -425,14 +427,12 @@ TEST_F(ResultFile, TheViewFollowsTheFrames) {
                      "    print(f['VTKHDF'].attrs['time'] == entry['time'], f['VTKHDF/Points'].shape)\n"),
               "True (9, 3)\nTrue (9, 3)\nTrue (9, 3)\n");
 
-    // A run that goes on and is killed: repairing makes the view whole.
     {
         auto again = ResultWriter::resume(file);
         EXPECT_EQ(view().size(), 4u);
         again.checkpoint(surface_record_at(3, 0));
         again.frame(surface_record_at(4, 0));
     }
-    repair_result(file);
     EXPECT_EQ(view().size(), 5u);
 
     // A new result takes its place; other files in the folder stay.
@@ -565,8 +565,8 @@ TEST_F(ResultFile, AMissingDirectoryIsReportedAtOnce) {
 
 TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
     const auto expect_refused = [&](const std::string& why) {
-        const auto messages = {message_of([&] { read_result(file); }), message_of([&] { repair_result(file); }),
-                               message_of([&] { ResultWriter::resume(file); }), message_of([&] { create(); })};
+        const auto messages = {message_of([&] { read_result(file); }), message_of([&] { ResultWriter::resume(file); }),
+                               message_of([&] { create(); })};
         for (const std::string& message : messages) {
             EXPECT_CONTAINS(message, file.string());
             EXPECT_CONTAINS(message, why);
@@ -580,7 +580,7 @@ TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
     python("h5py.File(name, 'w').create_group('series')");
     expect_refused("not a Tubule result: /case is missing");
     python("f = h5py.File(name, 'w')\nfor part in 'about series frames'.split(): f.create_group(part)\nf['case'] = ''");
-    expect_refused("not a Tubule result: the attribute id is missing");
+    expect_refused("not a Tubule result: the attribute about_begun is missing");
 
     fs::remove(file);
     fs::create_directory(file);
@@ -641,7 +641,6 @@ TEST_F(ResultFile, H5pyReadsItDuringTheRunAndAfter) {
     auto writer =
         ResultWriter::create(file, c, {{"version", "0.1.0"}, {"threads", std::int64_t{2}}, {"E_ref", 0.1}}, series);
     writer.row(row_at(0));
-    // The journal is not for h5py; the file is, whole, at any time.
     EXPECT_EQ(python("f = h5py.File(name)\nprint(f['case'].asstr()[()] == '# \\u00b5\\n', f['series/time'].shape)"),
               "True (1,)\n");
     writer.row(row_at(1));

@@ -106,7 +106,8 @@ void refuse_times_as_results(const PlotOptions& options) {
 int plot(const PlotOptions& options) {
     refuse_times_as_results(options);
     try {
-        for (const std::string& result : options.results) is_scan(result) ? repair_scan(result) : repair_result(result);
+        for (const std::string& result : options.results)
+            if (!is_scan(result)) require_result(result);
     } catch (const std::runtime_error& error) {
         say(stderr, "{}\n", explanation(error));
         return 2;

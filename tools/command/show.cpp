@@ -1,5 +1,4 @@
-// tubule show FILE: a result in words, as CSV or as JSON. Reads the journal of an unfinished run too, and writes
-// nothing.
+// tubule show FILE: a result in words, as CSV or as JSON.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

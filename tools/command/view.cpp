@@ -21,7 +21,7 @@ struct ViewOptions {
 
 int view(const ViewOptions& options) {
     try {
-        is_scan(options.result) ? repair_scan(options.result) : repair_result(options.result);
+        if (!is_scan(options.result)) require_result(options.result);
     } catch (const std::runtime_error& error) {
         say(stderr, "{}\n", explanation(error));
         return 2;

@@ -144,7 +144,7 @@ class Program:
         return run
 
     def read(self, going, run):
-        """Content of the result, journal included; empty if there is none."""
+        """Content of the result; empty if there is none."""
         shown = [self.printed("show", going.result, form) for form in ("--json", "--csv")]
         if not going.result.exists() or any(done.returncode != 0 for done in shown):
             return
