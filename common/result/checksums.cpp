@@ -129,10 +129,11 @@ std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes) {
     return ~crc;
 }
 
-void seal(std::vector<std::byte>& hdf5) {
+std::uint32_t seal(std::vector<std::byte>& hdf5) {
     const Seal seal{seal_magic, hdf5.size(), 0, crc32(0, hdf5), 0};
     const auto bytes = std::as_bytes(std::span(&seal, 1));
     for (int i = 0; i < 2; ++i) hdf5.insert(hdf5.end(), bytes.begin(), bytes.end());
+    return seal.hdf5_crc;
 }
 
 Wholeness examine(int descriptor) {
@@ -145,7 +146,7 @@ Wholeness examine(int descriptor) {
         return {Wholeness::Kind::damaged, "it is damaged: its checksum is wrong"};
     const bool rest_is_good =
         front == back && file.crc(seal->hdf5_size + sizeof(Seal), seal->between_size) == seal->between_crc;
-    return rest_is_good ? Wholeness{Wholeness::Kind::whole, ""}
+    return rest_is_good ? Wholeness{Wholeness::Kind::whole, "", seal->hdf5_crc}
                         : Wholeness{Wholeness::Kind::damaged, "its checksums are damaged"};
 }
 

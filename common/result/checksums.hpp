@@ -21,14 +21,15 @@ namespace tubule {
 // Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
 std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
 
-// Adds the trailer to the HDF5 part.
-void seal(std::vector<std::byte>& hdf5);
+// Adds the trailer to the HDF5 part; the CRC of that.
+std::uint32_t seal(std::vector<std::byte>& hdf5);
 
 struct Wholeness {
     // foreign: no HDF5; unsealed: what another program has written.
     enum class Kind { whole, unsealed, damaged, foreign };
     Kind kind;
-    std::string damage;  // in words
+    std::string damage;     // in words
+    std::uint32_t crc = 0;  // of the HDF5 part, if it is whole
 };
 
 // Reads all of the file.

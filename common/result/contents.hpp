@@ -11,6 +11,17 @@
 
 namespace tubule {
 
+// More bytes of frames than these are not written again and again, but move to a segment; the tests lower it.
+inline std::size_t most_rewritten = std::size_t{100} << 20;
+
+// A file beside a large result with some of its frames, which are not written again: those before `end`, from the end
+// of the segment before.
+struct Segment {
+    std::string file;  // without its folder
+    std::size_t end;
+    std::uint32_t crc;  // of its HDF5 part
+};
+
 struct Contents {
     std::uint64_t about_begun = 0;  // how many of `about` were there when the run began; the rest came at its end
     CaseText case_text;
@@ -20,13 +31,16 @@ struct Contents {
     std::vector<SurfaceCells> meshes;
     std::vector<Record> frames;
     std::optional<Record> checkpoint;
+    std::vector<Segment> segments;
 
+    std::size_t frames_in_segments() const { return segments.empty() ? 0 : segments.back().end; }
     void add_row(std::span<const double> values) { rows.insert(rows.end(), values.begin(), values.end()); }
     void forget() {
         rows.clear();
         meshes.clear();
         frames.clear();
         checkpoint.reset();
+        segments.clear();
     }
 };
 

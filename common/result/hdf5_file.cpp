@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <cmath>
 #include <mutex>
+#include <set>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -56,10 +58,30 @@ void put_series(hid_t file, const Contents& contents) {
     }
 }
 
+std::string frame_name(std::size_t number) {
+    return fmt::format("{:06}", number);
+}
+
+void put_segments(hid_t file, hid_t frames, const std::vector<Segment>& segments) {
+    if (segments.empty()) return;
+    std::vector<std::string> words;
+    std::size_t frame = 0;
+    for (const Segment& segment : segments) {
+        words.push_back(fmt::format("{} {} {}", segment.end, segment.crc, segment.file));
+        for (; frame < segment.end; ++frame) {
+            const std::string name = frame_name(frame), target = "/frames/" + name;
+            require(H5Lcreate_external(segment.file.c_str(), target.c_str(), frames, name.c_str(), H5P_DEFAULT,
+                                       H5P_DEFAULT) >= 0,
+                    "link", segment.file);
+        }
+    }
+    put_attribute(file, "segments", words);
+}
+
 std::size_t size_estimate(const Contents& contents) {
     std::size_t doubles = contents.rows.size();
-    for (const Record& frame : contents.frames)
-        for (const Array& array : frame.arrays) doubles += array.data.size();
+    for (std::size_t i = contents.frames_in_segments(); i < contents.frames.size(); ++i)
+        for (const Array& array : contents.frames[i].arrays) doubles += array.data.size();
     std::size_t integers = 0;
     for (const SurfaceCells& mesh : contents.meshes) integers += 2 * mesh.cells.size();
     return doubles * sizeof(double) + integers * sizeof(std::int64_t) + contents.frames.size() * 4096;
@@ -146,6 +168,33 @@ void require_parts(hid_t file) {
         throw std::runtime_error("not a Tubule result: the attribute about_begun is missing");
 }
 
+std::vector<Segment> get_segments(hid_t file) {
+    std::vector<Segment> segments;
+    if (H5Aexists(file, "segments") <= 0) return segments;
+    for (const std::string& words : get_texts(open_attribute(file, "segments"), "segments")) {
+        std::istringstream in(words);
+        Segment segment{};
+        in >> segment.end >> segment.crc >> std::ws;
+        std::getline(in, segment.file);
+        segments.push_back(segment);
+    }
+    return segments;
+}
+
+// HDF5 follows the links to them: they must be as they were written, too.
+void require_segments(hid_t file, const std::filesystem::path& folder) {
+    for (const Segment& segment : get_segments(file)) {
+        const auto path = folder / segment.file;
+        if (!std::filesystem::exists(path))
+            throw std::runtime_error(fmt::format("{}, which has some of its frames, is missing", path.string()));
+        const Wholeness found = examine(path);
+        if (found.kind != Wholeness::Kind::whole || found.crc != segment.crc)
+            throw std::runtime_error(
+                fmt::format("{}, which has some of its frames, {}", path.string(),
+                            found.damage.empty() ? "belongs to another result" : "cannot be read: " + found.damage));
+    }
+}
+
 CaseText get_case(hid_t file) {
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
     return {get_case_text(text), get_texts(open_attribute(text, "set"), "set"), get_inputs(file)};
@@ -156,6 +205,7 @@ Contents get_contents(hid_t file) {
     contents.about_begun =
         get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
     contents.case_text = get_case(file);
+    contents.segments = get_segments(file);
     const auto about = open_group(file, "about");
     for (const std::string& name : attribute_names(about))
         contents.about.emplace_back(name, get_value(open_attribute(about, name), name));
@@ -167,7 +217,7 @@ Contents get_contents(hid_t file) {
     }
     const auto frames = open_group(file, "frames");
     for (std::size_t i = member_names(frames).size(); contents.frames.size() < i;)
-        contents.frames.push_back(get_record(frames, fmt::format("{:06}", contents.frames.size()), contents.meshes));
+        contents.frames.push_back(get_record(frames, frame_name(contents.frames.size()), contents.meshes));
     if (has(file, "checkpoint")) contents.checkpoint = get_record(file, "checkpoint", contents.meshes);
     return contents;
 }
@@ -182,12 +232,18 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
     if (!std::filesystem::exists(status)) durable::fail("open", file, error ? error.value() : ENOENT);
     if (!std::filesystem::is_regular_file(status))
         throw std::runtime_error(fmt::format("{}: not a regular file", file.string()));
-    try {
-        const auto opened = open_file(file);
-        require_parts(opened);
-        return read(opened);
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+    for (int tries = 1;; ++tries) {
+        bool has_segments = false;
+        try {
+            const auto opened = open_file(file);
+            require_parts(opened);
+            has_segments = !get_segments(opened).empty();
+            require_segments(opened, file.parent_path());
+            return read(opened);
+        } catch (const std::runtime_error& e) {
+            // Its writer may have ended: then the segments are gone, and the file has all.
+            if (!has_segments || tries == 3) throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+        }
     }
 }
 
@@ -208,13 +264,30 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     put_series(file, contents);
     const auto meshes = put_meshes(file, contents.meshes);
     const auto frames = make_group(file, "frames");
-    for (std::size_t i = 0; i < contents.frames.size(); ++i)
-        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes);
+    put_segments(file, frames, contents.segments);
+    for (std::size_t i = contents.frames_in_segments(); i < contents.frames.size(); ++i)
+        put_record(frames, frame_name(i), contents.frames[i], meshes);
     if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes);
     put_steps(file, contents, meshes);
     auto bytes = bytes_of(file);
     seal(bytes);
     return bytes;
+}
+
+std::pair<std::vector<std::byte>, std::uint32_t> segment_image(const Contents& contents, std::size_t first) {
+    const std::lock_guard lock(library);
+    const Quiet quiet;
+    std::set<std::size_t> needed;
+    for (std::size_t i = first; i < contents.frames.size(); ++i)
+        if (contents.frames[i].mesh) needed.insert(*contents.frames[i].mesh);
+    const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
+    const auto meshes = put_meshes(file, contents.meshes, [&](std::size_t mesh) { return needed.contains(mesh); });
+    const auto frames = make_group(file, "frames");
+    for (std::size_t i = first; i < contents.frames.size(); ++i)
+        put_record(frames, frame_name(i), contents.frames[i], meshes);
+    auto bytes = bytes_of(file);
+    const std::uint32_t crc = seal(bytes);
+    return {std::move(bytes), crc};
 }
 
 std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {

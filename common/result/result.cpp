@@ -182,14 +182,45 @@ struct ResultWriter::Impl {
     Contents contents;
     Record restart;
     bool resumed = false;
-    bool began = false;      // the file is this writer's
-    bool unwritten = false;  // it lacks something
+    bool began = false;              // the file is this writer's
+    bool unwritten = false;          // it lacks something
+    bool has_other_segments = true;  // maybe: of another run, or of frames that are forgotten
     bool finished = false;
 
     void write() {
+        move_frames_to_segment();
+        write_file();
+    }
+    void write_file() {
         file.write([this] { return hdf5_image(contents); });
         unwritten = false;
+        if (std::exchange(has_other_segments, false)) remove_other_segments();
         write_view(file.path(), contents);
+    }
+    fs::path segment(std::size_t number) const { return file.path().string() + fmt::format(".frames{}", number); }
+    // Large frames that are written are not written again until the end: they move to a file of their own.
+    void move_frames_to_segment() {
+        const std::size_t first = contents.frames_in_segments();
+        std::size_t bytes = 0;
+        for (std::size_t i = first; i < contents.frames.size(); ++i)
+            for (const Array& array : contents.frames[i].arrays) bytes += array.data.size() * sizeof(double);
+        if (bytes <= most_rewritten) return;
+        std::size_t number = 0;
+        while (fs::exists(segment(number))) ++number;
+        const auto [image, crc] = segment_image(contents, first);
+        durable::replace(segment(number), image);
+        contents.segments.push_back({segment(number).filename().string(), contents.frames.size(), crc});
+    }
+    void remove_other_segments() {
+        std::vector<fs::path> others;
+        for (const auto& entry : fs::directory_iterator(file.path().parent_path())) {
+            const std::string name = entry.path().filename().string();
+            const auto is_it = [&](const Segment& segment) { return segment.file == name; };
+            if (name.starts_with(file.path().filename().string() + ".frames") &&
+                std::ranges::none_of(contents.segments, is_it))
+                others.push_back(entry.path());
+        }
+        for (const fs::path& other : others) durable::remove(other);
     }
 
     // What comes before the first row of a new result waits for it, and what was there stays: the run may fail at its
@@ -299,6 +330,7 @@ void ResultWriter::checkpoint(const Record& state) {
 void ResultWriter::discard() {
     impl_->refuse_if_finished();
     impl_->contents.forget();
+    impl_->has_other_segments = true;
     impl_->resumed = false;  // it begins again
     impl_->added(false, false);
 }
@@ -314,7 +346,9 @@ void ResultWriter::finish(const About& more) {
         else
             about.emplace_back(name, value);
     }
-    impl_->write();
+    impl_->contents.segments.clear();  // one file again
+    impl_->has_other_segments = true;
+    impl_->write_file();
     impl_->file.release();
     impl_->finished = true;
 }

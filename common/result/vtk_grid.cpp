@@ -90,13 +90,18 @@ VtkPoints vtk_points(const SurfaceCells& mesh) {
     return points;
 }
 
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes) {
+std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes,
+                                    const std::function<bool(std::size_t)>& needed) {
     std::vector<WrittenMesh> written;
     if (meshes.empty()) return written;
     const auto parent = make_group(file, "meshes");
     for (const SurfaceCells& mesh : meshes) {
         const std::string name = fmt::format("{:06}", written.size());
         VtkPoints points = vtk_points(mesh);
+        if (!needed(written.size())) {
+            written.push_back({mesh, std::move(points), ""});
+            continue;
+        }
         const std::size_t cells = cell_count(mesh);
         const auto group = make_group(parent, name);
         put_attribute(group, "order", std::int64_t{mesh.order});
@@ -192,6 +197,7 @@ namespace {
 struct Part {
     std::string path;
     std::size_t rows;
+    std::string file = ".";  // this one
 };
 
 // A dataset that shows others, one below the other; width 0 for lists.
@@ -210,7 +216,7 @@ void put_virtual(hid_t parent, const std::string& name, hid_t type, std::size_t 
         const auto source = space(shape(part.rows));
         const bool done =
             H5Sselect_hyperslab(whole, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) >= 0 &&
-            H5Pset_virtual(how, whole, ".", part.path.c_str(), source) >= 0;
+            H5Pset_virtual(how, whole, part.file.c_str(), part.path.c_str(), source) >= 0;
         require(done, "show", part.path);
         begin += part.rows;
     }
@@ -223,9 +229,15 @@ void put_virtual(hid_t parent, const std::string& name, hid_t type, std::size_t 
 struct Step {
     const Record& record;
     const WrittenMesh& written;
-    std::string path;
+    std::string path, file;
     std::size_t points() const { return written.points.node.size(); }
 };
+
+// Where a frame is, for virtual datasets.
+std::string file_of(const std::vector<Segment>& segments, std::size_t frame) {
+    const auto found = std::ranges::find_if(segments, [&](const Segment& segment) { return frame < segment.end; });
+    return found == segments.end() ? "." : found->file;
+}
 
 // Numbers of columns (0: a list) of the point data that all steps have alike: VTK reads no others over time.
 std::map<std::string, std::size_t> common_point_data(const std::vector<Step>& steps) {
@@ -273,20 +285,21 @@ void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMe
     std::vector<Step> steps;
     for (std::size_t i = 0; i < contents.frames.size(); ++i)
         if (const Record& frame = contents.frames[i]; frame.mesh)
-            steps.push_back({frame, meshes[*frame.mesh], fmt::format("/frames/{:06}", i)});
+            steps.push_back(
+                {frame, meshes[*frame.mesh], fmt::format("/frames/{:06}", i), file_of(contents.segments, i)});
     if (steps.empty()) return;
 
     const auto group = make_group(file, "VTKHDF");
     put_format(group, {2, 0});
     put_numbers(group, meshes);
     std::vector<Part> points;
-    for (const Step& step : steps) points.push_back({step.path + "/Points", step.points()});
+    for (const Step& step : steps) points.push_back({step.path + "/Points", step.points(), step.file});
     put_virtual(group, "Points", H5T_NATIVE_DOUBLE, 3, points);
     const auto common = common_point_data(steps);
     const auto data = make_group(group, "PointData");
     for (const auto& [name, width] : common) {
         std::vector<Part> parts;
-        for (const Step& step : steps) parts.push_back({step.path + "/PointData/" + name, step.points()});
+        for (const Step& step : steps) parts.push_back({step.path + "/PointData/" + name, step.points(), step.file});
         put_virtual(data, name, H5T_NATIVE_DOUBLE, width, parts);
     }
 

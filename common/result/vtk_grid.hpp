@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,8 +36,10 @@ inline constexpr const char* grid_members[] = {"NumberOfPoints", "NumberOfCells"
                                                "Points",         "PointData",     "CellData",
                                                "FieldData",      "Steps"};
 
-// Makes /meshes, if there are any.
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes);
+// Makes /meshes, if there are any, with those that are needed.
+std::vector<WrittenMesh> put_meshes(
+    hid_t file, const std::vector<SurfaceCells>& meshes,
+    const std::function<bool(std::size_t)>& needed = [](std::size_t) { return true; });
 SurfaceCells get_mesh(hid_t meshes, const std::string& name);
 
 // Makes the group of a frame an unstructured grid. Arrays that are not point data become plain datasets.

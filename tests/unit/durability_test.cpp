@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "common/result/contents.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/file_writer.hpp"
 #include "common/result/result.hpp"
@@ -234,9 +235,11 @@ protected:
         ASSERT_NE(mkdtemp(pattern.data()), nullptr);
         directory = pattern;
         file = directory / "run.hdf";
+        most_rewritten = 1000;  // large frames have files of their own
         FileWriter::seconds_between_writes = 0;
     }
     void TearDown() override {
+        most_rewritten = usual;
         FileWriter::seconds_between_writes.reset();
         durable::fault = nullptr;
         fs::remove_all(directory);
@@ -251,6 +254,7 @@ protected:
         for (const Step& step : steps) step.call(writer, file);
     }
 
+    const std::size_t usual = most_rewritten;
     fs::path directory, file;
 };
 

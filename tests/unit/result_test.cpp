@@ -13,8 +13,10 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/result/contents.hpp"
 #include "common/result/file_writer.hpp"
 #include "tests/support/message_of.hpp"
 
@@ -441,6 +443,78 @@ TEST_F(ResultFile, TheViewFollowsTheFrames) {
     EXPECT_EQ(view().size(), 6u);
     other.row(row_at(0));
     EXPECT_EQ(view(), std::vector<std::string>{"run_notes.hdf"});
+}
+
+// ---- large results
+
+// Its frames move to files of their own, and back into one at the end; h5py and the view see no difference. Long: one
+// result through all its life.
+TEST_F(ResultFile, FramesOfALargeResultAreWrittenOnce) {
+    const std::size_t usual = std::exchange(most_rewritten, 1000);
+    const auto frames = [&] {
+        std::vector<Record> expected = {record_at(0)};
+        for (const double time : {0.1, 2.0, 3.0, 4.0}) expected.push_back(surface_record_at(time, time > 1));
+        return expected;
+    }();
+    const auto segments = [&] {
+        std::vector<fs::path> found;
+        for (const auto& entry : fs::directory_iterator(directory))
+            if (entry.path().string().find(".hdf.frames") != std::string::npos) found.push_back(entry.path());
+        std::sort(found.begin(), found.end());
+        return found;
+    };
+    const auto expect_frames = [&](std::size_t count) {
+        const Result result = read_result(file);
+        ASSERT_EQ(result.frames.size(), count);
+        for (std::size_t i = 0; i < count; ++i) expect_same(result.frames[i], frames[i]);
+        EXPECT_EQ(result.meshes, (std::vector<SurfaceCells>{two_cells(), two_shifted_cells()}));
+        EXPECT_EQ(
+            python("f = h5py.File(name)\nprint(f['VTKHDF/Points'].shape[0], f['VTKHDF/PointData/H'][9:].tolist() == "
+                   "f['frames/000002/PointData/H'][:].tolist() + f['frames/000003/PointData/H'][:].tolist() + "
+                   "(f['frames/000004/PointData/H'][:].tolist() if len(f['frames']) > 4 else []))"),
+            count > 4 ? "51 True\n" : "37 True\n");
+        EXPECT_EQ(python("import os\nf = h5py.File(os.path.dirname(name) + '/view/run_000002.hdf')\n"
+                         "print(f['VTKHDF'].attrs['time'])"),
+                  "2.0\n");
+    };
+    {
+        auto writer = create();
+        writer.row(row_at(0));
+        writer.mesh(two_cells());
+        writer.mesh(two_shifted_cells());
+        for (int i = 0; i < 4; ++i) writer.frame(frames[i]);
+        EXPECT_EQ(segments().size(), 3u);
+        const auto before = fs::last_write_time(segments()[0]);
+        writer.row(row_at(1));
+        EXPECT_EQ(fs::last_write_time(segments()[0]), before);
+        expect_frames(4);
+    }
+    {  // killed, as it were
+        const fs::path segment = segments()[0], aside = directory / "aside";
+        fs::rename(segment, aside);
+        EXPECT_CONTAINS(message_of([&] { read_result(file); }),
+                        segment.string() + ", which has some of its frames, is missing");
+        fs::copy_file(segments()[0], segment);
+        EXPECT_CONTAINS(message_of([&] { read_result(file); }),
+                        segment.string() + ", which has some of its frames, belongs to another");
+        std::ofstream(segment, std::ios::app) << "x";
+        EXPECT_CONTAINS(message_of([&] { ResultWriter::resume(file); }), "cannot be read: its checksums are damaged");
+        fs::rename(aside, segment);
+        auto writer = ResultWriter::resume(file);
+        writer.frame(frames[4]);
+        expect_frames(5);
+        writer.finish({});
+    }
+    EXPECT_TRUE(segments().empty());
+    expect_frames(5);
+    auto other = create();
+    other.frame(frames[0]);
+    most_rewritten = 0;
+    other.row(row_at(0));
+    EXPECT_EQ(segments().size(), 1u);
+    other.discard();
+    EXPECT_TRUE(segments().empty());
+    most_rewritten = usual;
 }
 
 // ---- resuming

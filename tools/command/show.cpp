@@ -268,6 +268,8 @@ int verify(const ShowOptions& options) {
     const Wholeness found = examine(options.file);
     if (found.kind == Wholeness::Kind::foreign) throw std::runtime_error(options.file + ": not a Tubule result");
     const bool whole = found.kind == Wholeness::Kind::whole;
+    if (whole && !is_scan(options.file))
+        require_result(options.file);  // throws if other files with its frames are damaged
     const std::string words = whole ? "as it was written"
                               : found.kind == Wholeness::Kind::damaged
                                   ? found.damage
