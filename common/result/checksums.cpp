@@ -20,7 +20,7 @@ namespace tubule {
 
 namespace {
 
-// Eight tables take eight bytes a turn: a bytewise CRC would cost more than the write of a row.
+// Eight tables take eight bytes a turn.
 constexpr auto crc_tables = [] {
     std::array<std::array<std::uint32_t, 256>, 8> t{};
     for (std::uint32_t i = 0; i < 256; ++i) {
@@ -37,8 +37,8 @@ constexpr std::array<char, 8> seal_magic{'T', 'U', 'B', 'U', 'L', 'E', 'C', '1'}
 
 struct Seal {
     std::array<char, 8> magic;
-    std::uint64_t hdf5_size, index_size;
-    std::uint32_t hdf5_crc, index_crc;
+    std::uint64_t hdf5_size, between_size;
+    std::uint32_t hdf5_crc, between_crc;
 
     bool operator==(const Seal&) const = default;
 };
@@ -69,7 +69,7 @@ public:
         return value;
     }
     std::uint32_t crc(std::uint64_t offset, std::uint64_t size) const {
-        Bytes buffer(std::min<std::uint64_t>(size, 1 << 18));
+        std::vector<std::byte> buffer(std::min<std::uint64_t>(size, 1 << 18));
         std::uint32_t sum = 0;
         while (size > 0) {
             const auto part = std::span(buffer).first(std::min<std::uint64_t>(size, buffer.size()));
@@ -98,17 +98,17 @@ std::optional<Seal> seal_at(const Source& file, std::uint64_t offset) {
     const auto found = file.at<Seal>(offset);
     if (!found || found->magic != seal_magic) return std::nullopt;
     const std::uint64_t rest = file.size() - std::min<std::uint64_t>(file.size(), 2 * sizeof(Seal));
-    if (found->hdf5_size > rest || found->index_size != rest - found->hdf5_size) return std::nullopt;
+    if (found->hdf5_size > rest || found->between_size != rest - found->hdf5_size) return std::nullopt;
     return found;
 }
 
 Wholeness unsealed(const Source& file) {
     const auto end = hdf5_end(file);
-    if (!end || *end == file.size()) return {Wholeness::Kind::unsealed, "", end, {}};
-    const std::string words = *end > file.size()
-                                  ? fmt::format("it is cut off: {} of {} bytes are there", file.size(), *end)
-                                  : "its checksums are damaged";
-    return {Wholeness::Kind::damaged, words, {}, {}};
+    if (!end) return {Wholeness::Kind::foreign, ""};
+    if (*end == file.size()) return {Wholeness::Kind::unsealed, ""};
+    return {Wholeness::Kind::damaged, *end > file.size()
+                                          ? fmt::format("it is cut off: {} of {} bytes are there", file.size(), *end)
+                                          : "its checksums are damaged"};
 }
 
 }  // namespace
@@ -129,54 +129,40 @@ std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes) {
     return ~crc;
 }
 
-Extent extent_of(std::uint64_t offset, std::span<const std::byte> data) {
-    Extent extent{offset, data.size(), {}};
-    for (; !data.empty(); data = data.subspan(std::min(data.size(), Extent::chunk)))
-        extent.crcs.push_back(crc32(0, data.first(std::min(data.size(), Extent::chunk))));
-    return extent;
-}
-
-void seal(Bytes& hdf5, std::span<const std::byte> index) {
-    const Seal seal{seal_magic, hdf5.size(), index.size(), crc32(0, hdf5), crc32(0, index)};
+std::uint32_t seal(std::vector<std::byte>& hdf5) {
+    const Seal seal{seal_magic, hdf5.size(), 0, crc32(0, hdf5), 0};
     const auto bytes = std::as_bytes(std::span(&seal, 1));
-    hdf5.reserve(hdf5.size() + index.size() + 2 * bytes.size());
-    put(hdf5, bytes);
-    put(hdf5, index);
-    put(hdf5, bytes);
+    for (int i = 0; i < 2; ++i) hdf5.insert(hdf5.end(), bytes.begin(), bytes.end());
+    return seal.hdf5_crc;
 }
 
 Wholeness examine(int descriptor) {
     const Source file(descriptor);
-    auto back = file.size() >= sizeof(Seal) ? seal_at(file, file.size() - sizeof(Seal)) : std::nullopt;
+    const auto back = file.size() >= sizeof(Seal) ? seal_at(file, file.size() - sizeof(Seal)) : std::nullopt;
     const auto front = seal_at(file, back ? back->hdf5_size : hdf5_end(file).value_or(file.size()));
-    const bool seals_agree = front == back;
-    if (!back) back = front;
-    if (!back) return unsealed(file);
-
-    Wholeness out{Wholeness::Kind::damaged, "", {}, {}};
-    if (file.crc(0, back->hdf5_size) == back->hdf5_crc) out.hdf5_size = back->hdf5_size;
-    Bytes index(back->index_size);
-    file.read(back->hdf5_size + sizeof(Seal), index);
-    const bool index_is_good = crc32(0, index) == back->index_crc;
-    if (index_is_good) out.index = std::move(index);
-    if (out.hdf5_size && index_is_good && seals_agree)
-        out.kind = Wholeness::Kind::whole;
-    else
-        out.damage = out.hdf5_size ? "its checksums are damaged" : "it is damaged: its checksum is wrong";
-    return out;
+    const auto& seal = back ? back : front;
+    if (!seal) return unsealed(file);
+    if (file.crc(0, seal->hdf5_size) != seal->hdf5_crc)
+        return {Wholeness::Kind::damaged, "it is damaged: its checksum is wrong"};
+    const bool rest_is_good =
+        front == back && file.crc(seal->hdf5_size + sizeof(Seal), seal->between_size) == seal->between_crc;
+    return rest_is_good ? Wholeness{Wholeness::Kind::whole, "", seal->hdf5_crc}
+                        : Wholeness{Wholeness::Kind::damaged, "its checksums are damaged"};
 }
 
 Wholeness examine(const std::filesystem::path& file) {
+    if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file))
+        throw std::runtime_error(fmt::format("{}: not a regular file", file.string()));
     return examine(durable::File(file, O_RDONLY).descriptor());
 }
 
 bool require_whole(int descriptor, const std::filesystem::path& file) {
     const Wholeness found = examine(descriptor);
     if (found.kind == Wholeness::Kind::damaged)
-        throw std::runtime_error(fmt::format("{}; `tubule show --verify {}` says what is good and can rescue it",
-                                             found.damage, file.string()));
+        throw std::runtime_error(
+            fmt::format("{}; bring back a copy, or run its case again (docs/stopped_runs.md)", found.damage));
     static std::atomic_flag warned;
-    if (found.kind == Wholeness::Kind::unsealed && found.hdf5_size && !warned.test_and_set())
+    if (found.kind == Wholeness::Kind::unsealed && !warned.test_and_set())
         std::fputs(fmt::format("warning: {} has no checksums (it is of an earlier version, or another program has "
                                "changed it): damage may go unnoticed\n",
                                file.string())

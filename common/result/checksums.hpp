@@ -1,53 +1,43 @@
-// Checksums of a file: behind its HDF5 part, where HDF5 does not look, stand
+// The trailer of a file: behind its HDF5 part, where HDF5 does not look, stands twice
 //
-//   seal    "TUBULEC1", 8 bytes each: size of the HDF5 part, size of the index; 4 bytes each: CRC-32 of either
-//   index   what a reader needs to find the numbers without HDF5 (result_index.hpp)
-//   seal    the same again
+//   "TUBULEC1", 8 bytes each: size of the HDF5 part, size of what stands between the two; 4 bytes each: CRC-32 of
+//   either
+//
+// Nothing stands between them today; versions before 0.2 had an index there.
 //
 // HDF5 trusts every bit of a file, and one that is wrong can crash it: nothing of a file is shown to HDF5 before its
-// checksums have been found right.
+// checksum has been found right.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
-
-#include "common/result/bytes.hpp"
 
 namespace tubule {
 
 // Continues `crc` (0 to begin with) over `bytes`: the CRC-32 of zlib.
 std::uint32_t crc32(std::uint32_t crc, std::span<const std::byte> bytes);
 
-// Where the numbers of a dataset are in the file, and a CRC for each `chunk` bytes of them.
-struct Extent {
-    static constexpr std::size_t chunk = 4096;
-
-    std::uint64_t offset = 0, size = 0;  // bytes
-    std::vector<std::uint32_t> crcs;
-};
-Extent extent_of(std::uint64_t offset, std::span<const std::byte> data);
-
-// The HDF5 part with index and seals added.
-void seal(Bytes& hdf5, std::span<const std::byte> index);
+// Adds the trailer to the HDF5 part; the CRC of that.
+std::uint32_t seal(std::vector<std::byte>& hdf5);
 
 struct Wholeness {
-    enum class Kind { whole, unsealed, damaged };
+    // foreign: no HDF5; unsealed: what another program has written.
+    enum class Kind { whole, unsealed, damaged, foreign };
     Kind kind;
-    std::string damage;                      // in words
-    std::optional<std::uint64_t> hdf5_size;  // if there is such a part, and it is not known to be damaged
-    Bytes index;                             // empty unless it is as it was written
+    std::string damage;     // in words
+    std::uint32_t crc = 0;  // of the HDF5 part, if it is whole
 };
 
-// Reads all of the file. `unsealed` is what an earlier version or another program has written.
+// Reads all of the file.
 Wholeness examine(const std::filesystem::path& file);
 Wholeness examine(int descriptor);
 
-// Whether it has checksums; warns on stderr, once a process, of a file without. Throws std::runtime_error with the damage
-// in words.
+// Whether it has checksums; warns on stderr, once a process, of an HDF5 file without. Throws std::runtime_error with
+// the damage in words.
 bool require_whole(int descriptor, const std::filesystem::path& file);
 
 }  // namespace tubule

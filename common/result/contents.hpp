@@ -1,4 +1,4 @@
-// All that a result file holds, in memory, and where in the stream of calls it stands.
+// All that a result file holds, in memory.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,18 @@
 
 namespace tubule {
 
+// More bytes of frames than these are not written again and again, but move to a segment; the tests lower it.
+inline std::size_t most_rewritten = std::size_t{100} << 20;
+
+// A file beside a large result with some of its frames, which are not written again: those before `end`, from the end
+// of the segment before.
+struct Segment {
+    std::string file;  // without its folder
+    std::size_t end;
+    std::uint32_t crc;  // of its HDF5 part
+};
+
 struct Contents {
-    std::uint64_t id = 0;           // of this result: a journal with another id belongs to a file that is gone
-    std::uint64_t sequence = 0;     // number of journal records these contents include
     std::uint64_t about_begun = 0;  // how many of `about` were there when the run began; the rest came at its end
     CaseText case_text;
     About about;
@@ -22,13 +31,16 @@ struct Contents {
     std::vector<SurfaceCells> meshes;
     std::vector<Record> frames;
     std::optional<Record> checkpoint;
+    std::vector<Segment> segments;
 
+    std::size_t frames_in_segments() const { return segments.empty() ? 0 : segments.back().end; }
     void add_row(std::span<const double> values) { rows.insert(rows.end(), values.begin(), values.end()); }
     void forget() {
         rows.clear();
         meshes.clear();
         frames.clear();
         checkpoint.reset();
+        segments.clear();
     }
 };
 

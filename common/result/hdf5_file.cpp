@@ -8,13 +8,15 @@
 #include <cerrno>
 #include <cmath>
 #include <mutex>
+#include <set>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "common/energy/bending.hpp"
+#include "common/result/checksums.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
-#include "common/result/result_index.hpp"
 #include "common/result/vtk_grid.hpp"
 #include "common/series/catalogue.hpp"
 
@@ -28,23 +30,20 @@ std::mutex library;  // HDF5 may be built without thread safety
 
 // ---- writing
 
-void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes,
-                std::vector<Extent>& extents) {
+void put_record(hid_t parent, const std::string& name, const Record& record, const std::vector<WrittenMesh>& meshes) {
     const auto group = make_group(parent, name);
     put_attribute(group, "time", record.time);
     if (record.kind) put_attribute(group, "kind", std::string(tubule::name(*record.kind)));
     for (const auto& [key, value] : record.numbers) put_attribute(group, key, value);
     if (record.mesh) {
-        put_grid(group, record, meshes[*record.mesh], extents);
+        put_grid(group, record, meshes[*record.mesh]);
         return;
     }
     for (const Array& array : record.arrays)
-        extents.push_back(
-            extent_of(put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data()),
-                      std::as_bytes(std::span(array.data))));
+        put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data());
 }
 
-void put_series(hid_t file, const Contents& contents, std::vector<Extent>& extents) {
+void put_series(hid_t file, const Contents& contents) {
     const auto group = make_group(file, "series");
     put_attribute(group, "order", contents.series);
     const std::size_t width = contents.series.size();
@@ -53,7 +52,6 @@ void put_series(hid_t file, const Contents& contents, std::vector<Extent>& exten
         for (std::size_t i = 0; i < column.size(); ++i) column[i] = contents.rows[i * width + j];
         const auto data =
             put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
-        extents.push_back(extent_of(data, std::as_bytes(std::span(column))));
         if (const SeriesEntry* entry = find_series(contents.series[j])) {
             put_attribute(data, "unit", std::string(entry->unit));
             put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
@@ -63,10 +61,30 @@ void put_series(hid_t file, const Contents& contents, std::vector<Extent>& exten
     }
 }
 
+std::string frame_name(std::size_t number) {
+    return fmt::format("{:06}", number);
+}
+
+void put_segments(hid_t file, hid_t frames, const std::vector<Segment>& segments) {
+    if (segments.empty()) return;
+    std::vector<std::string> words;
+    std::size_t frame = 0;
+    for (const Segment& segment : segments) {
+        words.push_back(fmt::format("{} {} {}", segment.end, segment.crc, segment.file));
+        for (; frame < segment.end; ++frame) {
+            const std::string name = frame_name(frame), target = "/frames/" + name;
+            require(H5Lcreate_external(segment.file.c_str(), target.c_str(), frames, name.c_str(), H5P_DEFAULT,
+                                       H5P_DEFAULT) >= 0,
+                    "link", segment.file);
+        }
+    }
+    put_attribute(file, "segments", words);
+}
+
 std::size_t size_estimate(const Contents& contents) {
     std::size_t doubles = contents.rows.size();
-    for (const Record& frame : contents.frames)
-        for (const Array& array : frame.arrays) doubles += array.data.size();
+    for (std::size_t i = contents.frames_in_segments(); i < contents.frames.size(); ++i)
+        for (const Array& array : contents.frames[i].arrays) doubles += array.data.size();
     std::size_t integers = 0;
     for (const SurfaceCells& mesh : contents.meshes) integers += 2 * mesh.cells.size();
     return doubles * sizeof(double) + integers * sizeof(std::int64_t) + contents.frames.size() * 4096;
@@ -149,9 +167,35 @@ void require_parts(hid_t file) {
         throw std::runtime_error("is the result of a scan: this needs the result of a run");
     for (const char* part : {"case", "about", "series", "frames"})
         if (!has(file, part)) throw std::runtime_error(fmt::format("not a Tubule result: /{} is missing", part));
-    for (const char* part : {"id", "sequence", "about_begun"})
-        if (H5Aexists(file, part) <= 0)
-            throw std::runtime_error(fmt::format("not a Tubule result: the attribute {} is missing", part));
+    if (H5Aexists(file, "about_begun") <= 0)
+        throw std::runtime_error("not a Tubule result: the attribute about_begun is missing");
+}
+
+std::vector<Segment> get_segments(hid_t file) {
+    std::vector<Segment> segments;
+    if (H5Aexists(file, "segments") <= 0) return segments;
+    for (const std::string& words : get_texts(open_attribute(file, "segments"), "segments")) {
+        std::istringstream in(words);
+        Segment segment{};
+        in >> segment.end >> segment.crc >> std::ws;
+        std::getline(in, segment.file);
+        segments.push_back(segment);
+    }
+    return segments;
+}
+
+// HDF5 follows the links to them: they must be as they were written, too.
+void require_segments(hid_t file, const std::filesystem::path& folder) {
+    for (const Segment& segment : get_segments(file)) {
+        const auto path = folder / segment.file;
+        if (!std::filesystem::exists(path))
+            throw std::runtime_error(fmt::format("{}, which has some of its frames, is missing", path.string()));
+        const Wholeness found = examine(path);
+        if (found.kind != Wholeness::Kind::whole || found.crc != segment.crc)
+            throw std::runtime_error(
+                fmt::format("{}, which has some of its frames, {}", path.string(),
+                            found.damage.empty() ? "belongs to another result" : "cannot be read: " + found.damage));
+    }
 }
 
 CaseText get_case(hid_t file) {
@@ -164,11 +208,10 @@ CaseText get_case(hid_t file) {
 
 Contents get_contents(hid_t file) {
     Contents contents;
-    contents.id = get_attribute<std::uint64_t>(open_attribute(file, "id"), H5T_NATIVE_UINT64, "id");
-    contents.sequence = get_attribute<std::uint64_t>(open_attribute(file, "sequence"), H5T_NATIVE_UINT64, "sequence");
     contents.about_begun =
         get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
     contents.case_text = get_case(file);
+    contents.segments = get_segments(file);
     const auto about = open_group(file, "about");
     for (const std::string& name : attribute_names(about))
         contents.about.emplace_back(name, get_value(open_attribute(about, name), name));
@@ -180,7 +223,7 @@ Contents get_contents(hid_t file) {
     }
     const auto frames = open_group(file, "frames");
     for (std::size_t i = member_names(frames).size(); contents.frames.size() < i;)
-        contents.frames.push_back(get_record(frames, fmt::format("{:06}", contents.frames.size()), contents.meshes));
+        contents.frames.push_back(get_record(frames, frame_name(contents.frames.size()), contents.meshes));
     if (has(file, "checkpoint")) contents.checkpoint = get_record(file, "checkpoint", contents.meshes);
     return contents;
 }
@@ -195,12 +238,18 @@ auto with_result(const std::filesystem::path& file, const Read& read) {
     if (!std::filesystem::exists(status)) durable::fail("open", file, error ? error.value() : ENOENT);
     if (!std::filesystem::is_regular_file(status))
         throw std::runtime_error(fmt::format("{}: not a regular file", file.string()));
-    try {
-        const auto opened = open_file(file);
-        require_parts(opened);
-        return read(opened);
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+    for (int tries = 1;; ++tries) {
+        bool has_segments = false;
+        try {
+            const auto opened = open_file(file);
+            require_parts(opened);
+            has_segments = !get_segments(opened).empty();
+            require_segments(opened, file.parent_path());
+            return read(opened);
+        } catch (const std::runtime_error& e) {
+            // Its writer may have ended: then the segments are gone, and the file has all.
+            if (!has_segments || tries == 3) throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+        }
     }
 }
 
@@ -211,8 +260,6 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     const Quiet quiet;
     // Grows in steps of the expected size, so that it is rarely reallocated.
     const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
-    put_attribute(file, "id", contents.id);
-    put_attribute(file, "sequence", contents.sequence);
     put_attribute(file, "about_begun", contents.about_begun);
     const char* text = contents.case_text.text.c_str();
     put_attribute(put_dataset(file, "case", text_type(), scalar(), &text), "set", contents.case_text.sets);
@@ -222,17 +269,33 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
-    std::vector<Extent> extents;
-    put_series(file, contents, extents);
-    const auto meshes = put_meshes(file, contents.meshes, extents);
+    put_series(file, contents);
+    const auto meshes = put_meshes(file, contents.meshes);
     const auto frames = make_group(file, "frames");
-    for (std::size_t i = 0; i < contents.frames.size(); ++i)
-        put_record(frames, fmt::format("{:06}", i), contents.frames[i], meshes, extents);
-    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes, extents);
+    put_segments(file, frames, contents.segments);
+    for (std::size_t i = contents.frames_in_segments(); i < contents.frames.size(); ++i)
+        put_record(frames, frame_name(i), contents.frames[i], meshes);
+    if (contents.checkpoint) put_record(file, "checkpoint", *contents.checkpoint, meshes);
     put_steps(file, contents, meshes);
     auto bytes = bytes_of(file);
-    seal(bytes, index_of(contents, extents));
+    seal(bytes);
     return bytes;
+}
+
+std::pair<std::vector<std::byte>, std::uint32_t> segment_image(const Contents& contents, std::size_t first) {
+    const std::lock_guard lock(library);
+    const Quiet quiet;
+    std::set<std::size_t> needed;
+    for (std::size_t i = first; i < contents.frames.size(); ++i)
+        if (contents.frames[i].mesh) needed.insert(*contents.frames[i].mesh);
+    const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
+    const auto meshes = put_meshes(file, contents.meshes, [&](std::size_t mesh) { return needed.contains(mesh); });
+    const auto frames = make_group(file, "frames");
+    for (std::size_t i = first; i < contents.frames.size(); ++i)
+        put_record(frames, frame_name(i), contents.frames[i], meshes);
+    auto bytes = bytes_of(file);
+    const std::uint32_t crc = seal(bytes);
+    return {std::move(bytes), crc};
 }
 
 std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
@@ -247,14 +310,6 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame) {
 
 Contents read_hdf5(const std::filesystem::path& file) {
     return with_result(file, get_contents);
-}
-
-Contents read_hdf5(std::vector<std::byte> bytes) {
-    const std::lock_guard lock(library);
-    const Quiet quiet;
-    const auto image = open_image(bytes);
-    require_parts(image);
-    return get_contents(image);
 }
 
 CaseText read_hdf5_case(const std::filesystem::path& file) {

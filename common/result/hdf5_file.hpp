@@ -4,14 +4,18 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/result/contents.hpp"
 
 namespace tubule {
 
-// The bytes of the file, made in memory.
+// The bytes of the file, made in memory. In place of the frames that are in segments it has links to them.
 std::vector<std::byte> hdf5_image(const Contents& contents);
+
+// The bytes of a segment with the frames from `first` on, and its CRC.
+std::pair<std::vector<std::byte>, std::uint32_t> segment_image(const Contents& contents, std::size_t first);
 
 // The bytes of a file in which VTK finds that frame of `file`, a path relative to the folder of the one to be written.
 std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
@@ -19,7 +23,5 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
 // All throw std::runtime_error naming the file, and what is missing if it is HDF5 but not a result.
 Contents read_hdf5(const std::filesystem::path& file);
 CaseText read_hdf5_case(const std::filesystem::path& file);
-Contents read_hdf5(std::vector<std::byte> bytes);        // of the HDF5 part of a file, which is good
-void require_result(const std::filesystem::path& file);  // looks for the parts without reading them
 
 }  // namespace tubule

@@ -7,6 +7,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "common/result/checksums.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/solve/memory.hpp"
 
@@ -143,10 +144,6 @@ Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std:
     return put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size()}), values.data());
 }
 
-Extent extent_of(hid_t dataset, std::span<const std::byte> data) {
-    return tubule::extent_of(data.empty() ? 0 : H5Dget_offset(dataset), data);
-}
-
 Handle make_group(hid_t parent, const std::string& name) {
     const auto how = property_list(H5P_GROUP_CREATE);
     H5Pset_obj_track_times(how, false);
@@ -237,14 +234,6 @@ Handle open_file(const std::filesystem::path& file) {
         if (!has_checksums) require_all_values(opened);
         return opened;
     }
-}
-
-Handle open_image(std::span<std::byte> bytes) {
-    require_room(bytes.size());
-    const auto access = property_list(H5P_FILE_ACCESS);
-    H5Pset_fapl_core(access, bytes.size(), false);
-    require(H5Pset_file_image(access, bytes.data(), bytes.size()) >= 0, "read", "a file in memory");
-    return {H5Fopen("image", H5F_ACC_RDONLY, access), H5Fclose, "open", "it"};
 }
 
 bool has(hid_t parent, const std::string& name) {

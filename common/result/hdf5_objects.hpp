@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/result/checksums.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule::h5 {
@@ -74,8 +73,6 @@ void put_attribute(hid_t object, const std::string& name, const std::vector<std:
 
 Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data);
 Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values);
-// Where a dataset has its numbers, which begin with `data`.
-Extent extent_of(hid_t dataset, std::span<const std::byte> data);
 
 // A group that remembers the order in which its attributes and members were made.
 Handle make_group(hid_t parent, const std::string& name);
@@ -88,7 +85,6 @@ void put_inputs(hid_t file, const CaseInputs& inputs);
 // Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged, or if another
 // program has made it such that values are not in it.
 Handle open_file(const std::filesystem::path& file);
-Handle open_image(std::span<std::byte> bytes);  // of a file in memory
 
 bool has(hid_t parent, const std::string& name);
 Handle open_group(hid_t parent, const std::string& name);

@@ -1,4 +1,4 @@
-// Records and meshes as bytes, for the journal and the index of a file.
+// Records and meshes as bytes, for ranks and for what a case reads.
 #pragma once
 
 #include "common/result/bytes.hpp"

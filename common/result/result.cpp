@@ -1,25 +1,17 @@
 #include "common/result/result.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <random>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
-#include "common/result/checksums.hpp"
 #include "common/result/contents.hpp"
-#include "common/result/durable_io.hpp"
+#include "common/result/file_writer.hpp"
 #include "common/result/hdf5_file.hpp"
-#include "common/result/journal.hpp"
 #include "common/result/record.hpp"
-#include "common/result/result_index.hpp"
 #include "common/result/view.hpp"
 #include "common/result/vtk_grid.hpp"
 
@@ -27,7 +19,6 @@ namespace tubule {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 
 // ---- refusals
@@ -144,17 +135,6 @@ void refuse_to_replace_others(const fs::path& file) {
 
 // ---- contents
 
-Contents load(const fs::path& file) {
-    const auto journal = read_journal(file);  // before the file: see replay
-    Contents contents = read_hdf5(file);
-    try {
-        warn_of_rest(replay(journal, contents), file);
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
-    }
-    return contents;
-}
-
 // Drops everything after the newest restart record, and returns that record.
 Record rewind(Contents& contents) {
     const Record* newest = contents.frames.empty() ? nullptr : &contents.frames.back();
@@ -189,72 +169,73 @@ Record rewind(Contents& contents) {
 
 struct ResultWriter::Impl {
     // Fails if another writer holds the file, or if permissions are missing.
-    explicit Impl(const fs::path& f) : file(f), journal(f) {}
+    explicit Impl(const fs::path& path) : file(path) {}
+    // A run that ended by an exception; if the disk is the reason, nothing more can be done.
+    ~Impl() {
+        try {
+            if (began && unwritten) write();
+        } catch (const std::exception&) {
+        }
+    }
 
-    fs::path file;
-    Journal journal;
+    FileWriter file;
     Contents contents;
     Record restart;
-    std::vector<std::byte> rewound;  // image of a resumed result, made before its run begins and its time counts
-    bool has_row = false;
-    bool began = false;  // the file and its journal are this writer's
+    bool resumed = false;
+    bool began = false;              // the file is this writer's
+    bool unwritten = false;          // it lacks something
+    bool has_other_segments = true;  // maybe: of another run, or of frames that are forgotten
     bool finished = false;
 
-    std::size_t image_size = 0;
-    Clock::time_point consolidated_at;
-    Clock::duration cost{};
-
-    void consolidate() {
-        const auto start = Clock::now();
-        write(hdf5_image(contents));
-        cost = consolidated_at - start;
+    void write() {
+        move_frames_to_segment();
+        write_file();
     }
-    void write(const std::vector<std::byte>& image) {
-        durable::replace(file, image);
-        journal.restart(contents.id);
-        image_size = image.size();
-        consolidated_at = Clock::now();
+    void write_file() {
+        file.write([this] { return hdf5_image(contents); });
+        unwritten = false;
+        if (std::exchange(has_other_segments, false)) remove_other_segments();
+        write_view(file.path(), contents);
     }
-
-    // What was journalled is safe; it goes into the file when there is as much of it as the file has already (so that
-    // all consolidations together write only a small multiple of the final size), and for concurrent readers
-    // as often as takes less than 2 % of the time.
-    void consolidate_if_due() {
-        const bool outgrown = journal.size() > image_size + journal_slack;
-        const Clock::duration pause = std::max<Clock::duration>(std::chrono::seconds(2), 50 * cost);
-        if (outgrown || Clock::now() - consolidated_at > pause) consolidate();
+    fs::path segment(std::size_t number) const { return file.path().string() + fmt::format(".frames{}", number); }
+    // Large frames that are written are not written again until the end: they move to a file of their own.
+    void move_frames_to_segment() {
+        const std::size_t first = contents.frames_in_segments();
+        std::size_t bytes = 0;
+        for (std::size_t i = first; i < contents.frames.size(); ++i)
+            for (const Array& array : contents.frames[i].arrays) bytes += array.data.size() * sizeof(double);
+        if (bytes <= most_rewritten) return;
+        std::size_t number = 0;
+        while (fs::exists(segment(number))) ++number;
+        const auto [image, crc] = segment_image(contents, first);
+        durable::replace(segment(number), image);
+        contents.segments.push_back({segment(number).filename().string(), contents.frames.size(), crc});
     }
-
-    // One call: `journalled` writes its record, `add` adds it to the contents. What comes before the first row of a new
-    // result waits for it in memory, and what was there stays: the run may fail at its start.
-    template <class Journalled, class Add>
-    void record(const Journalled& journalled, const Add& add) {
-        refuse_if_finished();
-        if (!rewound.empty()) {
-            write(std::exchange(rewound, {}));
-            begin();
+    void remove_other_segments() {
+        std::vector<fs::path> others;
+        for (const auto& entry : fs::directory_iterator(file.path().parent_path())) {
+            const std::string name = entry.path().filename().string();
+            const auto is_it = [&](const Segment& segment) { return segment.file == name; };
+            if (name.starts_with(file.path().filename().string() + ".frames") &&
+                std::ranges::none_of(contents.segments, is_it))
+                others.push_back(entry.path());
         }
-        const auto sequence = contents.sequence + 1;
-        if (began) journalled(sequence);
-        add();
-        contents.sequence = sequence;
-        if (began) {
-            consolidate_if_due();
-        } else if (has_row) {
-            consolidate();
-            begin();
-        }
+        for (const fs::path& other : others) durable::remove(other);
     }
 
-    void begin() {
-        write_view(file, contents);
-        began = true;
+    // What comes before the first row of a new result waits for it, and what was there stays: the run may fail at its
+    // start.
+    void added(bool is_row, bool at_once) {
+        unwritten = true;
+        const bool begins = !began && !resumed && is_row;
+        began = began || resumed || is_row;
+        if (began && (begins || at_once || file.due())) write();
     }
 
     void refuse_if_finished() const {
         if (finished)
             throw std::logic_error(
-                fmt::format("{}: the result is finished; nothing can be written after finish()", file.string()));
+                fmt::format("{}: the result is finished; nothing can be written after finish()", file.path().string()));
     }
 };
 
@@ -272,8 +253,6 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     refuse_to_replace_others(path);
 
     auto impl = std::make_unique<Impl>(path);
-    std::random_device random;
-    impl->contents.id = (std::uint64_t{random()} << 32) | random();
     impl->contents.about_begun = about.size();
     impl->contents.case_text = c;
     impl->contents.about = about;
@@ -286,8 +265,9 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
     if (now) check_case(*now);
     const auto path = resolved(file);
     require_result(path);  // refuse a file that is not a result before changing anything
+    refuse_old_journal(path);
     auto impl = std::make_unique<Impl>(path);
-    impl->contents = load(path);
+    impl->contents = read_hdf5(path);
     try {
         impl->restart = rewind(impl->contents);
         check(impl->restart);
@@ -295,9 +275,7 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
         throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
     if (now) impl->contents.case_text = *now;
-    const auto start = Clock::now();
-    impl->rewound = hdf5_image(impl->contents);
-    impl->cost = Clock::now() - start;
+    impl->resumed = true;
     return ResultWriter(std::move(impl));
 }
 
@@ -317,42 +295,44 @@ void ResultWriter::row(std::span<const double> values) {
     for (std::size_t j = 0; j < values.size(); ++j)
         if (!std::isfinite(values[j])) check_finite(values[j], "series", contents.series[j]);
 
-    impl_->record([&](auto sequence) { impl_->journal.row(sequence, values); },
-                  [&] {
-                      contents.add_row(values);
-                      impl_->has_row = true;
-                  });
+    impl_->refuse_if_finished();
+    contents.add_row(values);
+    impl_->added(true, false);
 }
 
 std::size_t ResultWriter::mesh(const SurfaceCells& cells) {
     check_mesh(cells);
+    impl_->refuse_if_finished();
     std::vector<SurfaceCells>& meshes = impl_->contents.meshes;
     const auto same = std::find(meshes.begin(), meshes.end(), cells);
     const auto number = static_cast<std::size_t>(same - meshes.begin());
-    if (same == meshes.end())
-        impl_->record([&](auto sequence) { impl_->journal.mesh(sequence, cells); }, [&] { meshes.push_back(cells); });
+    if (same == meshes.end()) {
+        meshes.push_back(cells);
+        impl_->added(false, false);
+    }
     return number;
 }
 
 void ResultWriter::frame(const Record& frame) {
     check_record(frame, impl_->contents.meshes, "frame");
-    impl_->record([&](auto sequence) { impl_->journal.record(Entry::frame, sequence, frame); },
-                  [&] { impl_->contents.frames.push_back(frame); });
+    impl_->refuse_if_finished();
+    impl_->contents.frames.push_back(frame);
+    impl_->added(false, false);
 }
 
 void ResultWriter::checkpoint(const Record& state) {
     check_record(state, impl_->contents.meshes, "checkpoint");
-    impl_->record([&](auto sequence) { impl_->journal.record(Entry::checkpoint, sequence, state); },
-                  [&] { impl_->contents.checkpoint = state; });
+    impl_->refuse_if_finished();
+    impl_->contents.checkpoint = state;
+    impl_->added(false, true);
 }
 
 void ResultWriter::discard() {
-    impl_->rewound.clear();
-    impl_->record([&](auto sequence) { impl_->journal.discard(sequence); },
-                  [&] {
-                      impl_->contents.forget();
-                      impl_->has_row = false;
-                  });
+    impl_->refuse_if_finished();
+    impl_->contents.forget();
+    impl_->has_other_segments = true;
+    impl_->resumed = false;  // it begins again
+    impl_->added(false, false);
 }
 
 void ResultWriter::finish(const About& more) {
@@ -366,9 +346,10 @@ void ResultWriter::finish(const About& more) {
         else
             about.emplace_back(name, value);
     }
-    durable::replace(impl_->file, hdf5_image(impl_->contents));
-    write_view(impl_->file, impl_->contents);  // before the journal is removed: after a kill, repair completes the view
-    impl_->journal.remove();
+    impl_->contents.segments.clear();  // one file again
+    impl_->has_other_segments = true;
+    impl_->write_file();
+    impl_->file.release();
     impl_->finished = true;
 }
 
@@ -380,7 +361,8 @@ bool is_point_data(const Array& array, const SurfaceCells& mesh) {
 }
 
 Result read_result(const fs::path& file) {
-    Contents contents = load(file);
+    warn_of_old_journal(file);
+    Contents contents = read_hdf5(file);
     Result result;
     const std::size_t width = contents.series.size();
     for (std::size_t j = 0; j < width; ++j) {
@@ -399,57 +381,6 @@ Result read_result(const fs::path& file) {
 
 CaseText read_case_text(const fs::path& file) {
     return read_hdf5_case(file);
-}
-
-namespace {
-
-// Of a damaged file. Numbers that are lost are NaN.
-Contents what_is_left(const fs::path& file, const Wholeness& found) {
-    std::ifstream in(file, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
-    const auto bytes = std::as_bytes(std::span(text));
-    if (found.hdf5_size) return read_hdf5(std::vector(bytes.begin(), bytes.begin() + *found.hdf5_size));
-    if (found.index.empty()) throw std::runtime_error("its checksums are lost, too, so nothing of it can be rescued");
-    return contents_by_index(found.index, bytes);
-}
-
-}  // namespace
-
-Verification verify_result(const fs::path& file, const fs::path& rescued) {
-    const auto journal = read_journal(file);
-    const Wholeness found = examine(file);
-    Verification out;
-    out.has_checksums = found.kind != Wholeness::Kind::unsealed;
-    if (!out.has_checksums) {
-        if (!found.hdf5_size) require_result(file);  // which says what is wrong with it
-        return out;
-    }
-    out.damage = found.damage;
-    try {
-        Contents contents = found.kind == Wholeness::Kind::whole ? read_hdf5(file) : what_is_left(file, found);
-        warn_of_rest(replay(journal, contents), file);
-        out.lost = drop_what_is_lost(contents);
-        out.rows = contents.rows.size() / contents.series.size(), out.frames = contents.frames.size();
-        if (rescued.empty()) return out;
-        if (fs::exists(fs::symlink_status(rescued)))
-            throw std::runtime_error(fmt::format("{} exists already", rescued.string()));
-        if (!out.lost.empty()) contents.about.emplace_back("lost", fmt::format("{}", fmt::join(out.lost, "\n")));
-        durable::replace(rescued, hdf5_image(contents));
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
-    }
-    return out;
-}
-
-void repair_result(const fs::path& file) {
-    const auto path = resolved(file);
-    require_result(path);
-    if (!fs::exists(journal_path(path))) return;
-    Journal journal(path);
-    const Contents contents = load(path);
-    durable::replace(path, hdf5_image(contents));
-    write_view(path, contents);
-    journal.remove();
 }
 
 }  // namespace tubule

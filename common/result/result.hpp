@@ -67,12 +67,11 @@ struct CaseText {
     std::string resolved = {};      // effective_toml(); results of earlier versions have none
 };
 
-// Writes a result such that every row and frame passed to it survives a kill at any later moment:
-// each goes to an append-only journal NAME.hdf.journal first; NAME.hdf itself is only ever replaced
-// as a whole (write aside, rename). Non-finite numbers and impossible names are refused with
-// std::invalid_argument, I/O errors and a second writer of the same file with std::runtime_error naming
-// the file; arguments that are refused leave nothing behind. What was in the file before, and its journal, stay until
-// the first row: a run that fails at its start replaces nothing. A writer destroyed before finish() leaves its journal.
+// Writes a result as a whole (write aside, sync, rename): at the first row, at each checkpoint, and when 2 s or 50
+// times the cost of the last write have passed. So a kill at any moment loses no more than that, and nothing is ever
+// half written. Non-finite numbers and impossible names are refused with std::invalid_argument, I/O errors and a second
+// writer of the same file with std::runtime_error naming the file; arguments that are refused leave nothing behind.
+// What was in the file before stays until the first row: a run that fails at its start replaces nothing.
 class ResultWriter {
 public:
     // A new result. An old one of that name is replaced at the first row; a file that is not a result is kept
@@ -81,7 +80,7 @@ public:
                                const std::vector<std::string>& series);
     // Resumes a result from its newest restart record (checkpoint or last frame, whichever is later);
     // rows and frames later than that are dropped, meshes that only they needed, and what finish() had added to /about.
-    // restart_record() gives it. The file changes with the next record; its case becomes `now`, if that is given.
+    // restart_record() gives it. Its case becomes `now`, if that is given.
     // Throws std::runtime_error if there is none, and whatever `check` throws of it, with the file as it was.
     static ResultWriter resume(
         const std::filesystem::path& file, const std::function<void(const Record&)>& check = [](const Record&) {},
@@ -91,14 +90,14 @@ public:
     ~ResultWriter();
 
     const Record& restart_record() const;      // of a resumed result
-    bool began() const;                        // whether the file has changed
+    bool began() const;                        // whether the file is, or will be, changed
     void row(std::span<const double> values);  // one value a series, in the order given to create
     // Gives the number by which later frames name these cells; that of an equal mesh if there is one.
     std::size_t mesh(const SurfaceCells& cells);
     void frame(const Record& frame);
     void checkpoint(const Record& state);  // replaces the one before
     void discard();                        // forgets all rows, meshes, frames and the checkpoint: the run begins again
-    // Adds to /about, writes NAME.hdf whole, and the folder `view` if frames have meshes; removes the journal.
+    // Adds to /about; writes NAME.hdf, and the folder `view` if frames have meshes.
     void finish(const About& more);
 
 private:
@@ -117,27 +116,13 @@ struct Result {
     std::optional<Record> checkpoint;
 };
 
-// Reads a result; if a journal lies beside it (the run was killed, or is still going on), its complete
-// records are included. Throws std::runtime_error naming the file when it is not a result.
+// Reads a result. Throws std::runtime_error naming the file when it is not a result.
 Result read_result(const std::filesystem::path& file);
 
 // The case alone, without rows and frames: quick for large results, too. Throws as read_result.
 CaseText read_case_text(const std::filesystem::path& file);
 
-// What is good of a result, whatever has happened to the file (not to its journal, which is included as far as it is
-// good). HDF5 sees none of what is damaged.
-struct Verification {
-    bool has_checksums = true;
-    std::string damage;                // in words; empty: all is as it was written
-    std::vector<std::string> lost;     // rows, frames and the checkpoint that are not, a line each
-    std::size_t rows = 0, frames = 0;  // that are
-};
-
-// Writes what is good as a new result `rescued`, if that is given: it must not exist. Throws std::runtime_error where
-// nothing can be said of the file.
-Verification verify_result(const std::filesystem::path& file, const std::filesystem::path& rescued = {});
-
-// Merges a left-over journal into the file, so that it can be read by any HDF5 program, and into the folder `view`.
-void repair_result(const std::filesystem::path& file);
+// Looks for the parts without reading them; throws as read_result.
+void require_result(const std::filesystem::path& file);
 
 }  // namespace tubule

@@ -90,33 +90,35 @@ VtkPoints vtk_points(const SurfaceCells& mesh) {
     return points;
 }
 
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes, std::vector<Extent>& extents) {
+std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes,
+                                    const std::function<bool(std::size_t)>& needed) {
     std::vector<WrittenMesh> written;
     if (meshes.empty()) return written;
     const auto parent = make_group(file, "meshes");
     for (const SurfaceCells& mesh : meshes) {
         const std::string name = fmt::format("{:06}", written.size());
         VtkPoints points = vtk_points(mesh);
+        if (!needed(written.size())) {
+            written.push_back({mesh, std::move(points), ""});
+            continue;
+        }
         const std::size_t cells = cell_count(mesh);
         const auto group = make_group(parent, name);
         put_attribute(group, "order", std::int64_t{mesh.order});
         put_attribute(group, "nodes", static_cast<std::int64_t>(mesh.nodes));
         put_attribute(group, "period", mesh.period);
-        const auto put_and_list = [&](const char* part, const std::vector<std::int64_t>& values) {
-            extents.push_back(extent_of(put_dataset(group, part, values), std::as_bytes(std::span(values))));
-        };
         put_dataset(group, "NumberOfPoints", {static_cast<std::int64_t>(points.node.size())});
         put_dataset(group, "NumberOfCells", {static_cast<std::int64_t>(cells)});
         put_dataset(group, "NumberOfConnectivityIds", {static_cast<std::int64_t>(mesh.cells.size())});
-        put_and_list("Connectivity", points.connectivity);
+        put_dataset(group, "Connectivity", points.connectivity);
         std::vector<std::int64_t> offsets;
         for (std::size_t c = 0; c <= cells; ++c) offsets.push_back(static_cast<std::int64_t>(c * nodes_per_cell(mesh)));
         put_dataset(group, "Offsets", offsets);
         const std::vector<std::uint8_t> types(cells, lagrange_triangle);
         put_dataset(group, "Types", H5T_NATIVE_UINT8, space({cells}), types.data());
         if (mesh.period > 0) {
-            put_and_list("point_node", points.node);
-            put_and_list("point_shift", points.shift);
+            put_dataset(group, "point_node", points.node);
+            put_dataset(group, "point_shift", points.shift);
         }
         written.push_back({mesh, std::move(points), "/meshes/" + name});
     }
@@ -134,27 +136,22 @@ SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     mesh.period = get_attribute<double>(open_attribute(group, "period"), H5T_NATIVE_DOUBLE, "period");
     if (mesh.order < 1 || mesh.order > 4)
         throw std::runtime_error(fmt::format("mesh {}: its order is {}, not 1 to 4", name, mesh.order));
-    std::vector<std::int64_t> node, shift;
-    if (mesh.period > 0) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
-    set_cells(mesh, get_integers(group, "Connectivity"), node, shift, name);
-    return mesh;
-}
-
-void set_cells(SurfaceCells& mesh, const std::vector<std::int64_t>& connectivity, const std::vector<std::int64_t>& node,
-               const std::vector<std::int64_t>& shift, const std::string& where) {
     const bool tube = mesh.period > 0;
+    std::vector<std::int64_t> node, shift;
+    if (tube) node = get_integers(group, "point_node"), shift = get_integers(group, "point_shift");
     const std::size_t points = tube ? std::min(node.size(), shift.size()) : mesh.nodes;
-    for (const std::int64_t point : connectivity) {
+    for (const std::int64_t point : get_integers(group, "Connectivity")) {
         const auto p = static_cast<std::size_t>(point);
         if (p >= points)
             throw std::runtime_error(
-                fmt::format("mesh {}: a cell uses point {}, but there are {}", where, point, points));
+                fmt::format("mesh {}: a cell uses point {}, but there are {}", name, point, points));
         mesh.cells.push_back(static_cast<int>(tube ? node[p] : point));
         if (tube) mesh.shifts.push_back(static_cast<int>(shift[p]));
     }
+    return mesh;
 }
 
-void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std::vector<Extent>& extents) {
+void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
     put_format(group, {1, 0});
     put_attribute(group, "mesh", static_cast<std::int64_t>(*record.mesh));
     std::vector<std::string> names;
@@ -176,8 +173,7 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std
         return put_doubles(data, values.name, values.shape, values.data);
     };
     // The numbers of the nodes come first, whatever points follow.
-    for (const Array& array : record.arrays)
-        extents.push_back(extent_of(put_one(array), std::as_bytes(std::span(array.data))));
+    for (const Array& array : record.arrays) put_one(array);
 }
 
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh) {
@@ -201,6 +197,7 @@ namespace {
 struct Part {
     std::string path;
     std::size_t rows;
+    std::string file = ".";  // this one
 };
 
 // A dataset that shows others, one below the other; width 0 for lists.
@@ -219,7 +216,7 @@ void put_virtual(hid_t parent, const std::string& name, hid_t type, std::size_t 
         const auto source = space(shape(part.rows));
         const bool done =
             H5Sselect_hyperslab(whole, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) >= 0 &&
-            H5Pset_virtual(how, whole, ".", part.path.c_str(), source) >= 0;
+            H5Pset_virtual(how, whole, part.file.c_str(), part.path.c_str(), source) >= 0;
         require(done, "show", part.path);
         begin += part.rows;
     }
@@ -232,9 +229,15 @@ void put_virtual(hid_t parent, const std::string& name, hid_t type, std::size_t 
 struct Step {
     const Record& record;
     const WrittenMesh& written;
-    std::string path;
+    std::string path, file;
     std::size_t points() const { return written.points.node.size(); }
 };
+
+// Where a frame is, for virtual datasets.
+std::string file_of(const std::vector<Segment>& segments, std::size_t frame) {
+    const auto found = std::ranges::find_if(segments, [&](const Segment& segment) { return frame < segment.end; });
+    return found == segments.end() ? "." : found->file;
+}
 
 // Numbers of columns (0: a list) of the point data that all steps have alike: VTK reads no others over time.
 std::map<std::string, std::size_t> common_point_data(const std::vector<Step>& steps) {
@@ -282,20 +285,21 @@ void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMe
     std::vector<Step> steps;
     for (std::size_t i = 0; i < contents.frames.size(); ++i)
         if (const Record& frame = contents.frames[i]; frame.mesh)
-            steps.push_back({frame, meshes[*frame.mesh], fmt::format("/frames/{:06}", i)});
+            steps.push_back(
+                {frame, meshes[*frame.mesh], fmt::format("/frames/{:06}", i), file_of(contents.segments, i)});
     if (steps.empty()) return;
 
     const auto group = make_group(file, "VTKHDF");
     put_format(group, {2, 0});
     put_numbers(group, meshes);
     std::vector<Part> points;
-    for (const Step& step : steps) points.push_back({step.path + "/Points", step.points()});
+    for (const Step& step : steps) points.push_back({step.path + "/Points", step.points(), step.file});
     put_virtual(group, "Points", H5T_NATIVE_DOUBLE, 3, points);
     const auto common = common_point_data(steps);
     const auto data = make_group(group, "PointData");
     for (const auto& [name, width] : common) {
         std::vector<Part> parts;
-        for (const Step& step : steps) parts.push_back({step.path + "/PointData/" + name, step.points()});
+        for (const Step& step : steps) parts.push_back({step.path + "/PointData/" + name, step.points(), step.file});
         put_virtual(data, name, H5T_NATIVE_DOUBLE, width, parts);
     }
 

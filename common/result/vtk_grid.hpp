@@ -6,10 +6,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "common/result/checksums.hpp"
 #include "common/result/contents.hpp"
 
 namespace tubule {
@@ -36,16 +36,14 @@ inline constexpr const char* grid_members[] = {"NumberOfPoints", "NumberOfCells"
                                                "Points",         "PointData",     "CellData",
                                                "FieldData",      "Steps"};
 
-// Makes /meshes, if there are any. `extents`, here and below: those of result_index.hpp are appended.
-std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>& meshes, std::vector<Extent>& extents);
+// Makes /meshes, if there are any, with those that are needed.
+std::vector<WrittenMesh> put_meshes(
+    hid_t file, const std::vector<SurfaceCells>& meshes,
+    const std::function<bool(std::size_t)>& needed = [](std::size_t) { return true; });
 SurfaceCells get_mesh(hid_t meshes, const std::string& name);
-// The cells of a mesh of which the rest is known, from what VTK knows of them (node and shift: of tubes). `where` names
-// the mesh in errors.
-void set_cells(SurfaceCells& mesh, const std::vector<std::int64_t>& connectivity, const std::vector<std::int64_t>& node,
-               const std::vector<std::int64_t>& shift, const std::string& where);
 
 // Makes the group of a frame an unstructured grid. Arrays that are not point data become plain datasets.
-void put_grid(hid_t group, const Record& record, const WrittenMesh& written, std::vector<Extent>& extents);
+void put_grid(hid_t group, const Record& record, const WrittenMesh& written);
 // The arrays of such a frame, as they were written.
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh);
 

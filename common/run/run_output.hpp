@@ -39,7 +39,7 @@ private:
     RunObserver& watch_;
     const RunClock& clock_;
     bool reported_;
-    double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0;
+    double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0, checkpoint_cost_ = 0;
 };
 
 }  // namespace tubule

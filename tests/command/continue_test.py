@@ -13,7 +13,7 @@ import unittest
 import h5py
 import numpy as np
 
-from kill_test import CURVE, SURFACE
+from kill_test import CURVE, OFTEN, SURFACE
 from program import ACCURACY, E_REF, QUICK, SLOW, ProgramTest, about, series
 
 # A tube that comes to rest as a straight one.
@@ -38,7 +38,7 @@ class Continued(ProgramTest):
         """Goes on with the result, or begins it, until it has so many more rows; then a signal."""
         what = ["case.hdf", "--resume"] if self.result.exists() else ["case.toml"]
         before = len(self.shown(self.result)[1]) if self.result.exists() else 0
-        process = self.start("run", *what, "--quiet", *arguments)
+        process = self.start("run", *what, "--quiet", *arguments, **OFTEN)
         self.addCleanup(process.kill)
         while True:  # inspected while it is stopped, or it would be at its end before that
             time.sleep(0.005)
@@ -181,14 +181,6 @@ class Unfinished(Continued):
         self.tubule("run", "case.toml", "--overwrite")
         self.tubule("run", "case.toml")  # finished: the same again
         self.assertEqual(about(self.result)["stop"], "finished")
-
-    def test_the_journal_of_a_run_that_was_killed_at_its_very_end_goes(self):
-        self.tubule("run", "case.toml")
-        journal = self.folder / "case.hdf.journal"
-        with h5py.File(self.result) as file:
-            journal.write_bytes(b"TUBULEJ1" + int(file.attrs["id"]).to_bytes(8, "little"))  # what is left of it then
-        self.assertIn("nothing to resume", self.tubule("run", "case.toml", "--resume")[0])
-        self.assertFalse(journal.exists())
 
 
 class Refused(Continued):

@@ -4,7 +4,6 @@
 damage_test.py TUBULE [FLIPS], so many of each kind. What is damaged is known, so nothing else is expected.
 """
 import random
-import struct
 import sys
 import tempfile
 import unittest
@@ -19,10 +18,6 @@ from sandbox import Sandbox
 PROGRAM = Path(sys.argv[1]).resolve()
 FLIPS = int(sys.argv[2]) if len(sys.argv) > 2 else 8
 HEAD = 4096  # where HDF5 has most of its structures
-
-
-def table(csv):
-    return [line.split(",") for line in csv.splitlines()]
 
 
 class Damage(unittest.TestCase):
@@ -52,45 +47,16 @@ class Damage(unittest.TestCase):
                     self.assertEqual(done.out, "")
                     self.assertEqual(result.read_bytes(), bytes(spoilt))
 
-    def test_what_is_good_is_rescued(self):
+    def test_verify_says_good_or_damaged(self):
         for sample in samples(PROGRAM):
             with self.subTest(kind=sample.kind):
                 box = self.box(sample)
-                done = box.run("show", "case.hdf", "--verify")
-                self.assertIn("as it was written", done.out)
-                expected = box.run("show", "case.hdf", "--csv").out
+                self.assertEqual(box.run("show", "case.hdf", "--verify").out, "case.hdf: as it was written\n")
                 spoilt = bytearray(sample.result)
-                spoilt[0:2048] = bytes(2048)  # what HDF5 needs first
+                spoilt[len(spoilt) // 2] ^= 1
                 box.write("case.hdf", bytes(spoilt))
-                if sample.kind == "scan":
-                    self.assertIn("nothing of it can be rescued", box.run("show", "case.hdf", "--verify", statuses=(2,)).err)
-                    continue
-                (box.folder / "round.hdf").symlink_to("round.hdf")
-                self.assertIn("round.hdf exists already", box.run("show", "case.hdf", "--rescue", "round.hdf", statuses=(2,)).err)
-                done = box.run("show", "case.hdf", "--rescue", "good.hdf", statuses=(1,))
-                self.assertIn("it is damaged", done.out)
-                rows, all_rows = table(box.run("show", "good.hdf", "--csv").out), table(expected)
-                self.assertLessEqual(set(rows[0]), set(all_rows[0]))
-                kept = [all_rows[0].index(name) for name in rows[0]]
-                all_rows = [[row[j] for j in kept] for row in all_rows]
-                self.assertTrue(all(row in all_rows for row in rows))
-                self.assertEqual(len(rows) - 1, int(done.out.split("good")[1].split()[0]))
-                if "rows" not in done.out.split("good")[0]:
-                    self.assertEqual(rows, all_rows)
-
-    def test_a_lost_series_costs_no_rows(self):
-        sample = next(s for s in samples(PROGRAM) if s.kind != "scan")
-        box = self.box(sample)
-        head, *rows = table(box.run("show", "case.hdf", "--csv").out)
-        energies = struct.pack(f"<{len(rows)}d", *(float(row[head.index("energy")]) for row in rows))
-        spoilt = bytearray(sample.result)
-        spoilt[sample.result.index(energies) + len(energies) // 2] ^= 1
-        box.write("case.hdf", bytes(spoilt))
-        done = box.run("show", "case.hdf", "--rescue", "good.hdf", statuses=(1,))
-        self.assertIn(f"series energy: {len(rows)} of {len(rows)} rows", done.out)
-        good_head, *good = table(box.run("show", "good.hdf", "--csv").out)
-        self.assertNotIn("energy", good_head)
-        self.assertEqual(good, [[row[head.index(name)] for name in good_head] for row in rows])
+                done = box.run("show", "case.hdf", "--verify", statuses=(1,))
+                self.assertEqual(done.out, "case.hdf: it is damaged: its checksum is wrong\n")
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ class FailedStart(ProgramTest):
                 self.result.unlink(missing_ok=True)
                 self.write("case.toml", text)
                 self.failing(command, self.case, "--set", key)
-                self.assertNotIn("case.hdf.journal", self.files())
+                self.assertNotIn("case.hdf.lock", self.files())
                 self.assertEqual(about(self.result)["stop"], "solver-failed")
                 self.assertIn(key.replace("=", " = "), about(self.result)["stop_message"])
                 # The start itself may have an energy, 1e300 or so, and then a row.
@@ -68,14 +68,6 @@ class FailedStart(ProgramTest):
                 self.failing(command, self.case, "--set", key, "--set", "energy.k40=1e+300")
                 self.assertIn("energy.k40 = 1e+300", about(self.result)["stop_message"])
                 self.result.unlink()
-
-    def test_the_journal_of_a_killed_run_stays(self):
-        self.tubule("run", self.case)
-        self.write("case.hdf.journal", "TUBULEJ1 and the rows of a run that was killed")
-        before = self.result.read_bytes()
-        self.failing("run", self.case, "--overwrite", "--set", EXTREME[0])
-        self.assertEqual(self.result.read_bytes(), before)
-        self.assertIn("rows of a run", (self.folder / "case.hdf.journal").read_text())
 
     def test_points_of_a_scan_say_so(self):
         self.tubule("scan", self.case, "--over", "shape.radius=1,1e200", "-o", "scan.hdf", "--quiet")

@@ -3,6 +3,7 @@
 
 grow_test.py TUBULE [MPIRUN]. Expected is a scan made at once: its points, bit for bit, but for the times they took.
 """
+import os
 import signal
 import subprocess
 import sys
@@ -33,6 +34,8 @@ def contents(result):
             if name in file:
                 found[name] = file[name][()]
     return found
+
+os.environ["TUBULE_WRITE_SECONDS"] = "0.1"  # points are to be seen before a kill
 
 
 class GrowTest(ProgramTest):

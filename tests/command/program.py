@@ -152,6 +152,6 @@ class ProgramTest(unittest.TestCase):
         return err
 
     def shown(self, result):
-        """The series as `tubule show --csv` gives them, journal included: header, rows of strings."""
+        """The series as `tubule show --csv` gives them: header, rows of strings."""
         rows = list(csv.reader(io.StringIO(self.tubule("show", result, "--csv")[0])))
         return rows[0], rows[1:]

@@ -3,6 +3,7 @@
 
 scan_equilibria_test.py TUBULE CASES [MPIRUN]
 """
+import os
 import csv
 import io
 import json
@@ -49,6 +50,8 @@ def crossings(result):
         names = list(group["kinds"].attrs["names"])
         return [((names[a], names[b]), value, bool(lowest))
                 for (a, b), value, lowest in zip(group["kinds"], group["value"], group["lowest"])]  # fmt: skip
+
+os.environ["TUBULE_WRITE_SECONDS"] = "0.1"  # points are to be seen before a kill
 
 
 class EquilibriaTest(ProgramTest):

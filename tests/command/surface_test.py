@@ -149,7 +149,7 @@ class Surface(unittest.TestCase):
     def test_resumed_from_the_beginning(self):
         """What an interrupted run has written is replaced, not continued: there is one row, one frame."""
         with subprocess.Popen([PROGRAM, "run", "--quiet", CASES / "surface_slow.toml"], cwd=self.directory) as process:
-            while not (self.directory / "surface_slow.hdf.journal").exists():  # from then on, signals are caught
+            while not (self.directory / "surface_slow.hdf.lock").exists():  # from then on, signals are caught
                 time.sleep(0.01)
             process.send_signal(signal.SIGINT)
         self.assertEqual(process.returncode, 130)

@@ -1,7 +1,7 @@
 """Runs that are disturbed: killed, interrupted (twice), out of disk space, without streams; then resumed until they end.
 
 After each disturbance the result opens, has every row up to the frame that resuming begins from, and nothing else is left
-behind but its journal; at last the run ends as the undisturbed one does."""
+behind but its lock; at last the run ends as the undisturbed one does."""
 
 import csv
 import io
@@ -17,10 +17,11 @@ from sandbox import Finding
 FAST = 2
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGKILL, signal.SIGKILL, signal.SIGHUP)
 END = None
+os.environ["TUBULE_WRITE_SECONDS"] = "0.1"  # so that there is something to lose
 
 
 def rows(box):
-    """The rows as `show` prints them, journal included; none before there is a result."""
+    """The rows as `show` prints them, none before there is a result."""
     if not (box.folder / "case.hdf").exists():
         return []
     shown = box.run("show", "case.hdf", "--csv", statuses=(0,))

@@ -211,10 +211,7 @@ const std::vector<Target>& targets() {
                                          {"mesh", mesh_file, mesh_seeds},
                                          {"profile", profile_text, profile_seeds},
                                          {"formula", formula_text, formula_seeds},
-                                         {"journal", journal_records, journal_seeds},
-                                         {"journal_bytes", journal_bytes, journal_byte_seeds},
-                                         {"result", result_parts, result_seeds},
-                                         {"result_index", result_index, index_seeds}};
+                                         {"result", result_parts, result_seeds}};
     return all;
 }
 

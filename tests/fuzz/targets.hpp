@@ -22,14 +22,8 @@ struct Target {
 const std::vector<Target>& targets();
 
 // Those of result_targets.cpp.
-void journal_records(Input input);
-void journal_bytes(Input input);
 void result_parts(Input input);
-void result_index(Input input);
-std::vector<std::string> journal_seeds();
-std::vector<std::string> journal_byte_seeds();
 std::vector<std::string> result_seeds();
-std::vector<std::string> index_seeds();
 
 // A file with these bytes, for readers that want one; the same path for every input.
 std::filesystem::path file_of(Input input, const std::string& ending);

@@ -13,9 +13,11 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "common/result/journal.hpp"
+#include "common/result/contents.hpp"
+#include "common/result/file_writer.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
@@ -89,8 +91,12 @@ protected:
         ASSERT_NE(mkdtemp(pattern.data()), nullptr);
         directory = pattern;
         file = directory / "run.hdf";
+        FileWriter::seconds_between_writes = 0;
     }
-    void TearDown() override { fs::remove_all(directory); }
+    void TearDown() override {
+        FileWriter::seconds_between_writes.reset();
+        fs::remove_all(directory);
+    }
 
     ResultWriter create() const { return ResultWriter::create(file, {"x = 1\n", {}}, {}, series); }
     // Runs Debian's Python with h5py and gives back what it prints.
@@ -119,11 +125,9 @@ TEST_F(ResultFile, RoundTrip) {
     writer.frame(record_at(6));
     writer.checkpoint(record_at(3));
     writer.checkpoint(record_at(4));
-    // The same through the journal, and from the file alone.
     for (const bool finished : {false, true}) {
         SCOPED_TRACE(finished);
         if (finished) writer.finish({{"E_ref", 0.2}, {"stop", "finished"}});
-        EXPECT_EQ(fs::exists(journal_path(file)), !finished);
         const Result result = read_result(file);
         EXPECT_EQ(result.case_text.text, c.text);
         EXPECT_EQ(result.case_text.sets, c.sets);
@@ -198,7 +202,7 @@ TEST_F(ResultFile, CreateReplacesAnOldResult) {
         auto old = create();
         old.row(row_at(0));
         old.frame(record_at(0));
-    }  // not finished: its journal lies there
+    }  // not finished
     auto writer = ResultWriter::create(file, {"y = 2\n", {}}, {}, {"time"});
     EXPECT_EQ(read_result(file).case_text.text, "x = 1\n");
     writer.row(std::vector<double>{7});
@@ -425,14 +429,12 @@ TEST_F(ResultFile, TheViewFollowsTheFrames) {
                      "    print(f['VTKHDF'].attrs['time'] == entry['time'], f['VTKHDF/Points'].shape)\n"),
               "True (9, 3)\nTrue (9, 3)\nTrue (9, 3)\n");
 
-    // A run that goes on and is killed: repairing makes the view whole.
     {
         auto again = ResultWriter::resume(file);
         EXPECT_EQ(view().size(), 4u);
         again.checkpoint(surface_record_at(3, 0));
         again.frame(surface_record_at(4, 0));
     }
-    repair_result(file);
     EXPECT_EQ(view().size(), 5u);
 
     // A new result takes its place; other files in the folder stay.
@@ -441,6 +443,78 @@ TEST_F(ResultFile, TheViewFollowsTheFrames) {
     EXPECT_EQ(view().size(), 6u);
     other.row(row_at(0));
     EXPECT_EQ(view(), std::vector<std::string>{"run_notes.hdf"});
+}
+
+// ---- large results
+
+// Its frames move to files of their own, and back into one at the end; h5py and the view see no difference. Long: one
+// result through all its life.
+TEST_F(ResultFile, FramesOfALargeResultAreWrittenOnce) {
+    const std::size_t usual = std::exchange(most_rewritten, 1000);
+    const auto frames = [&] {
+        std::vector<Record> expected = {record_at(0)};
+        for (const double time : {0.1, 2.0, 3.0, 4.0}) expected.push_back(surface_record_at(time, time > 1));
+        return expected;
+    }();
+    const auto segments = [&] {
+        std::vector<fs::path> found;
+        for (const auto& entry : fs::directory_iterator(directory))
+            if (entry.path().string().find(".hdf.frames") != std::string::npos) found.push_back(entry.path());
+        std::sort(found.begin(), found.end());
+        return found;
+    };
+    const auto expect_frames = [&](std::size_t count) {
+        const Result result = read_result(file);
+        ASSERT_EQ(result.frames.size(), count);
+        for (std::size_t i = 0; i < count; ++i) expect_same(result.frames[i], frames[i]);
+        EXPECT_EQ(result.meshes, (std::vector<SurfaceCells>{two_cells(), two_shifted_cells()}));
+        EXPECT_EQ(
+            python("f = h5py.File(name)\nprint(f['VTKHDF/Points'].shape[0], f['VTKHDF/PointData/H'][9:].tolist() == "
+                   "f['frames/000002/PointData/H'][:].tolist() + f['frames/000003/PointData/H'][:].tolist() + "
+                   "(f['frames/000004/PointData/H'][:].tolist() if len(f['frames']) > 4 else []))"),
+            count > 4 ? "51 True\n" : "37 True\n");
+        EXPECT_EQ(python("import os\nf = h5py.File(os.path.dirname(name) + '/view/run_000002.hdf')\n"
+                         "print(f['VTKHDF'].attrs['time'])"),
+                  "2.0\n");
+    };
+    {
+        auto writer = create();
+        writer.row(row_at(0));
+        writer.mesh(two_cells());
+        writer.mesh(two_shifted_cells());
+        for (int i = 0; i < 4; ++i) writer.frame(frames[i]);
+        EXPECT_EQ(segments().size(), 3u);
+        const auto before = fs::last_write_time(segments()[0]);
+        writer.row(row_at(1));
+        EXPECT_EQ(fs::last_write_time(segments()[0]), before);
+        expect_frames(4);
+    }
+    {  // killed, as it were
+        const fs::path segment = segments()[0], aside = directory / "aside";
+        fs::rename(segment, aside);
+        EXPECT_CONTAINS(message_of([&] { read_result(file); }),
+                        segment.string() + ", which has some of its frames, is missing");
+        fs::copy_file(segments()[0], segment);
+        EXPECT_CONTAINS(message_of([&] { read_result(file); }),
+                        segment.string() + ", which has some of its frames, belongs to another");
+        std::ofstream(segment, std::ios::app) << "x";
+        EXPECT_CONTAINS(message_of([&] { ResultWriter::resume(file); }), "cannot be read: its checksums are damaged");
+        fs::rename(aside, segment);
+        auto writer = ResultWriter::resume(file);
+        writer.frame(frames[4]);
+        expect_frames(5);
+        writer.finish({});
+    }
+    EXPECT_TRUE(segments().empty());
+    expect_frames(5);
+    auto other = create();
+    other.frame(frames[0]);
+    most_rewritten = 0;
+    other.row(row_at(0));
+    EXPECT_EQ(segments().size(), 1u);
+    other.discard();
+    EXPECT_TRUE(segments().empty());
+    most_rewritten = usual;
 }
 
 // ---- resuming
@@ -565,8 +639,8 @@ TEST_F(ResultFile, AMissingDirectoryIsReportedAtOnce) {
 
 TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
     const auto expect_refused = [&](const std::string& why) {
-        const auto messages = {message_of([&] { read_result(file); }), message_of([&] { repair_result(file); }),
-                               message_of([&] { ResultWriter::resume(file); }), message_of([&] { create(); })};
+        const auto messages = {message_of([&] { read_result(file); }), message_of([&] { ResultWriter::resume(file); }),
+                               message_of([&] { create(); })};
         for (const std::string& message : messages) {
             EXPECT_CONTAINS(message, file.string());
             EXPECT_CONTAINS(message, why);
@@ -580,7 +654,7 @@ TEST_F(ResultFile, OtherFilesAreNeitherReadNorReplaced) {
     python("h5py.File(name, 'w').create_group('series')");
     expect_refused("not a Tubule result: /case is missing");
     python("f = h5py.File(name, 'w')\nfor part in 'about series frames'.split(): f.create_group(part)\nf['case'] = ''");
-    expect_refused("not a Tubule result: the attribute id is missing");
+    expect_refused("not a Tubule result: the attribute about_begun is missing");
 
     fs::remove(file);
     fs::create_directory(file);
@@ -641,7 +715,6 @@ TEST_F(ResultFile, H5pyReadsItDuringTheRunAndAfter) {
     auto writer =
         ResultWriter::create(file, c, {{"version", "0.1.0"}, {"threads", std::int64_t{2}}, {"E_ref", 0.1}}, series);
     writer.row(row_at(0));
-    // The journal is not for h5py; the file is, whole, at any time.
     EXPECT_EQ(python("f = h5py.File(name)\nprint(f['case'].asstr()[()] == '# \\u00b5\\n', f['series/time'].shape)"),
               "True (1,)\n");
     writer.row(row_at(1));

@@ -115,7 +115,7 @@ void refuse_blank_outputs(CLI::App& app) {
     };
     for (CLI::App* command : app.get_subcommands({}))
         for (CLI::Option* option : command->get_options())
-            if (option->check_lname("output") || option->check_lname("rescue"))
+            if (option->check_lname("output"))
                 option->check(
                     CLI::Validator([blank](const std::string& name) { return std::string(blank(name)); }, ""));
 }

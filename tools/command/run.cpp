@@ -46,9 +46,6 @@ std::filesystem::path result_path(const RunOptions& options, const std::filesyst
 }
 
 void check_output(const std::filesystem::path& file) {
-    if (file.extension() == ".journal")
-        throw CaseError(fmt::format("{}: is the name of the journal of {}: choose another one with -o", file.string(),
-                                    std::filesystem::path(file).replace_extension().string()));
     for (const char* other :
          {".toml", ".csv", ".json", ".txt", ".png", ".svg", ".pdf", ".gif", ".html", ".vtu", ".vtk",
           ".vtp",  ".pvd", ".xdmf", ".mat", ".npz", ".npy", ".dat", ".obj", ".stl",  ".ply", ".off"})
@@ -247,10 +244,7 @@ Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesys
 std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
     const Case& c = chosen.c;
     Result old = read_result(file);
-    if (!goes_on(c, old, file)) {
-        repair_result(file);  // a kill may have left its journal
-        return std::nullopt;
-    }
+    if (!goes_on(c, old, file)) return std::nullopt;
     if (c.equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
@@ -279,7 +273,7 @@ struct Ended {
 };
 
 // A run that cannot go on is at its end, too: rows and frames until then are kept. Passes on bad input that is found
-// before there is a row, and errors of the disk: the journal has what was written until then.
+// before there is a row, and errors of the disk: the file has what was written until then.
 Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Recorder& recorder) {
     const auto failed = [&](const std::exception& error) {
         Ended ended{{}, true};

@@ -1,5 +1,4 @@
-// tubule show FILE: a result in words, as CSV or as JSON. Reads the journal of an unfinished run too, and writes
-// nothing.
+// tubule show FILE: a result in words, as CSV or as JSON.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -35,7 +34,7 @@ namespace {
 
 struct ShowOptions {
     std::string file;
-    std::string output, rescue;
+    std::string output;
     bool overwrite = false;
     bool csv = false, json = false, verify = false;
     std::optional<long> frame;
@@ -264,21 +263,19 @@ Text shown(const ShowOptions& options) {
     return out;
 }
 
-// Whether all is as it was written: exit status 0, or 1 if anything is lost or cannot be known.
+// Whether all is as it was written: exit status 0, or 1 if it is not, or cannot be known.
 int verify(const ShowOptions& options) {
-    const bool is_whole_scan =
-        is_scan(options.file) && examine(options.file).kind == Wholeness::Kind::whole && options.rescue.empty();
-    const Verification found = is_whole_scan ? Verification{} : verify_result(options.file, options.rescue);
-    std::string out = options.file + ": ";
-    if (!found.has_checksums)
-        add(out, "has no checksums, so whether it is as it was written cannot be told\n");
-    else
-        add(out, "{}\n", found.damage.empty() ? "as it was written" : found.damage);
-    for (const std::string& what : found.lost) add(out, "lost       {}\n", what);
-    if (found.has_checksums && !is_whole_scan) add(out, "good       {} rows, {} frames\n", found.rows, found.frames);
-    if (found.has_checksums && !options.rescue.empty()) add(out, "written    {}\n", options.rescue);
-    print_answer(out);
-    return found.has_checksums && found.damage.empty() ? 0 : 1;
+    const Wholeness found = examine(options.file);
+    if (found.kind == Wholeness::Kind::foreign) throw std::runtime_error(options.file + ": not a Tubule result");
+    const bool whole = found.kind == Wholeness::Kind::whole;
+    if (whole && !is_scan(options.file))
+        require_result(options.file);  // throws if other files with its frames are damaged
+    const std::string words = whole ? "as it was written"
+                              : found.kind == Wholeness::Kind::damaged
+                                  ? found.damage
+                                  : "has no checksums, so whether it is as it was written cannot be told";
+    print_answer(fmt::format("{}: {}\n", options.file, words));
+    return whole ? 0 : 1;
 }
 
 // Whether a file begins as what is to replace it: with the same columns, or as JSON of ours.
@@ -304,7 +301,7 @@ void write_file(const std::string& path, std::string_view text, bool overwrite) 
 
 int show(const ShowOptions& options) {
     try {
-        if (options.verify || !options.rescue.empty()) return verify(options);
+        if (options.verify) return verify(options);
         const Text out = shown(options);
         if (options.output.empty())
             print_answer({out.data(), out.size()});
@@ -335,15 +332,13 @@ void add_show(CLI::App& app, int& exit_status) {
                         "too (-1: the last)");
     command
         ->add_flag("--verify", options->verify,
-                   "only look whether the file is as it was written, and which rows and frames are good: exit status 1 "
-                   "if it is damaged")
+                   "only look whether the file is as it was written: exit status 1 if it is damaged")
         ->excludes(csv);
     command->add_option("-o,--output", options->output, "write it to this file instead of stdout");
     command->add_flag("--overwrite", options->overwrite, "replace that file even if it is no such table");
-    command->add_option("--rescue", options->rescue, "write what is good of a damaged result to this new file");
     end_help(*command,
              {"tubule show figure.hdf", "tubule show figure.hdf --csv --frame -1", "tubule show figure.hdf --verify"},
-             {{0}, {1, "--verify, --rescue: the file is damaged, or has no checksums"}, {2}}, {"results"});
+             {{0}, {1, "--verify: the file is damaged, or has no checksums"}, {2}}, {"results"});
     command->callback([options, &exit_status] { exit_status = show(*options); });
 }
 

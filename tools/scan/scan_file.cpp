@@ -5,18 +5,14 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <random>
-#include <span>
 #include <tuple>
 
 #include "common/case/read.hpp"
-#include "common/result/durable_io.hpp"
+#include "common/result/checksums.hpp"
+#include "common/result/file_writer.hpp"
 #include "common/result/hdf5_objects.hpp"
-#include "common/result/journal.hpp"
 #include "tools/scan/extension.hpp"
 #include "tools/scan/theory.hpp"
 
@@ -27,54 +23,11 @@ using namespace h5;
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
-// A scan and where in the stream of its journal it stands.
 struct Stored {
-    std::uint64_t id = 0, sequence = 0;
     ScanResult result;
     std::vector<ThresholdMap> thresholds;  // told at the end
 };
-
-// ---- a point as a record of the journal
-
-template <class T>
-void put(std::vector<std::byte>& out, const T& value) {
-    const auto bytes = std::as_bytes(std::span(&value, 1));
-    out.insert(out.end(), bytes.begin(), bytes.end());
-}
-
-std::vector<std::byte> to_bytes(const PointResult& p) {
-    std::vector<std::byte> out;
-    put(out, std::uint64_t{p.point});
-    put(out, static_cast<std::int32_t>(p.outcome));
-    put(out, static_cast<std::int32_t>(p.stop));
-    put(out, p.value);
-    put(out, p.measures);
-    const auto text = std::as_bytes(std::span(p.message));
-    out.insert(out.end(), text.begin(), text.end());
-    return out;
-}
-
-template <class T>
-T take(std::span<const std::byte>& in) {
-    if (in.size() < sizeof(T)) throw std::runtime_error("a journal record is shorter than a point");
-    T value;
-    std::memcpy(&value, in.data(), sizeof(T));
-    in = in.subspan(sizeof(T));
-    return value;
-}
-
-PointResult from_bytes(std::span<const std::byte> in) {
-    PointResult p;
-    p.point = take<std::uint64_t>(in);
-    p.outcome = static_cast<Outcome>(take<std::int32_t>(in));
-    p.stop = take<std::int32_t>(in);
-    p.value = take<double>(in);
-    p.measures = take<decltype(p.measures)>(in);
-    p.message.assign(reinterpret_cast<const char*>(in.data()), in.size());
-    return p;
-}
 
 // ---- writing HDF5
 
@@ -239,8 +192,6 @@ std::vector<std::byte> image_of(const Stored& stored) {
     const Quiet quiet;
     const ScanResult& result = stored.result;
     const auto file = make_image(std::max<std::size_t>(result.points.size() * 256, 1 << 16));
-    put_attribute(file, "id", stored.id);
-    put_attribute(file, "sequence", stored.sequence);
     const Scan& scan = result.scan;
     const auto what = make_group(file, "scan");
     put_text(what, "text", scan.text);
@@ -275,8 +226,7 @@ std::vector<std::byte> image_of(const Stored& stored) {
     const auto lines = make_group(file, "thresholds");
     for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
     auto bytes = bytes_of(file);
-    const std::string kind = "scan 1";  // its points are not rescued one by one: a scan is damaged or whole
-    seal(bytes, std::as_bytes(std::span(kind)));
+    seal(bytes);
     return bytes;
 }
 
@@ -375,8 +325,6 @@ Stored read_file(const fs::path& path) {
     const auto file = open_file(path);
     if (!has(file, "scan") || !has(file, "points")) throw std::runtime_error("not a scan of tubule: it has no /scan");
     Stored stored;
-    stored.id = get_count(file, "id");
-    stored.sequence = get_count(file, "sequence");
     stored.result.scan = get_scan(file);
     const auto about = open_group(file, "about");
     for (const std::string& key : attribute_names(about))
@@ -396,23 +344,9 @@ void keep(ScanResult& result, const PointResult& p) {
         result.crossings[p.point] = p;
 }
 
-// The file with its journal.
 Stored load(const fs::path& path) {
     try {
-        const auto journal = read_journal(path);  // before the file: see replay
-        Stored stored = read_file(path);
-        const auto rest =
-            replay(journal, stored.id, stored.sequence, [&](Entry kind, std::span<const std::byte> payload) {
-                if (kind == Entry::point_of_version_0)
-                    throw std::runtime_error(fmt::format(
-                        "the points in its journal were written by an earlier version. Finish the scan "
-                        "with that version, or give up these points: delete {}, then continue with --resume",
-                        journal_path(path).filename().string()));
-                if (kind != Entry::point) throw std::runtime_error("its journal belongs to a run, not to a scan");
-                keep(stored.result, from_bytes(payload));
-            });
-        warn_of_rest(rest, path);
-        return stored;
+        return read_file(path);
     } catch (const std::exception& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
     }
@@ -473,23 +407,25 @@ ScanPlan plan_of(const ScanResult& result) {
 }
 
 struct ScanWriter::Impl {
-    explicit Impl(const fs::path& f) : file(f), journal(f) {}
+    explicit Impl(const fs::path& path) : file(path) {}
+    // A scan that ended by an exception; if the disk is the reason, nothing more can be done.
+    ~Impl() {
+        try {
+            if (unwritten) write();
+        } catch (const std::exception&) {
+        }
+    }
 
-    fs::path file;
-    Journal journal;
+    FileWriter file;
     Stored stored;
     bool complete = false;
-    bool began = false;  // the file and its journal are this writer's
-    Clock::time_point written_at;
-    Clock::duration cost{};
+    bool began = false;      // the file is this writer's
+    bool unwritten = false;  // it lacks a point
 
     void write() {
-        const auto start = Clock::now();
-        durable::replace(file, image_of(stored));
-        journal.restart(stored.id);
-        written_at = Clock::now();
-        cost = written_at - start;
+        file.write([this] { return image_of(stored); });
         began = true;
+        unwritten = false;
     }
 };
 
@@ -505,13 +441,11 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
                         "another file with -o",
                         path.string()));
     auto impl = std::make_unique<Impl>(path);
-    std::random_device random;
-    Stored& c = impl->stored;
-    c.id = (std::uint64_t{random()} << 32) | random();
-    c.result.scan = scan;
-    c.result.about = about;
-    c.result.points.resize(scan.size());
-    for (std::size_t i = 0; i < c.result.points.size(); ++i) c.result.points[i] = unknown_point(i);
+    ScanResult& result = impl->stored.result;
+    result.scan = scan;
+    result.about = about;
+    result.points.resize(scan.size());
+    for (std::size_t i = 0; i < result.points.size(); ++i) result.points[i] = unknown_point(i);
     return ScanWriter(std::move(impl));
 }
 
@@ -523,7 +457,7 @@ ScanWriter ScanWriter::extend(const fs::path& file, const ScanResult& known, con
 
 ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     const auto path = fs::weakly_canonical(file);
-    load(path);  // refuses a file that is not a scan before anything is changed
+    refuse_old_journal(path);
     auto impl = std::make_unique<Impl>(path);
     impl->stored = load(path);
     add_inputs(impl->stored.result.scan);
@@ -532,9 +466,7 @@ ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
                                     file.string(), scan.path));
     for (const auto& [key, value] : impl->stored.result.about)
         if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
-    if (impl->complete)
-        impl->journal.remove();
-    else
+    if (!impl->complete)
         std::erase_if(impl->stored.result.about, [](const auto& entry) { return entry.first == "stop"; });
     return ScanWriter(std::move(impl));
 }
@@ -552,14 +484,9 @@ bool ScanWriter::began() const {
 }
 
 void ScanWriter::point(const PointResult& p) {
-    Stored& c = impl_->stored;
-    if (impl_->began) impl_->journal.bytes(Entry::point, c.sequence + 1, to_bytes(p));
-    ++c.sequence;
-    keep(c.result, p);
-    // For concurrent readers, as often as takes less than 2 % of the time.
-    if (!impl_->began ||
-        Clock::now() - impl_->written_at > std::max<Clock::duration>(std::chrono::seconds(2), 50 * impl_->cost))
-        impl_->write();
+    keep(impl_->stored.result, p);
+    impl_->unwritten = true;
+    if (!impl_->began || impl_->file.due()) impl_->write();
 }
 
 void ScanWriter::finish(const About& more) {
@@ -573,8 +500,8 @@ void ScanWriter::finish(const About& more) {
     }
     drop_unwanted(impl_->stored.result);
     impl_->stored.thresholds = threshold_maps(impl_->stored.result.scan);
-    durable::replace(impl_->file, image_of(impl_->stored));
-    impl_->journal.remove();
+    impl_->write();
+    impl_->file.release();
 }
 
 bool is_scan(const fs::path& file) {
@@ -588,16 +515,8 @@ bool is_scan(const fs::path& file) {
 }
 
 ScanResult read_scan_result(const fs::path& file) {
+    warn_of_old_journal(file);
     return load(file).result;
-}
-
-void repair_scan(const fs::path& file) {
-    const auto path = fs::weakly_canonical(file);
-    if (!fs::exists(journal_path(path))) return;
-    load(path);
-    Journal journal(path);
-    durable::replace(path, image_of(load(path)));
-    journal.remove();
 }
 
 }  // namespace tubule

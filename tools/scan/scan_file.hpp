@@ -1,5 +1,5 @@
-// The result of a scan, NAME.hdf, crash-safe: a point that was handed over survives a kill at any later
-// moment, in NAME.hdf.journal until the file is written again as a whole. Layout: docs/scans.md.
+// The result of a scan, NAME.hdf: written as a whole (write aside, sync, rename) when 2 s or 50 times the cost of the
+// last write have passed, so a kill loses no more points than that. Layout: docs/scans.md.
 #pragma once
 
 #include <filesystem>
@@ -45,7 +45,7 @@ public:
     bool complete() const;  // of a resumed scan: nothing is left to do
     bool began() const;     // there was a point, and the file is this writer's
     void point(const PointResult& p);
-    // Writes the file whole and removes the journal. What `more` says replaces what /about said by the same names.
+    // Writes the file. What `more` says replaces what /about said by the same names.
     void finish(const About& more);
 
 private:
@@ -62,10 +62,7 @@ bool same_scan(const Scan& a, const Scan& b);
 // Another scan may be needed: throws CaseError if the file has one that is not the same.
 void refuse_to_replace_another_scan(const Scan& scan, const std::filesystem::path& file);
 
-// Its journal included. Throws std::runtime_error naming the file.
+// Throws std::runtime_error naming the file.
 ScanResult read_scan_result(const std::filesystem::path& file);
-
-// Merges a left-over journal into the file, so that any HDF5 program sees all points.
-void repair_scan(const std::filesystem::path& file);
 
 }  // namespace tubule

@@ -143,9 +143,9 @@ class Program:
         return run
 
     def read(self, going, run):
-        """Content of the result, journal included; empty if there is none."""
+        """Content of the result; empty if there is none."""
         shown = self.printed("show", going.result, "--json")
-        if shown.returncode != 0:
+        if not going.result.exists() or shown.returncode != 0:
             return
         result = json.loads(shown.stdout)
         about, series = result["about"], result["series"]
