@@ -152,7 +152,7 @@ class Runs(Compare):
         self.tubule("scan", self.case, "--over", "energy.k42=0.1,0.2", "--quiet", "-o", "scan.hdf")
         self.assertIn("scan.hdf: is the result of a scan: this needs the result of a run",
                       self.refused("compare", self.fine, "scan.hdf"))  # fmt: skip
-        self.assertIn("required", self.refused("compare", self.fine))
+        self.assertIn("are needed", self.refused("compare", self.fine))
         self.assertIn("did you mean 'energy'; it must be one of", self.refused("compare", self.fine, self.fine, "--tolerance=enregy=1"))
         for bad in ("energy", "energy=", "energy=-1", "energy=much", "energy=nan"):
             self.assertIn("must be NAME=VALUE", self.refused("compare", self.fine, self.fine, f"--tolerance={bad}"))

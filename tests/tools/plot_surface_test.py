@@ -154,7 +154,7 @@ class Surfaces(InFolder):
 
     def test_refusals(self):
         self.refused("no profiles to draw", self.torus, "--kind", "profiles")
-        self.refused("no surfaces to draw", write(self.folder / "a.hdf"), "--kind", "surface")
+        self.refused("no surfaces to draw; those of tier axisym are drawn by --kind profiles", write(self.folder / "a.hdf"), "--kind", "surface")
         self.refused("frame 000000 lacks H, K, normal", self.made / "closed_3.hdf")
 
         def damaged(change, words):

@@ -176,6 +176,8 @@ def toml_of(path):
             raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
         if path.exists() and path.stat().st_size > LARGEST_FILE:
             raise BadInput(f"{path}: is larger than {LARGEST_FILE // 2**20} MB, the most that is read")
+        if path.read_bytes()[:4] == b"\x89HDF":
+            raise BadInput(f"{path}: is a result: a chart runs a case, or what a chart file says")
         return tomllib.loads(path.read_text())
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from error

@@ -25,6 +25,11 @@ NOTHING = {
     "balance": "no dissipation over time",
     "all": "neither frames nor an energy series",
 }
+OTHER_TIER = {
+    "profiles": "; those of tier surface3d are drawn by --kind surface or cuts",
+    "surface": "; those of tier axisym are drawn by --kind profiles",
+    "cuts": "; those of tier axisym are drawn by --kind profiles",
+}
 
 
 class Page:
@@ -94,7 +99,7 @@ def figure_of(results, options):
         labels = [[as_label(label)] for label in options.label]
     panels = Page(results, labels, options).panels()
     if not panels:
-        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind]} to draw")
+        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind]} to draw{OTHER_TIER.get(options.kind, '')}")
 
     bars = 0.62
     title = 0.2 if len(results) == 1 else 0.0
