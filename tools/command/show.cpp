@@ -266,16 +266,18 @@ Text shown(const ShowOptions& options) {
 // Whether all is as it was written: exit status 0, or 1 if it is not, or cannot be known.
 int verify(const ShowOptions& options) {
     const Wholeness found = examine(options.file);
-    if (found.kind == Wholeness::Kind::foreign) throw std::runtime_error(options.file + ": not a Tubule result");
-    const bool whole = found.kind == Wholeness::Kind::whole;
-    if (whole && !is_scan(options.file))
-        require_result(options.file);  // throws if other files with its frames are damaged
-    const std::string words = whole ? "as it was written"
-                              : found.kind == Wholeness::Kind::damaged
-                                  ? found.damage
-                                  : "has no checksums, so whether it is as it was written cannot be told";
-    print_answer(fmt::format("{}: {}\n", options.file, words));
-    return whole ? 0 : 1;
+    if (found.kind == Wholeness::Kind::foreign) read_case_text(options.file);  // which says what is wrong with it
+    std::string words = found.damage;
+    if (found.kind == Wholeness::Kind::unsealed)
+        words = "has no checksums, so whether it is as it was written cannot be told";
+    try {
+        if (words.empty() && !is_scan(options.file))
+            require_result(options.file);  // other files have frames of it, too
+    } catch (const std::runtime_error& error) {
+        words = error.what();
+    }
+    print_answer(fmt::format("{}: {}\n", options.file, words.empty() ? "as it was written" : words));
+    return words.empty() ? 0 : 1;
 }
 
 // Whether a file begins as what is to replace it: with the same columns, or as JSON of ours.
