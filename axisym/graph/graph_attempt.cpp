@@ -200,9 +200,7 @@ std::optional<StopReport> GraphAttempt::check(Flow::Outcome outcome, const Obser
     return std::nullopt;
 }
 
-// A shape that keeps sharpening gets more room each time, as every remesh restarts the integrator. Afterwards the
-// profile is the same, but on the new mesh its knots move a little, and fast. Linearly implicit Euler damps that,
-// where the integrator would resolve it with tiny steps.
+// A shape that keeps sharpening gets more room each time, as every remesh restarts the integrator.
 std::optional<StopReport> GraphAttempt::remesh() {
     const bool soon = flow_->counters().steps < few_steps && summary.meshes > 1;
     remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
