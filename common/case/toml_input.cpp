@@ -49,7 +49,7 @@ std::string place(const toml::source_region& source) {
 
 toml::table parse_toml(const std::string& text, const std::string& path) {
     if (const auto other = no_plain_text(text); !other.empty())
-        throw CaseError(fmt::format("{}: is {}: a case is TOML, plain text saved as UTF-8", path, other));
+        throw CaseError(fmt::format("{}:1:1: is {}: a case is TOML, plain text saved as UTF-8", path, other));
     refuse_long_keys(text, path);
     try {
         return toml::parse(text, std::string_view(path));

@@ -272,7 +272,10 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool pole = kind == Kind::cell && (i == 0 || i + 1 == points.size());
         if (!pole && !(points[i].r > 0))
-            refuse(path, points[i].at, fmt::format("r = {:.6g}: the profile meets the axis", points[i].r));
+            refuse(path, points[i].at,
+                   fmt::format("r = {:.6g}: the profile meets the axis within; give one half of the outline, r >= 0, "
+                               "from pole to pole",
+                               points[i].r));
         if (i > 0 && points[i].r == points[i - 1].r && points[i].z == points[i - 1].z)
             refuse(path, points[i].at, "the same point as before; remove one of the two");
     }

@@ -96,7 +96,7 @@ class Confirm(ProgramTest):
     def test_refusals(self):
         for words, *arguments in (
             ("--points must be 1 or more, not 0", "--points", "0"),
-            ("--elements must be 1 or more, not 0", "--elements", "0"),
+            ("--elements must be an integer from 20 to 1000000, not 0", "--elements", "0"),
             ("--noise must be above 0 and below 0.1", "--noise", "0.5"),
             ("--end must be above 0", "--end", "-1"),
         ):

@@ -83,7 +83,7 @@ class Full(StreamsTest):
         """SLOW writes several megabytes."""
         self.write("case.toml", SLOW)
         limit = 300_000
-        done = self.redirected("", "run", self.case, "--quiet", env=os.environ | {"TUBULE_WRITE_SECONDS": "0.1"},
+        done = self.redirected("", "run", self.case, "--quiet", env=os.environ | {"TUBULE_WRITE_SECONDS": "0.01"},
                                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))  # fmt: skip
         self.assertEqual(done.returncode, 4, done.stderr)
         self.assertRegex(done.stderr, r"case.toml: cannot write .*case.hdf.*: File too large")

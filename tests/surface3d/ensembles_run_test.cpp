@@ -151,7 +151,7 @@ TEST(EnsembleRuns, ATubeIsPulled) {
             EXPECT_LT(std::abs(defect[i]), 2e-3 * E_ref);
         }
         EXPECT_GT(std::abs(L.back() / L.front() - 1), kind == "fluid" ? 1e-4 : 2e-3);
-        ASSERT_EQ(o.watch.meshes.size(), o.watch.frames.size());
+        ASSERT_GE(o.watch.meshes.size(), o.watch.frames.size());  // a checkpoint has one, too
         EXPECT_EQ(o.watch.meshes.back().period, L.back());
         EXPECT_NE(o.watch.meshes.front().period, L.back());
     }

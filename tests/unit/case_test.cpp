@@ -92,10 +92,10 @@ void expect_refused(const std::vector<Override>& overrides) {
 
 TEST(CaseRefusal, ContentsOfAnotherKind) {
     const std::string text = ": a case is TOML, plain text saved as UTF-8";
-    EXPECT_EQ(refusal("PK\x03\x04..."), "case.toml: is a zip archive, such as a spreadsheet" + text);
-    EXPECT_EQ(refusal({'t', '\0', 'i', '\0'}), "case.toml: is text in UTF-16" + text);
+    EXPECT_EQ(refusal("PK\x03\x04..."), "case.toml:1:1: is a zip archive, such as a spreadsheet" + text);
+    EXPECT_EQ(refusal({'t', '\0', 'i', '\0'}), "case.toml:1:1: is text in UTF-16" + text);
     EXPECT_EQ(refusal("// a cube\nvertices\n1 0 0 0\nedges\n1 1 2\n").substr(0, 43),
-              "case.toml: is a file of Surface Evolver (me");
+              "case.toml:1:1: is a file of Surface Evolver");
     EXPECT_EQ(refusal("tier = \"a\x1b[31m\xff\"\n").find_first_of("\x1b\xff"), std::string::npos);
 }
 
@@ -222,6 +222,9 @@ TEST(CaseRefusal, UnknownKeysAndTables) {
         Edit{"energy = 1e-6", "rmin = 1e-6",
              "17:1: unknown key accuracy.rmin; did you mean 'r_min'? Allowed here: "
              "energy, relative_to, estimate, r_min"},
+        Edit{"order = 5", "scheme = \"bdf2\"",
+             "19:1: unknown key discretisation.scheme: only tier \"surface3d\" has it. Allowed here: elements, order, "
+             "smoothness, time_tolerance, symmetry, parametrisation"},
         Edit{"order", "oder",
              "19:1: unknown key discretisation.oder; did you mean 'order'? Allowed here: elements, "
              "order, smoothness, time_tolerance, symmetry, parametrisation"},

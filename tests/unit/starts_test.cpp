@@ -140,7 +140,9 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
               "r >= 0");
     EXPECT_EQ(refusal("-1,0\n-1,.1\n-.9,.2\n-.8,.3\n-.7,.4\n-.6,.5\n-.4,.6\n-.2,.5\n.2,0\n"),
               "p.csv:1:1: r = -1 is below 0, but it is the distance from the axis: are the columns r and z swapped?");
-    EXPECT_EQ(refusal(half + "-.1,0\n" + rest), "p.csv:4:1: r = -0.1: the profile meets the axis");
+    EXPECT_EQ(refusal(half + "-.1,0\n" + rest),
+              "p.csv:4:1: r = -0.1: the profile meets the axis within; give one half of the "
+              "outline, r >= 0, from pole to pole");
     EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before; remove one of the two");
     EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6:1: the profile crosses itself"), std::string::npos);
     EXPECT_NE(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n").find("p.csv:9:1: the profile is not closed"),

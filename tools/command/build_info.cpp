@@ -75,16 +75,11 @@ std::string machine() {
 
 std::vector<std::pair<std::string, std::string>> build_info() {
     return {{"version", TUBULE_VERSION},  //
-            {"git_hash", TUBULE_GIT_HASH},
-            {"build", TUBULE_BUILD},
-            {"compiler", TUBULE_COMPILER},
-            {"sundials", sundials()},
-            {"suitesparse", suitesparse()},
-            {"eigen", TUBULE_EIGEN},
-            {"cgal", TUBULE_CGAL},
-            {"hdf5", hdf5()},
-            {"gsl", gsl_version},
-            {"blas", blas()},
+            {"git_hash", TUBULE_GIT_HASH},  {"build", TUBULE_BUILD},
+            {"compiler", TUBULE_COMPILER},  {"sundials", sundials()},
+            {"suitesparse", suitesparse()}, {"eigen", TUBULE_EIGEN},
+            {"cgal", TUBULE_CGAL},          {"hdf5", hdf5()},
+            {"gsl", gsl_version},           {"blas", blas()},
             {"machine", machine()}};
 }
 

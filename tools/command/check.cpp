@@ -111,7 +111,11 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         if (const std::string warning = engine_for(c)->warning(); !warning.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), warning));
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
-        if (!options.quick) out.expected = forecast(c);
+        if (!options.quick)
+            out.expected = forecast(c);
+        else if (const std::string file = input_name(c.shape);
+                 !file.empty() && !std::holds_alternative<MeshFile>(c.shape))
+            out.warnings.push_back(fmt::format("{}: note: {} is not read, because of --quick", shown_path(path), file));
         if (out.expected && out.expected->ill_posed.empty()) out.advice = advice_for(c, *out.expected);
         if (out.expected && !out.expected->ill_posed.empty())
             out.warnings.push_back(

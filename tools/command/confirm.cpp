@@ -170,8 +170,8 @@ std::string json_text(const ConfirmOptions& options, const std::vector<Point>& p
 void check(const ConfirmOptions& options) {
     const auto refuse = [](const std::string& why) { throw CaseError(why); };
     if (options.points < 1) refuse(fmt::format("--points must be 1 or more, not {}", options.points));
-    if (options.choices.elements < 1)
-        refuse(fmt::format("--elements must be 1 or more, not {}", options.choices.elements));
+    if (options.choices.elements < 20 || options.choices.elements > 1000000)
+        refuse(fmt::format("--elements must be an integer from 20 to 1000000, not {}", options.choices.elements));
     if (!(options.choices.noise > 0 && options.choices.noise < 0.1))
         refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
@@ -374,8 +374,7 @@ void add_confirm(CLI::App& app, int& exit_status) {
     command->add_option("SCAN", o->scan, "result of tubule scan")->required();
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
     command->add_option("--seed", o->seed, "of the random choice (1)");
-    command->add_option("--elements", o->choices.elements, "about how many triangles (200)")
-        ->check(CLI::Range(20, 1000000));
+    command->add_option("--elements", o->choices.elements, "about how many triangles (200)");
     command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)")
         ->check(refuse_infinite);
     command->add_option("--end", o->choices.end, "run until then instead of time.end of the case")

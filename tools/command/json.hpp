@@ -44,6 +44,7 @@ Json json_list(const std::vector<T>& items, const Make& json_of_item) {
 }
 
 // A line of text. Names of files can hold any bytes: those that are not UTF-8 are replaced.
-std::string line_of(const Json& json);
+// -0 becomes 0.
+std::string line_of(Json json);
 
 }  // namespace tubule

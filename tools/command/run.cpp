@@ -324,6 +324,8 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
     }
+    if (!options.quiet && options.resume && !result->unfinished)
+        say(stderr, "{}: note: there is no {} to go on from: the run begins at t = 0\n", c.path, file.string());
     if (!options.quiet && result->restart) tell_missed_outputs(c, *result->unfinished, result->restart->record.time);
     watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!options.quiet && !result->restart)

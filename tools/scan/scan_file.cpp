@@ -462,8 +462,10 @@ ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     impl->stored = load(path);
     add_inputs(impl->stored.result.scan);
     if (!same_scan(impl->stored.result.scan, scan))
-        throw CaseError(fmt::format("{}: cannot be resumed with {}: it belongs to another scan, case, --set or --over",
-                                    file.string(), scan.path));
+        throw CaseError(
+            fmt::format("{}: cannot be resumed with {}: it belongs to another scan, case, --set or --over; "
+                        "--extend --over adds values to a result, -o names another one, --overwrite replaces it",
+                        file.string(), scan.path));
     for (const auto& [key, value] : impl->stored.result.about)
         if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
     if (!impl->complete)

@@ -174,7 +174,7 @@ def opened(path):
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise BadInput(f"{path}: cannot be read as HDF5") from error
+        raise BadInput(f"{path}: cannot be read as HDF5: give a file NAME.hdf that run, equilibrium or scan wrote") from error
     with file:
         elsewhere = file.id.links.visit(lambda name, link: name if link.type >= h5py.h5l.TYPE_EXTERNAL else None, info=True)
         if elsewhere:
