@@ -815,7 +815,7 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
     EXPECT_EQ(refused("equilibrium.modes=2"),
               "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\"");
     EXPECT_EQ(refused("discretisation.parametrisation=even").substr(0, 92),
-              "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation. Allow");
+              "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation: only ");
     EXPECT_EQ(
         refused("discretisation.scheme=paper"),
         "--set discretisation.scheme=paper: discretisation.scheme must not be \"paper\" in tier \"auto\": it has no "

@@ -80,7 +80,7 @@ TEST(ShapeKeys, ChoicesOfTheSurface) {
     EXPECT_EQ(refusal(surface + shape("kind = \"dumbbell\"\n") + "[discretisation]\norder = 5\n"),
               "case.toml:7:9: discretisation.order must be one of 2, 3, 4, not 5");
     EXPECT_EQ(refusal(surface + shape("kind = \"dumbbell\"\n") + "[discretisation]\nsymmetry = true\n"),
-              "case.toml:7:1: unknown key discretisation.symmetry. Allowed here: elements, order, mesh, recovery, "
+              "case.toml:7:1: unknown key discretisation.symmetry: only tier \"axisym\" has it. Allowed here: elements, order, mesh, recovery, "
               "smoothing, scheme, step, time_tolerance, relaxation, follow_curvature, coarsen");
 }
 
