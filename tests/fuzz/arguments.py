@@ -10,7 +10,8 @@ from sandbox import Finding
 
 FAST = range(4, 9)
 PYTHON = "/usr/bin/python3"
-SETUP = """import copy, os, pathlib, pickle, sys, warnings
+SETUP = """import copy, os, pathlib, pickle, signal, sys, warnings
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts jobs of the background without it
 sys.path.insert(0, {package!r})
 import numpy as np, tubule
 warnings.simplefilter("ignore")
