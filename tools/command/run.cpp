@@ -52,7 +52,7 @@ void check_output(const std::filesystem::path& file) {
         if (file.extension() == other)
             throw CaseError(
                 fmt::format("{}: a result is an HDF5 file: give it a name such as {}; tubule show makes tables "
-                            "of it, tubule plot pictures, and ParaView opens it",
+                            "of it, tubule plot pictures; ParaView opens surfaces",
                             file.string(), std::filesystem::path(file).replace_extension(".hdf").filename().string()));
     std::error_code error;
     if (std::filesystem::is_directory(file, error))
