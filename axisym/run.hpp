@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "axisym/integration/run_summary.hpp"
+#include "common/run/run.hpp"
 #include "common/case/case.hpp"
 #include "common/result/record.hpp"
 

@@ -10,10 +10,8 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr double steepest = 3;       // largest curvature times element length: beyond it the curve is not resolved
-constexpr double stretched = 1e-3;   // least over largest |X_s|
-constexpr int most_crawling = 2000;  // steps in which the time grows by less than a thousandth
-constexpr double crawling = 1.001, tiny_step = 1e-9;  // of the time reached; of the end
+constexpr double steepest = 3;      // largest curvature times element length: beyond it the curve is not resolved
+constexpr double stretched = 1e-3;  // least over largest |X_s|
 
 }  // namespace
 
@@ -63,14 +61,6 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
         Stop::resolution_lost, time,
         fmt::format("the tangent rotates across one element by {:.2g} radians near s = {:.4g}", turn, s.o.s_curvature),
         "ask for more accuracy, or set discretisation.elements"};
-}
-
-std::optional<StopReport> CurveStall::after_step(double time, double step, double end) {
-    if (time > crawling * since_) since_ = time, steps_ = 0;
-    if (++steps_ <= most_crawling || step >= tiny_step * end) return std::nullopt;
-    return StopReport{Stop::solver_failed, time,
-                      fmt::format("the time integrator makes no progress with steps of {:.2g}", step),
-                      "try another accuracy, discretisation.elements or parametrisation"};
 }
 
 }  // namespace tubule::axisym

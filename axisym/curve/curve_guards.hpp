@@ -20,14 +20,4 @@ std::span<const CurveGuard> curve_guards();
 std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen::VectorXd& x, const Snapshot& s,
                                            double time);
 
-// Steps that make no progress: IDA may continue them indefinitely.
-class CurveStall {
-public:
-    std::optional<StopReport> after_step(double time, double step, double end);
-
-private:
-    double since_ = 0;
-    int steps_ = 0;
-};
-
 }  // namespace tubule::axisym

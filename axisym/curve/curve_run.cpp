@@ -4,12 +4,16 @@
 
 #include <algorithm>
 
-#include "axisym/curve/curve_attempt.hpp"
+#include "axisym/curve/curve_simulation.hpp"
+#include "common/run/loop.hpp"
+#include "common/run/stall.hpp"
 
 namespace tubule::axisym {
 namespace {
 
-constexpr int most_failures = 2;        // pairs of runs that fail, after which nothing else is tried
+constexpr int most_failures = 2;    // pairs of runs that fail, after which nothing else is tried
+constexpr int most_stalled = 2000;  // steps, shorter than this part of the end
+constexpr double tiny_step = 1e-9;
 constexpr double share_of_mesh = 1e-4;  // of the error allowed: what any state may lose to the mesh
 constexpr double too_early = 1e-6;      // of time.end: runs that fail so soon say nothing of each other's error
 
@@ -44,7 +48,10 @@ public:
         if (!begun_->is_coarser) settings_ = *begun_;
     }
 
-    void show_start() override { attempt(settings_, nullptr).begin(); }
+    void show_start() override {
+        make(settings_, nullptr).begin();
+        loop().begin(start_.note);
+    }
     RunSummary& run_coarser() override { return run(coarser(settings_), nullptr); }
     RunSummary& run_reported(const EndedRun& coarser) override { return run(settings_, &coarser); }
     EndedRun ended() override { return {run_->trace, run_->summary.stop, run_->least_symbol}; }
@@ -68,7 +75,7 @@ public:
         return s.reference_energy;
     }
 
-    bool refine(const tubule::RunSummary& last) override {
+    bool refine(const RunSummary& last) override {
         const bool good = last.as_accurate_as_asked && !failed(last.stop);
         if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
         const bool cheap = last.stop.time == 0;  // a failure at the beginning, where finer meshes may do
@@ -89,12 +96,16 @@ public:
         return settings_given(case_) ? "discretisation.elements or time_tolerance are given" : "";
     }
 
-    const RunSummary& summary() const { return run_->summary; }
-
 private:
-    CurveAttempt& attempt(const CurveSettings& settings, const EndedRun* coarser) {
-        run_.emplace(case_, watch_, clock_, start_, settings, coarser);
-        return *run_;
+    CurveSimulation& make(const CurveSettings& settings, const EndedRun* coarser) {
+        return run_.emplace(case_, start_, settings, coarser);
+    }
+
+    Loop loop() {
+        Loop out(*run_, case_, watch_, clock_, run_->is_reported());
+        out.add(std::make_unique<Stall>(most_stalled, tiny_step * case_.time.end, case_.accuracy.energy,
+                                        "try another accuracy, discretisation.elements or parametrisation"));
+        return out;
     }
 
     // Not where breaks are at jumps of curvature or of H0, nor where small elements make the waves of a fluid shorter.
@@ -104,12 +115,16 @@ private:
 
     // Resumes the interrupted run if that had the same role in its pair.
     RunSummary& run(const CurveSettings& settings, const EndedRun* coarser) {
-        attempt(settings, coarser);
-        if (restart_ && begun_->is_coarser == settings.is_coarser)
-            run_->resume(*std::exchange(restart_, nullptr));
-        else
+        make(settings, coarser);
+        Loop steps = loop();
+        if (restart_ && begun_->is_coarser == settings.is_coarser) {
+            run_->resume(*restart_);
+            steps.resume(*std::exchange(restart_, nullptr));
+        } else {
             run_->begin();
-        run_->go();
+            steps.begin(start_.note);
+        }
+        steps.go();
         return run_->summary;
     }
 
@@ -121,7 +136,7 @@ private:
     std::optional<CurveSettings> begun_;  // of the run that was interrupted
     CurveSettings settings_;              // of the run to be reported
     int failures_ = 0;                    // of pairs
-    std::optional<CurveAttempt> run_;     // the last one
+    std::optional<CurveSimulation> run_;  // the last one
 };
 
 }  // namespace
@@ -131,8 +146,7 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
     return clock.pausing([&] {
         CurveRuns runs(c, observer, clock, restart);
         RunPairs pairs(runs, c, observer, 0, restart);
-        drive(c, observer, clock, pairs);
-        return runs.summary();
+        return drive(c, observer, clock, pairs);
     });
 }
 

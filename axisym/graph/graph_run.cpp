@@ -5,8 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include "axisym/graph/graph_attempt.hpp"
+#include "axisym/graph/graph_simulation.hpp"
 #include "common/run/driver.hpp"
+#include "common/run/loop.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -24,20 +25,23 @@ public:
 
     RunSummary& next() override {
         settings_.may_give_up = --left_ > 0;
-        run_.emplace(case_, watch_, clock_, settings_);
-        if (restart_)
-            run_->resume(*std::exchange(restart_, nullptr));
+        const Record* restart = std::exchange(restart_, nullptr);
+        if (restart)
+            run_.emplace(case_, clock_, settings_, *restart);
         else
-            run_->begin();
-        run_->go();
+            run_.emplace(case_, clock_, settings_);
         run_->summary.attempts = count_;
-        run_->summary.integrator = settings_.one_step ? "rosenbrock" : "ida";
+        Loop loop(*run_, case_, watch_, clock_);
+        if (restart)
+            loop.resume(*restart);
+        else
+            loop.begin();
+        loop.go();
         if (!fallback_.empty()) run_->summary.warnings.push_back(fallback_);
-        describe_effort(run_->summary);
         return run_->summary;
     }
 
-    bool refine(const tubule::RunSummary& last) override {
+    bool refine(const RunSummary& last) override {
         if (!run_->gave_up) return fall_back_on_ida(last);
         const double allowed = case_.accuracy.energy * last.reference_energy / stated_over_computed;
         settings_ = tightened(settings_, run_->latest_error(), allowed, count_++);
@@ -49,12 +53,10 @@ public:
         return d.elements || d.time_tolerance ? "discretisation.elements or time_tolerance are given" : "";
     }
 
-    const RunSummary& summary() const { return run_->summary; }
-
 private:
     // Where H is zero an energy of powers of H alone has no stiffness. What appears there within a step, the linearised
     // flow of a Rosenbrock method does not see; Newton's method does.
-    bool fall_back_on_ida(const tubule::RunSummary& last) {
+    bool fall_back_on_ida(const RunSummary& last) {
         const bool lost = last.stop.reason == Stop::resolution_lost || last.stop.reason == Stop::solver_failed;
         if (!settings_.one_step || !lost) return false;
         fallback_ = fmt::format("IDA has integrated the run: time.integrator = \"rosenbrock\" failed at t = {:.4g}, {}",
@@ -71,7 +73,7 @@ private:
     GraphSettings settings_;
     std::string fallback_;  // why IDA integrates what Rosenbrock's method should have
     int count_ = 1, left_ = most_attempts;
-    std::optional<GraphAttempt> run_;  // the last one
+    std::optional<GraphSimulation> run_;  // the last one
 };
 
 }  // namespace
@@ -80,8 +82,7 @@ RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart
     const RunClock clock(c, observer);
     return clock.pausing([&] {
         GraphRuns runs(c, observer, clock, restart);
-        drive(c, observer, clock, runs);
-        return runs.summary();
+        return drive(c, observer, clock, runs);
     });
 }
 

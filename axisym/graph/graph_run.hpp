@@ -2,7 +2,7 @@
 #pragma once
 
 #include "axisym/graph/graph_series.hpp"
-#include "axisym/integration/run_summary.hpp"
+#include "common/run/run.hpp"
 
 namespace tubule::axisym {
 

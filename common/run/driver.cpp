@@ -12,9 +12,9 @@ constexpr double rounding = 1e-12;  // of E_ref: no energy is known better
 // Of a run that is not refined any more, although it may be less accurate than asked.
 void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
     if (s.as_accurate_as_asked || can_go_on(s.stop.reason)) return;
-    const std::string error = s.error_is_known()
-                                  ? fmt::format("the estimated error of the energy is {:.2g} of E_ref", s.estimated_error)
-                                  : "the error of the energy is unknown",
+    const std::string error = s.error_is_known() ? fmt::format("the estimated error of the energy is {:.2g} of E_ref",
+                                                               s.estimated_error)
+                                                 : "the error of the energy is unknown",
                       missed = fmt::format("{}, but {:.2g} was asked for", error, c.accuracy.energy);
     if (fixed_by.empty() && s.stop.reason == Stop::finished)
         s.stop = {Stop::resolution_lost, s.stop.time, missed, "ask for less accuracy"};

@@ -36,6 +36,7 @@ struct RunSummary {
     double reference_energy = 0;  // E_ref, theory.md (11.1): asked and estimated errors are relative to it
     double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref; 1 where it is unknown
     bool as_accurate_as_asked = true;
+    int attempts = 1;  // how often the run began again with finer settings, plus one
     int elements = 0;  // at the stop; of a tube over one period
     std::vector<std::string> warnings;
     std::string effort;  // in words, such as "85 steps, 96 elements"

@@ -16,9 +16,6 @@ namespace {
 constexpr double creep = 10;    // increase since its lowest, of the asked accuracy
 constexpr double climb = 0.25;  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
-constexpr int most_stalled = 100;
-constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere
-constexpr double least_fall = 0.1;       // or of the energy, of the asked accuracy
 
 std::string where(const Eigen::Vector3d& x) {
     return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
@@ -99,17 +96,6 @@ std::optional<StopReport> find_drift(double change, double asked, double time) {
                     "volume",
                     std::abs(change)),
         "use more elements"};
-}
-
-std::optional<StopReport> StallDetector::look(double time, double step, double tiny, double lowest_energy,
-                                              double asked) {
-    if (time > (1 + least_progress) * time_ || lowest_energy < energy_ - least_fall * asked) {
-        time_ = time, energy_ = lowest_energy, steps_ = 0;
-        return std::nullopt;
-    }
-    if (++steps_ <= most_stalled || step >= tiny) return std::nullopt;
-    return StopReport{Stop::solver_failed, time, fmt::format("no progress with steps of {:.2g}", step),
-                      "ask for less accuracy, or use more elements"};
 }
 
 }  // namespace tubule::surface3d

@@ -38,16 +38,4 @@ std::optional<StopReport> find_impossible_motion(const Observables& o, const Cur
 constexpr double most_drift = 0.01;
 std::optional<StopReport> find_drift(double change, double asked, double time);
 
-// Steps that make no progress: 100 in which neither time advances by a thousandth nor the lowest energy falls by a
-// tenth of the accuracy asked, while steps are shorter than `tiny`. A run that follows a singularity by shorter and
-// shorter steps does not count as stalled, as its energy falls.
-class StallDetector {
-public:
-    std::optional<StopReport> look(double time, double step, double tiny, double lowest_energy, double asked);
-
-private:
-    int steps_ = 0;  // since the last progress
-    double time_ = 0, energy_ = HUGE_VAL;
-};
-
 }  // namespace tubule::surface3d

@@ -17,18 +17,6 @@ bool lost(const StopReport& stop) {
     return stop.reason == Stop::pinch_off || exit_code(stop.reason) == exit_code(Stop::solver_failed);
 }
 
-// What the record of a coarser run has beside its state.
-struct Saved {
-    double time = 0;
-    int stop = -1;  // it goes on
-    double stop_time = 0;
-    SurfaceCells cells;
-};
-template <class Fields, class S>
-void saved_fields(Fields&& f, S& s) {
-    f.number("time", s.time), f.number("stop", s.stop), f.number("stop_time", s.stop_time);
-    f.number("order", s.cells.order), f.number("period", s.cells.period);
-}
 template <class Fields, class R, class C>
 void compared_fields(Fields&& f, R& r, C& c) {
     f.number("restart_compared", c.compared), f.number("restart_compared_error", c.error);
@@ -50,79 +38,13 @@ void compared_fields(Fields&& f, R& r, C& c) {
 // Coarser runs, by the prefix of their names in the record of the run.
 const std::string of_coarser = "restart_coarser_run_", of_same_steps = "restart_coarser_same_steps_";
 
-bool is_saved(const Record& record, const std::string& prefix) {
-    int exists = 0;
-    RecordReader(record).number(prefix + "exists", exists);
-    return exists != 0;
-}
-
-Record record_of(const Record& record, const std::string& prefix) {
-    Record out;
-    out.kind = RecordKind::surface;
-    for (const auto& [name, value] : record.numbers)
-        if (name.starts_with(prefix)) out.numbers.emplace_back(name.substr(prefix.size()), value);
-    for (const Array& a : record.arrays)
-        if (a.name.starts_with(prefix)) out.arrays.push_back({a.name.substr(prefix.size()), a.shape, a.data});
-    return out;
-}
-
-Saved saved_of(Record& record) {
-    Saved out;
-    const RecordReader reader(record);
-    saved_fields(reader, out);
-    std::vector<double> cells, shifts;
-    reader.array("cells", cells), reader.optional_array("shifts", shifts, cells.size());
-    out.cells.cells.assign(cells.begin(), cells.end()), out.cells.shifts.assign(shifts.begin(), shifts.end());
-    Eigen::Matrix3Xd points;
-    reader.array("points", points);
-    out.cells.nodes = points.cols();
-    const int k = out.cells.order;
-    const bool whole = k >= 1 && k <= 4 && cells.size() % ((k + 1) * (k + 2) / 2) == 0;
-    const auto is_node = [&](double node) { return node >= 0 && node < points.cols(); };
-    if (!whole || !std::ranges::all_of(cells, is_node))
-        throw std::runtime_error(
-            "cannot resume from this frame: its coarser run has no cells of these nodes; run the case without "
-            "--resume");
-    if (out.stop < -1 || out.stop >= static_cast<int>(stop_kinds.size()))
-        throw std::runtime_error(
-            "cannot resume from this frame: its coarser run ended for an unknown reason; run the case without "
-            "--resume");
-    record.time = out.time;
-    return out;
-}
-
-void save_coarser(const MotionAttempt& run, const std::string& prefix, Record& record) {
-    Record own = run.saved();
-    Saved saved{.time = own.time, .cells = cells_of(run.mesh())};
-    if (const auto& stop = run.stop(); stop && !can_go_on(stop->reason))
-        saved.stop = static_cast<int>(stop->reason), saved.stop_time = stop->time;
-    RecordWriter writer(own);
-    saved_fields(writer, saved);
-    writer.array("cells", std::vector<double>(saved.cells.cells.begin(), saved.cells.cells.end()));
-    writer.array("shifts", std::vector<double>(saved.cells.shifts.begin(), saved.cells.shifts.end()));
-    for (auto& [name, value] : own.numbers) record.numbers.emplace_back(prefix + name, value);
-    for (Array& a : own.arrays) record.arrays.push_back({prefix + a.name, std::move(a.shape), std::move(a.data)});
-}
-
 }  // namespace
 
-MotionError::MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock,
-                         const MotionSettings& of)
-    : case_(c), start_(start), watch_(watch), clock_(clock), of_(of) {}
+MotionError::MotionError(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& of)
+    : case_(c), start_(start), clock_(clock), of_(of) {}
 
-bool MotionError::tells_apart() const {
+bool MotionError::separates_time_error() const {
     return is_of_high_order(case_);
-}
-
-std::unique_ptr<MotionError::Coarser> MotionError::make(const MotionSettings& settings) const {
-    auto out = std::make_unique<Coarser>(Coarser{case_, {}});
-    const int order = element_order(case_);
-    if (settings.role == Role::other_order) out->c.surface.order = order > 2 ? order - 1 : 3;
-    out->c.surface.step.reset();
-    out->c.time.output.clear();
-    out->c.time.stationary.reset();  // it goes as far as the run does
-    out->run.emplace(out->c, watch_, clock_, settings, nullptr);
-    return out;
 }
 
 // What goes wrong in coarser runs leaves the run alone: its error is unknown from then on.
@@ -157,12 +79,12 @@ void MotionError::begin(int triangles) {
 
 void MotionError::begin(Role role, double coarser_by) {
     const auto begun = [&] {
-        auto next = make(coarser(of_, role, coarser_by));
-        next->run->begin(start_);
+        auto next = std::make_unique<CoarserRun>(case_, start_, clock_, coarser(of_, role, coarser_by));
+        next->begin();
         return next;
     };
     coarser_ = begun();
-    if (tells_apart()) same_steps_ = begun();
+    if (separates_time_error()) same_steps_ = begun();
     compared_ = {};
 }
 
@@ -172,16 +94,12 @@ bool MotionError::is_compared(std::size_t i) const {
 
 // At all times that are to be compared. False if a coarser run does not get there.
 bool MotionError::catch_up(double smoothness) {
-    const auto gets_to = [this](MotionAttempt& run, double time) {
-        run.advance_to(time, of_run_.growth);
-        return run.state().X.size() > 0 && !is_before(run.state().time, time);
-    };
     const std::vector<double>& times = of_run_.times;
     double largest = 0;
     for (int& i = compared_.compared; i < std::ssize(times); ++i) {
-        if (same_steps_ && !gets_to(*same_steps_->run, times[i])) return false;
+        if (same_steps_ && !same_steps_->advance_to(times[i], of_run_.growth)) return false;
         if (!is_compared(i)) continue;
-        if (!gets_to(*coarser_->run, times[i])) return false;
+        if (!coarser_->advance_to(times[i], of_run_.growth)) return false;
         largest = std::max(largest, error_at(i, smoothness));
         compared_.error = largest;
         follow_mesh(i);
@@ -197,10 +115,9 @@ void MotionError::follow_mesh(std::size_t i) try {
         if (r.coarser_at[k] == static_cast<double>(i))
             for (const auto* coarser : {&coarser_, &same_steps_}) {
                 if (!*coarser) continue;
-                MotionAttempt& run = *(*coarser)->run;
                 const int triangles = static_cast<int>(r.asked[k]);
-                run.follow_to(run.settings().role == Role::other_order ? triangles : fewer_triangles(triangles),
-                              static_cast<int>(r.had[k]));
+                const bool as_many = (*coarser)->run().settings().role == Role::other_order;
+                (*coarser)->follow_to(as_many ? triangles : fewer_triangles(triangles), static_cast<int>(r.had[k]));
             }
 } catch (const Paused&) {
     coarser_.reset(), same_steps_.reset();
@@ -209,10 +126,8 @@ void MotionError::follow_mesh(std::size_t i) try {
 }
 
 bool MotionError::is_at(double time) const {
-    const auto there = [&](const std::unique_ptr<Coarser>& coarser) {
-        if (!coarser) return true;
-        const MotionAttempt& run = *coarser->run;
-        return !run.stop() && !is_before(run.state().time, time) && run.is_on_grid();
+    const auto there = [&](const std::unique_ptr<CoarserRun>& coarser) {
+        return !coarser || (!coarser->stop() && coarser->is_at(time) && coarser->is_on_grid());
     };
     return failure_ || (there(coarser_) && there(same_steps_));
 }
@@ -228,9 +143,9 @@ void MotionError::coarsen(int asked, int triangles) {
 double MotionError::error_at_once(std::size_t i, double smoothness) {
     const FollowedRun& r = of_run_;
     Comparison& c = compared_;
-    const double part = error_by_difference(case_, coarser_->run->settings(), smoothness);
-    const double difference = coarser_->run->energy() - r.energies[i], at = static_cast<double>(i);
-    const int steps = coarser_->run->steps();
+    const double part = error_by_difference(case_, coarser_->run().settings(), smoothness);
+    const double difference = coarser_->energy() - r.energies[i], at = static_cast<double>(i);
+    const int steps = coarser_->steps();
     if (i == 0 || r.dissipations[i] <= c.slowest)
         c.slowest_at = at, c.slowest = c.fastest = r.dissipations[i], c.difference_then = difference,
         c.steps_then = steps;
@@ -244,10 +159,10 @@ double MotionError::error_at_once(std::size_t i, double smoothness) {
 double MotionError::error_at(std::size_t i, double smoothness) {
     const FollowedRun& r = of_run_;
     Comparison& c = compared_;
-    const MotionSettings& settings = coarser_->run->settings();
+    const MotionSettings& settings = coarser_->run().settings();
     if (!same_steps_) return error_at_once(i, smoothness);
-    const double longer_steps = coarser_->run->energy();
-    const double same_steps = same_steps_->run->energy();
+    const double longer_steps = coarser_->energy();
+    const double same_steps = same_steps_->energy();
     const std::size_t since = i == 0 ? 0 : steps_at_once * ((i - 1) / steps_at_once) + 1;
     const auto order = static_cast<int>(*std::min_element(r.orders.begin() + since, r.orders.begin() + i + 1));
     c.sum_in_time += (longer_steps - same_steps - c.between) * error_in_time(order);
@@ -259,7 +174,7 @@ double MotionError::error_at(std::size_t i, double smoothness) {
 // Without an end, or to that of a coarser run; what is lost on fewer triangles is tried with elements of another order.
 void MotionError::follow(double smoothness) {
     while (true) {
-        const Role role = coarser_->run->settings().role;
+        const Role role = coarser_->run().settings().role;
         const bool another = role == Role::fewer_triangles;
         try {
             if (catch_up(smoothness)) return;
@@ -292,50 +207,35 @@ std::optional<double> MotionError::in_time() const {
 
 std::optional<StopReport> MotionError::stop() const {
     if (failure_) return failure_;
-    std::optional<StopReport> out = coarser_ ? coarser_->run->stop() : std::nullopt;
-    const std::optional<StopReport> other = same_steps_ ? same_steps_->run->stop() : std::nullopt;
+    std::optional<StopReport> out = coarser_ ? coarser_->stop() : std::nullopt;
+    const std::optional<StopReport> other = same_steps_ ? same_steps_->stop() : std::nullopt;
     if (other && (!out || other->time < out->time)) return other;
     return out;
 }
 
 void MotionError::save(Record& record) const {
     RecordWriter writer(record);
-    const auto is_begun = [](const auto& coarser) { return coarser && coarser->run->state().X.size() > 0; };
+    const auto is_begun = [](const auto& coarser) { return coarser && coarser->has_begun(); };
     const bool exists = is_begun(coarser_), both = exists && is_begun(same_steps_);
     writer.number(of_coarser + "exists", exists), writer.number(of_same_steps + "exists", both);
     compared_fields(writer, of_run_, compared_);
-    if (exists) save_coarser(*coarser_->run, of_coarser, record);
-    if (both) save_coarser(*same_steps_->run, of_same_steps, record);
+    if (exists) coarser_->save(of_coarser, record);
+    if (both) same_steps_->save(of_same_steps, record);
 }
 
 void MotionError::resume(const Record& record, int triangles) {
     compared_fields(RecordReader(record), of_run_, compared_);
-    if (!is_saved(record, of_coarser)) return attempt([&] { begin(triangles); }, record.time);
-    const auto resumed = [&](const std::string& prefix) {
-        Record own = record_of(record, prefix);
-        const Saved saved = saved_of(own);
-        auto out = make(motion_restart(own, time_scheme(case_)).memory.settings);
-        out->run->resume({std::move(own), saved.cells}, start_);
-        const auto stop = static_cast<Stop>(saved.stop);
-        const bool goes_on =
-            saved.stop < 0 || (stop == Stop::finished && saved.stop_time < case_.time.end * (1 - 1e-12));
-        if (!goes_on) out->run->end({stop, saved.stop_time, "", ""});
-        return out;
-    };
-    coarser_ = resumed(of_coarser);
-    if (is_saved(record, of_same_steps)) same_steps_ = resumed(of_same_steps);
+    if (!CoarserRun::is_saved(record, of_coarser)) return attempt([&] { begin(triangles); }, record.time);
+    coarser_ = CoarserRun::resumed(case_, start_, clock_, record, of_coarser);
+    if (CoarserRun::is_saved(record, of_same_steps))
+        same_steps_ = CoarserRun::resumed(case_, start_, clock_, record, of_same_steps);
 }
 
 void check_error_restart(const Case& c, const Record& record) {
     FollowedRun run;
     Comparison compared;
     compared_fields(RecordReader(record), run, compared);
-    for (const std::string& prefix : {of_coarser, of_same_steps}) {
-        if (!is_saved(record, prefix)) continue;
-        Record own = record_of(record, prefix);
-        saved_of(own);
-        motion_restart(own, time_scheme(c));
-    }
+    for (const std::string& prefix : {of_coarser, of_same_steps}) CoarserRun::check_restart(c, record, prefix);
 }
 
 }  // namespace tubule::surface3d

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "surface3d/run/motion_attempt.hpp"
+#include "surface3d/run/coarser_run.hpp"
 
 namespace tubule::surface3d {
 
@@ -39,7 +39,7 @@ struct Comparison {
 class MotionError {
 public:
     // All references must outlive it. `of`: the run whose error it is.
-    MotionError(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const MotionSettings& of);
+    MotionError(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& of);
 
     // With the run, which has so many triangles, or where that goes on. resume() throws as RecordReader. begin()
     // tells the error of the start, which has these measures.
@@ -65,13 +65,6 @@ public:
     double give_up = HUGE_VAL;  // beyond this error, of E_ref, the run is not worth going on
 
 private:
-    // A coarser run refers to its case.
-    struct Coarser {
-        Case c;
-        std::optional<MotionAttempt> run;
-    };
-
-    std::unique_ptr<Coarser> make(const MotionSettings& settings) const;
     void begin(int triangles);
     void begin(Role role, double coarser_by);
     template <class Work>
@@ -82,14 +75,13 @@ private:
     double error_at_once(std::size_t i, double smoothness);
     void follow_mesh(std::size_t i);
     bool is_compared(std::size_t i) const;
-    bool tells_apart() const;
+    bool separates_time_error() const;
 
     const Case& case_;
     const Start& start_;
-    RunObserver& watch_;
     const RunClock& clock_;
     MotionSettings of_;
-    std::unique_ptr<Coarser> coarser_, same_steps_;  // the second one where errors are told apart
+    std::unique_ptr<CoarserRun> coarser_, same_steps_;  // the second one where errors are told apart
     FollowedRun of_run_;
     Comparison compared_;
     std::optional<StopReport> failure_;  // there are no coarser runs

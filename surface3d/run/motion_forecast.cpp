@@ -10,7 +10,7 @@
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/motion/motion_forms.hpp"
-#include "surface3d/run/motion_attempt.hpp"
+#include "surface3d/run/surface_simulation.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -64,11 +64,13 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
     c.accuracy.energy = std::max(c.accuracy.energy, 0.05);
     Pilot pilot;
     const RunClock clock(c, pilot);
-    MotionAttempt run(c, pilot, clock, {.elements = triangles, .tolerance = tolerance}, nullptr);
+    SurfaceSimulation run(c, pilot, {.elements = triangles, .tolerance = tolerance}, nullptr);
     try {
         run.begin(start);
         const double before = quiet_seconds();
-        run.go();
+        Loop loop = loop_of(run, c, pilot, clock);
+        loop.begin();
+        loop.go();
         const Stop stop = run.summary.stop.reason;
         if (stop == Stop::ill_posed && !pilot.moved()) return {.ill_posed = run.summary.stop.message};
         const bool lost = stop == Stop::resolution_lost || stop == Stop::mesh_lost || stop == Stop::solver_failed;
@@ -76,7 +78,7 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
         if (!pilot.moved() || (lost && run.summary.stop.time < 0.5 * c.time.end)) return {};
         if (!whole && pilot.has_collapsed()) return {};
         return {pilot.steps() * (whole ? 1 : pilot.all_by_done(c.time.end)), (quiet_seconds() - before) / pilot.steps(),
-                true, run.rough_steps() > rough_part * run.steps()};
+                true, run.memory().count.rough > rough_part * run.memory().count.steps};
     } catch (const SolveError&) {
     }
     return {};

@@ -36,6 +36,7 @@ struct MotionBalance {
 struct MotionCounters {
     int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
     int coarser = 0;  // meshes of fewer triangles, on the way
+    int rough = 0;    // steps to surfaces that are rough for their mesh
 };
 
 // Beside the state of the surface, what a run has to remember.
@@ -50,6 +51,7 @@ struct MotionMemory {
     double error = 0;    // largest so far, of the energy, absolute
     double moved = 0;    // the nodes, at most, since the last look for self-intersection
     Eigen::VectorXd H0;  // at the nodes, where it varies
+    LinearWork linear_work;
 };
 
 // Data of the nodes: points, normal, u, u_n (normal velocity), p (where there is one), H, K, energy_density, H0 (if it

@@ -32,17 +32,22 @@ public:
                             : first_settings(c, start)) {}
 
     RunSummary& next() override {
-        MotionError error(case_, start_, watch_, clock_, settings_);
+        MotionError error(case_, start_, clock_, settings_);
         if (fixed_by().empty() && can_be_finer(settings_)) error.give_up = beyond_use * case_.accuracy.energy;
-        MotionAttempt run(case_, watch_, clock_, settings_, case_.accuracy.estimate ? &error : nullptr);
-        if (restart_) {
-            run.summary.warnings = start_.notes();
-            run.resume(*std::exchange(restart_, nullptr), start_);
-        } else {
+        SurfaceSimulation run(case_, watch_, settings_, case_.accuracy.estimate ? &error : nullptr);
+        const Restart* restart = std::exchange(restart_, nullptr);
+        if (restart)
+            run.resume(*restart, start_);
+        else
             run.begin(start_);
-        }
-        run.go();
-        ended_ = {std::move(run.summary), {run.error(), error.in_time(), error.spare() * run.defect()}};
+        Loop loop = loop_of(run, case_, watch_, clock_);
+        if (restart)
+            loop.resume(restart->record);
+        else
+            loop.begin();
+        loop.go();
+        const MotionMemory& memory = run.memory();
+        ended_ = {std::move(run.summary), {memory.error, error.in_time(), error.spare() * memory.balance.defect}};
         judge(error.stop());
         return ended_.summary;
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_guards.hpp"
+#include "common/run/stall.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 
@@ -254,12 +255,12 @@ TEST(CurveGuards, aParameterStretchedTooFar) {
 }
 
 TEST(CurveGuards, stepsThatLeadNowhere) {
-    // 2000 steps in which the time does not grow by a thousandth, and which are shorter than 1e-9 of the end.
+    // 2000 steps in which the time does not grow by a thousandth, nor the energy falls, and which are shorter than 1e-9 of the end.
     const auto steps_until_stop = [](double step, double end) {
-        CurveStall stall;
+        Stall stall(2000, 1e-9 * end, 1e-4, "set discretisation.elements");
         double time = 1;
         for (int steps = 1; steps <= 5000; ++steps, time += step)
-            if (const auto stop = stall.after_step(time, step, end)) {
+            if (const auto stop = stall.look(time, step, 0)) {
                 EXPECT_EQ(word(stop->reason), "solver-failed");
                 EXPECT_SAYS(stop->message, "no progress with steps of 1e-10");
                 EXPECT_SAYS(stop->advice, "discretisation.elements");
@@ -267,7 +268,7 @@ TEST(CurveGuards, stepsThatLeadNowhere) {
             }
         return 0;
     };
-    EXPECT_EQ(steps_until_stop(1e-10, 1), 2001);
+    EXPECT_EQ(steps_until_stop(1e-10, 1), 2002);  // the first look is where it begins
     EXPECT_EQ(steps_until_stop(1e-10, 0.01), 0);  // such steps are not short for this end
     EXPECT_EQ(steps_until_stop(1e-5, 1e5), 0);    // a thousandth of the time in 100 steps
 }

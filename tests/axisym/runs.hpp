@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "axisym/run.hpp"
+#include "tests/support/summary_detail.hpp"
 
 namespace tubule::axisym {
 

@@ -23,7 +23,7 @@ void figure_run(benchmark::State& state, Integrator integrator) {
     }
     state.counters["error"] = error / summary.reference_energy;
     state.counters["stated"] = summary.estimated_error;
-    state.counters["steps"] = static_cast<double>(summary.counters.steps);
+    state.counters["steps"] = static_cast<double>(detail<std::int64_t>(summary, "steps"));
     state.counters["elements"] = summary.elements;
     state.counters["attempts"] = summary.attempts;
 }

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "axisym/run.hpp"
+#include "tests/support/summary_detail.hpp"
 #include "tests/axisym/reference.hpp"
 
 namespace tubule::axisym {

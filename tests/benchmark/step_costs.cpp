@@ -259,7 +259,7 @@ void solve_lagged(Lagged& l, bool due, const Matrix& A, const Vector& b, Gmres& 
 // Forty steps of a motion, controlled by their error as those of a run: factors made anew every so many.
 void lagged(Size size) {
     constexpr int steps = 40;
-    constexpr double asked = 1e-4, safety = 0.85, growth = 1.6;  // of motion_attempt.cpp
+    constexpr double asked = 1e-4, safety = 0.85, growth = 1.6;  // of surface_simulation.cpp
     Scene scene(size.n, size.k);
     const MotionUnknowns& unknowns = scene.solver.unknowns();
     const double wanted = asked * std::sqrt(extent(scene.surface.space(), scene.mesh).area);

@@ -8,6 +8,7 @@
 #include <map>
 #include <regex>
 
+#include "common/run/stall.hpp"
 #include "common/case/read.hpp"
 #include "common/shapes/capsule.hpp"
 #include "common/shapes/sphere.hpp"
@@ -211,10 +212,10 @@ TEST(Guards, AdviseNothingThatACaseRefuses) {
 
 // How many steps of one length are taken from t = 1 until they are found to lead nowhere, at most `most`.
 int steps_taken(double step, double fall, int most) {
-    StallDetector stall;
+    Stall stall(100, 1e-4, 1e-2, "");
     double time = 1, energy = 1;
     for (int taken = 0; taken < most; ++taken) {
-        if (const auto stuck = stall.look(time, step, 1e-4, energy, 1e-2)) {
+        if (const auto stuck = stall.look(time, step, energy)) {
             EXPECT_EQ(stuck->reason, Stop::solver_failed);
             EXPECT_NE(stuck->message.find("no progress with steps of"), std::string::npos);
             return taken;
@@ -224,19 +225,19 @@ int steps_taken(double step, double fall, int most) {
     return most;
 }
 
-TEST(StallDetector, OnlyStepsThatLeadNowhere) {
+TEST(Stall, OnlyStepsThatLeadNowhere) {
     EXPECT_EQ(steps_taken(1e-6, 0, 1000), 101);      // the first look is where it begins
     EXPECT_EQ(steps_taken(2e-5, 0, 1000), 1000);     // a thousandth of the time in 50 steps
     EXPECT_EQ(steps_taken(1e-6, 2e-5, 1000), 1000);  // a tenth of the accuracy in 50 steps
     EXPECT_EQ(steps_taken(1e-6, 5e-6, 1000), 101);   // in 200
 }
 
-TEST(StallDetector, FollowsASingularity) {
+TEST(Stall, FollowsASingularity) {
     // Steps of 1/125 of what is left until t = 1, as near a pinch-off asked for 1e-4; the energy falls with the root.
-    StallDetector stall;
+    Stall stall(100, 1e-3, 1e-4, "");
     for (int i = 0; i < 1500; ++i) {
         const double left = std::pow(1 - 1.0 / 125, i);
-        ASSERT_FALSE(stall.look(1 - left, left / 125, 1e-3, std::sqrt(left), 1e-4)) << "left: " << left;
+        ASSERT_FALSE(stall.look(1 - left, left / 125, std::sqrt(left))) << "left: " << left;
     }
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/case/read.hpp"
 #include "surface3d/run/run.hpp"
+#include "tests/support/summary_detail.hpp"
 
 namespace tubule::surface3d {
 
@@ -52,13 +53,6 @@ struct Outcome {
     }
     double last(const std::string& name) const { return series(name).back(); }
 };
-
-// A whole number of the summary, -1 where it has none of this name.
-inline std::int64_t detail(const RunSummary& s, const std::string& name) {
-    for (const auto& [key, value] : s.details)
-        if (key == name) return std::get<std::int64_t>(value);
-    return -1;
-}
 
 inline Outcome begin(const std::string& text, const std::vector<std::string>& sets) {
     return {parse_case("tier = \"surface3d\"\n" + text, sets, "case.toml"), {}, {}};

@@ -1,5 +1,5 @@
 // Surfaces that come to rest: motions whose distance to rest is known at every time.
-#include "common/run/settling.hpp"
+#include "common/run/stationarity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -29,42 +29,42 @@ double dissipation(double a, double t) {
     return speed * speed * area;
 }
 
-TEST(Settling, WaitsUntilTheDistanceIsSmall) {
+TEST(Stationarity, WaitsUntilTheDistanceIsSmall) {
     Case c = case_with(1e-4);  // distances of 0.01
     c.time.end = 100;
-    Settling settling;
+    Stationarity settling(c);
     double settled_at = -1;
     for (double t = 0; t < 100 && settled_at < 0; t += 0.5)
-        if (settling.is_settled(c, t, dissipation(0.034, t), area)) settled_at = t;
+        if (settling.is_settled(t, dissipation(0.034, t), area)) settled_at = t;
     EXPECT_NEAR(settled_at, 10 * std::log(3.4), 0.5);
 }
 
-TEST(Settling, NoiseOfTheSpeedIsNoRest) {
+TEST(Stationarity, NoiseOfTheSpeedIsNoRest) {
     Case c = case_with(1e-4);
     c.time.end = 100;
-    Settling settling;
+    Stationarity settling(c);
     for (int i = 0; i < 1000; ++i)  // 1e-3 of it, from step to step
-        EXPECT_FALSE(settling.is_settled(c, 0.01 * i, dissipation(0.034, 0.01 * i) * (1 + 0.002 * (i % 2)), area)) << i;
+        EXPECT_FALSE(settling.is_settled(0.01 * i, dissipation(0.034, 0.01 * i) * (1 + 0.002 * (i % 2)), area)) << i;
 }
 
-TEST(Settling, NothingSettlesThatDoesNotSlowDown) {
+TEST(Stationarity, NothingSettlesThatDoesNotSlowDown) {
     const Case c = case_with(1e-4);
-    Settling settling;
-    EXPECT_FALSE(settling.is_settled(c, 0, 1e-8, area));  // how it changes is unknown as yet
-    EXPECT_FALSE(settling.is_settled(c, 1, 1e-8, area));
-    EXPECT_FALSE(settling.is_settled(c, 30, 1e-8, area));
-    EXPECT_TRUE(settling.is_settled(c, 60, 1e-8, area));
-    EXPECT_TRUE(settling.is_settled(c, 90, 2e-8, area));
-    EXPECT_TRUE(settling.is_settled(c, 91, 0, area));
+    Stationarity settling(c);
+    EXPECT_FALSE(settling.is_settled(0, 1e-8, area));  // how it changes is unknown as yet
+    EXPECT_FALSE(settling.is_settled(1, 1e-8, area));
+    EXPECT_FALSE(settling.is_settled(30, 1e-8, area));
+    EXPECT_TRUE(settling.is_settled(60, 1e-8, area));
+    EXPECT_TRUE(settling.is_settled(90, 2e-8, area));
+    EXPECT_TRUE(settling.is_settled(91, 0, area));
 }
 
-TEST(Settling, NoFartherThanUntilTheEnd) {
+TEST(Stationarity, NoFartherThanUntilTheEnd) {
     Case c = case_with(1e-4);
     c.time.end = 0.6;  // at a speed of 0.0034, less than 0.01
-    Settling settling;
-    settling.is_settled(c, 0, dissipation(0.034, 0), area);
-    settling.is_settled(c, 0.5, dissipation(0.034, 0.5), area);
-    EXPECT_TRUE(settling.is_settled(c, 0.55, dissipation(0.034, 0.55), area));
+    Stationarity settling(c);
+    settling.is_settled(0, dissipation(0.034, 0), area);
+    settling.is_settled(0.5, dissipation(0.034, 0.5), area);
+    EXPECT_TRUE(settling.is_settled(0.55, dissipation(0.034, 0.55), area));
 }
 
 TEST(ErrorScale, IsTheEnergyOfTheStartWhereTheCaseHasItSo) {

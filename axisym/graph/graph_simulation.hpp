@@ -1,46 +1,55 @@
-// One run of a graph with settings as given: steps, remeshing, its error, and the reason why it ends.
+// One run of a graph with settings as given: steps, meshes, its error, events.
 #pragma once
 
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "axisym/graph/graph_error.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "axisym/graph/graph_guards.hpp"
 #include "axisym/graph/graph_series.hpp"
 #include "axisym/graph/graph_stage.hpp"
+#include "axisym/integration/effort.hpp"
 #include "axisym/integration/flow.hpp"
-#include "axisym/integration/run_summary.hpp"
 #include "axisym/integration/step_integral.hpp"
-#include "common/run/output_times.hpp"
-#include "common/run/run_output.hpp"
-#include "common/run/settling.hpp"
+#include "common/run/simulation.hpp"
 
 namespace tubule::axisym {
 
-// Many fields: what the run is given, its state and its guards; the error, the mesh and the output have classes of
-// their own.
-class GraphAttempt {
+// Many fields: the settings, the state and its limits; the error and the mesh have classes of their own.
+class GraphSimulation : public Simulation {
 public:
-    // All references must outlive the attempt.
-    GraphAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const GraphSettings& settings);
+    // All references must outlive it. From the initial shape, or resumed from a frame or checkpoint.
+    GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings);
+    GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings, const Record& restart);
 
-    // One of the first two, then go().
-    void begin();
-    void resume(const Record& restart);
-    void go();
+    double time() const override { return flow_->time(); }
+    double step_size() const override { return flow_->step_size(); }
+    Energetics energetics() const override;
+    std::unique_ptr<StateView> at(double t) override;
+    std::optional<StopReport> check_start() override;
+    std::optional<StopReport> advance(double until) override;
+    std::optional<StopReport> update_error() override;
+    void write_path(double from, double until, RunOutput& out) override;
+    void accept() override;
+    std::optional<StopReport> find_event(bool at_output) override;
+    std::optional<StopReport> check_error() override;
+    std::optional<StopReport> adapt_mesh() override;
+    StopReport failure(const SolveError& error) override { return failure(std::string(error.what())); }
+    void summarise() override;
 
-    RunSummary summary;
     bool gave_up = false;  // its error exceeds the accuracy asked, and finer settings would help
     const ErrorTransport::EnergyError& latest_error() const { return error_.latest; }
 
 private:
+    struct State;
+    struct View;
     // Before the present flow began.
     struct Past {
         double energy_start = 0, dissipated = 0;
         FlowCounters counters;
-        Settling settling;
     };
     // The last good state.
     struct Good {
@@ -59,31 +68,23 @@ private:
     };
 
     const Observation& observe(double t, const double* x, const double* v);
+    const Observation& observe() { return observe(flow_->time(), flow_->x(), flow_->v()); }
     void use_stage(std::unique_ptr<GraphStage> stage);
     FlowSystem system();
     bool is_one_step() const { return settings_.one_step; }
     void make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
+    void return_to_good();
 
-    std::optional<StopReport> step();
-    bool must_give_up(const Observation& o);
-    std::optional<StopReport> find_rise(const Observation& o);
-    std::optional<StopReport> check(Flow::Outcome outcome, const Observation& o);
-    std::optional<StopReport> find_lost_accuracy(double t) const;
-    std::optional<StopReport> check_start() const;
-    GraphLimits limits() const;
-
-    std::optional<StopReport> remesh();
     std::optional<StopReport> recover();
+    std::optional<StopReport> find_rise(const Observation& o);
+    std::optional<StopReport> give_up_if_curable();
+    GraphLimits limits() const;
+    std::optional<StopReport> remesh();
     StopReport failure(const std::string& what) const;
     std::string suspects() const;
 
     double least_error() const;
-    void end_with(const StopReport& stop);
-    void write_outputs(double from, double error, const Observation& o);
-    void write_path(double from, double until, double error);
-    void write(double t, double error, const Observation& o, const double* x, const double* v);
-    void write_row(double t, double error, const Observation& o, const double* x);
-    Record record(double t, const Observation& o, const double* x, const double* v) const;
+    std::vector<double> row(double t, double error, const Observation& o, const double* x, double wall_seconds) const;
     // IDA integrates less exactly than it steps.
     double dissipated(double t) const {
         return past_.dissipated + (is_one_step() ? flow_->dissipated(t) : dissipated_.at(t));
@@ -93,16 +94,17 @@ private:
     const RunClock& clock_;
     const SeriesTable<GraphRow> series_;
     GraphSettings settings_;
-    RunOutput out_;
-    OutputTimes outputs_;
     std::unique_ptr<GraphStage> stage_;
     std::unique_ptr<Flow> flow_;
+    Flow::Outcome outcome_ = Flow::Outcome::step;  // of the last step
     Now now_;
     std::vector<std::pair<double, Observation>> seen_;  // on the way of the last step, by time
     StepIntegral dissipated_;                           // since the present flow began
     GraphError error_;
+    double error_before_ = 0;  // at the begin of the last step
     Past past_;
     Good good_;
+    int meshes_ = 1;
     double remesh_margin_;
     std::optional<double> least_symbol_;  // of a flow that is well-posed
 };

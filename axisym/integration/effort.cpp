@@ -1,17 +1,17 @@
-#include "axisym/integration/run_summary.hpp"
+#include "axisym/integration/effort.hpp"
 
 #include <fmt/format.h>
 
 namespace tubule::axisym {
 
-void describe_effort(RunSummary& s) {
-    const FlowCounters& n = s.counters;
+void describe(const Effort& effort, RunSummary& s) {
+    const FlowCounters& n = effort.counters;
     s.effort = fmt::format("{} steps, {} elements", n.steps, s.elements);
-    s.details = {{"integrator", s.integrator},
+    s.details = {{"integrator", effort.integrator},
                  {"attempts", std::int64_t{s.attempts}},
-                 {"meshes", std::int64_t{s.meshes}},
+                 {"meshes", std::int64_t{effort.meshes}},
                  {"elements", std::int64_t{s.elements}},
-                 {"time_tolerance", s.time_tolerance},
+                 {"time_tolerance", effort.time_tolerance},
                  {"steps", std::int64_t{n.steps}},
                  {"residuals", std::int64_t{n.residuals}},
                  {"jacobians", std::int64_t{n.jacobians}},

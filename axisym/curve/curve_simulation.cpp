@@ -1,4 +1,4 @@
-#include "axisym/curve/curve_attempt.hpp"
+#include "axisym/curve/curve_simulation.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 #include "axisym/curve/curve_series.hpp"
 #include "axisym/integration/bdf_flow.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/error_scale.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -22,6 +21,7 @@ constexpr double start_steps = 40;                 // over which steps grow wher
 constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
 constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
 constexpr int few_steps = 8;
+const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
 constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
 
 // How often the integrator has begun by this time: at the start, and at each kink of the loads.
@@ -33,20 +33,53 @@ int beginnings(const MotionLaw& law, double t) {
 
 }  // namespace
 
-CurveAttempt::CurveAttempt(const Case& c, RunObserver& watch, const RunClock& clock, const Beginning& start,
-                           const CurveSettings& settings, const EndedRun* coarser)
-    : setup_(c, start, settings),
-      clock_(clock),
-      coarser_(coarser),
-      out_(watch, clock, !settings.is_coarser),
-      outputs_(c) {
+// A state at one time, with what has dissipated and what loads that change have done until then.
+struct CurveSimulation::View : StateView {
+    const CurveSimulation& run;
+    double t, dissipated, work;
+    Eigen::VectorXd y, rate;
+    Snapshot s;
+
+    View(const CurveSimulation& r, double time, double lost, double done, const Eigen::VectorXd& unknowns,
+         const Eigen::VectorXd& rates, const Snapshot& measured)
+        : run(r), t(time), dissipated(lost), work(done), y(unknowns), rate(rates), s(measured) {}
+
+    std::vector<double> row(double wall_seconds) const override {
+        const double defect = s.total() - run.past_.total_start + dissipated - work;
+        return run.setup_.series.values({t, s, y.data(), *run.setup_.motion, *run.flow_, defect, work, run.error_now_,
+                                         run.summary.elements, wall_seconds});
+    }
+
+    Record record() const override {
+        const CurveSetup& setup = run.setup_;
+        const CurveRestart state{setup.space->splines().breaks(),
+                                 y,
+                                 rate,
+                                 setup.settings,
+                                 run.past_.total_start,
+                                 dissipated,
+                                 run.error,
+                                 run.summary.reference_energy,
+                                 run.least_symbol,
+                                 work,
+                                 run.mesh_need};
+        Record out = curve_record(t, *setup.motion, state, s.o.energy);
+        add_to_record(out, run.trace, run.coarser_);
+        return out;
+    }
+};
+
+CurveSimulation::~CurveSimulation() = default;
+
+CurveSimulation::CurveSimulation(const Case& c, const Beginning& start, const CurveSettings& settings,
+                                 const EndedRun* coarser)
+    : setup_(c, start, settings), coarser_(coarser) {
     summary.reference_energy = setup_.reference_energy;
     summary.elements = setup_.elements();
-    summary.time_tolerance = settings.tolerance;
     summary.attempts = settings.pair;
 }
 
-const Snapshot& CurveAttempt::observe(double t, const double* y, const double* rate) {
+const Snapshot& CurveSimulation::observe(double t, const double* y, const double* rate) {
     if (t != observed_at_) {
         now_ = measure(*setup_.motion, t, y, rate);
         observed_at_ = t;
@@ -54,28 +87,26 @@ const Snapshot& CurveAttempt::observe(double t, const double* y, const double* r
     return now_;
 }
 
-void CurveAttempt::begin() {
+void CurveSimulation::begin() {
     CurveBegin at;
     try {
         at = begin_state(setup_);
     } catch (const SolveError& error) {
         at = given_state(setup_);
-        stop_ = StopReport{Stop::solver_failed, 0, error.what(),
-                           "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
+        initial_stop_ =
+            StopReport{Stop::solver_failed, 0, error.what(),
+                       "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
     }
     make_flow(at.y, at.rate, at.time, at.first_step);
     const Snapshot s = setup_.initial_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
     past_.total_start = s.total();
     past_.least = past_.total_start;
-    out_.note(doubt_before(setup_.c, s.free_energy, summary.reference_energy));
-    out_.note(setup_.start.note);
     compare(0, s);
     trace.add(0, s.free_energy, 0);
     add_to_trace(at.time);
-    write_row(0, s, at.shown.data());
-    write_frame(0, s, at.shown.data(), at.rate.data());
-    if (!stop_) stop_ = find_event(s, 0);
-    if (stop_) now_ = s;
+    initial_ = std::make_unique<View>(*this, 0, 0, 0, at.shown, at.rate, s);
+    if (!initial_stop_) initial_stop_ = find_guard(s, 0);
+    if (initial_stop_) now_ = s;
     // In the time of the steps that lead from the curve to the first unknowns, changing loads do work at this shape;
     // the rest of the difference dissipates.
     const auto at_loads = [&](double t) {
@@ -83,9 +114,10 @@ void CurveAttempt::begin() {
     };
     past_.work = at_loads(at.time) - at_loads(0);
     past_.dissipated = past_.total_start + past_.work - now_.total();
+    look_at_mesh();
 }
 
-void CurveAttempt::resume(const Record& restart) {
+void CurveSimulation::resume(const Record& restart) {
     const CurveRestart state = curve_restart(restart);
     past_.total_start = state.total_start, past_.dissipated = state.dissipated, past_.work = state.work;
     error = state.error;
@@ -93,14 +125,39 @@ void CurveAttempt::resume(const Record& restart) {
     mesh_need = state.mesh_need;
     summary.reference_energy = state.reference_energy;
     trace = pair_memory(restart).own;
-    outputs_.go_on_from(restart.time);
-    out_.go_on_from(restart.time);
     make_flow(state.y, state.rate, restart.time, 0);
     past_.least = now_.total() - past_.work;
     add_to_trace(restart.time);
+    look_at_mesh();
 }
 
-void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step) {
+Energetics CurveSimulation::energetics() const {
+    const Snapshot& s = initial_ ? initial_->s : now_;
+    return {.bending = s.o.energy,
+            .free_energy = s.free_energy,
+            .total = s.total() - work(flow_->time()),
+            .start = past_.total_start,
+            .least = past_.least,
+            .kinetic = s.balance.kinetic,
+            .dissipation = s.balance.dissipation,
+            .acceleration = s.balance.acceleration,
+            .area = s.o.area};
+}
+
+std::unique_ptr<StateView> CurveSimulation::at(double t) {
+    if (initial_ && t == 0) return std::make_unique<View>(*initial_);
+    const int n = setup_.motion->layout().size;
+    if (t == flow_->time())
+        return std::make_unique<View>(*this, t, dissipated(t), work(t),
+                                      Eigen::Map<const Eigen::VectorXd>(flow_->x(), n),
+                                      Eigen::Map<const Eigen::VectorXd>(flow_->v(), n), now_);
+    Eigen::VectorXd y(n), rate(n);
+    flow_->interpolate(t, y.data(), rate.data());
+    return std::make_unique<View>(*this, t, dissipated(t), work(t), y, rate,
+                                  measure(*setup_.motion, t, y.data(), rate.data()));
+}
+
+void CurveSimulation::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step) {
     FlowSystem system = setup_.system();
     system.dissipation = [this](double t, const double* at, const double* v) {
         return observe(t, at, v).balance.dissipation;
@@ -123,19 +180,21 @@ void CurveAttempt::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& ra
     keep_good();
 }
 
-// From another state, or with loads that change at another rate.
-void CurveAttempt::restart_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time) {
+// From the last good state, with its loads.
+void CurveSimulation::restart_flow() {
+    const Eigen::VectorXd y = past_.y, rate = past_.rate;
+    const double time = past_.time;
     past_.dissipated = dissipated(time), past_.work = work(time);
     past_.counters = counters();
     make_flow(y, rate, time, 0);
 }
 
-FlowCounters CurveAttempt::counters() const {
+FlowCounters CurveSimulation::counters() const {
     FlowCounters out = past_.counters;
     return out += flow_->counters();
 }
 
-void CurveAttempt::add_to_trace(double t) {
+void CurveSimulation::add_to_trace(double t) {
     const MotionLaw& law = setup_.motion->law();
     const Loads loads = loads_at(law, t);
     const Eigen::VectorXd gradient = setup_.motion->forms().gradient(
@@ -148,63 +207,58 @@ void CurveAttempt::add_to_trace(double t) {
         gradient.dot(moves) - loads.force * lengthens + past_.rates.energy(now_.o.area, now_.o.volume, now_.period));
 }
 
-// Bound of the change of the energy until the end, from the present dissipation, kinetic energy and acceleration.
-double CurveAttempt::what_may_change(double t) const {
-    const double left = setup_.c.time.end - t;
-    return std::max({now_.balance.dissipation * left, now_.balance.kinetic, now_.balance.acceleration * left * left});
-}
-
-void CurveAttempt::look_at_mesh() {
+void CurveSimulation::look_at_mesh() {
     std::vector<double> lost;
     setup_.motion->forms().observe(setup_.curve(flow_->x()), &lost);
     mesh_need.add(setup_.space->splines(), lost);
 }
 
-std::optional<StopReport> CurveAttempt::check(double t) {
-    const std::optional<double> stationary = setup_.c.time.stationary;
-    if (auto pause = clock_.find_pause(t)) return pause;
-    const bool loads_rest = next_kink(setup_.motion->law(), t) == HUGE_VAL;
-    if (stationary && loads_rest && past_.settling.is_settled(setup_.c, t, now_.balance.dissipation, now_.o.area) &&
-        what_may_change(t) < *stationary * summary.reference_energy)
-        return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
-    if (flow_->counters().steps % steps_between_looks != 0) return std::nullopt;
+// At intervals, since it takes long; not at the end, which no longer needs a mesh.
+std::optional<StopReport> CurveSimulation::find_event(bool) {
+    const double t = flow_->time();
+    if (outcome_ == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(now_, t);
+    const bool due = at_kink_ || flow_->counters().steps % steps_between_looks == 0;
+    if (outcome_ == Flow::Outcome::end || !due) return std::nullopt;
     look_at_mesh();
     return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
 }
 
-std::optional<StopReport> CurveAttempt::step() {
-    const double end = setup_.c.time.end, kink = next_kink(setup_.motion->law(), flow_->time());
-    Flow::Outcome outcome = flow_->advance(std::min(kink, end));
+std::optional<StopReport> CurveSimulation::advance(double until) {
+    initial_.reset();
+    if (at_kink_) restart_flow();
+    outcome_ = flow_->advance(std::min(next_kink(setup_.motion->law(), flow_->time()), until));
     const double t = flow_->time();
-    const bool at_kink = outcome == Flow::Outcome::end && t < end;
-    if (at_kink) outcome = Flow::Outcome::step;
-    if (auto stall = stall_.after_step(t, flow_->step_size(), end)) return stall;
-    if (outcome == Flow::Outcome::failed && may_be_undefined(now_.o.domain))
+    at_kink_ = outcome_ == Flow::Outcome::end && t < until;
+    if (at_kink_) outcome_ = Flow::Outcome::step;
+    if (outcome_ == Flow::Outcome::failed && may_be_undefined(now_.o.domain))
         return undefined_energy(now_.o.domain, t, fmt::format("s = {:.4g}", now_.o.domain.place));
-    if (outcome == Flow::Outcome::failed)
+    if (outcome_ == Flow::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
-                          "try another accuracy, discretisation.elements or parametrisation"};
-    if (outcome == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    const Snapshot s = observe(t, flow_->x(), flow_->v());
-    if (auto rise = find_rise(s)) return rise;
-    least_symbol = std::min(least_symbol, s.o.symbol);
+                          another_resolution};
+    if (outcome_ == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    return find_rise(observe(t, flow_->x(), flow_->v()));
+}
+
+std::optional<StopReport> CurveSimulation::update_error() {
+    const double t = flow_->time();
+    least_symbol = std::min(least_symbol, now_.o.symbol);
     add_to_trace(t);
-    compare(t, s);
-    write_outputs(t);
-    write_row(t, s, flow_->x());
-    out_.progress(t, s.o.energy, flow_->step_size());
-    if (outcome == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(s, t);
-    if (outcome == Flow::Outcome::end) return StopReport{Stop::finished, t, "reached time.end", ""};
-    keep_good();
-    if (at_kink) restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), t);
-    out_.safeguard([this] { return record(); });
-    return check(t);
+    compare(t, now_);
+    return std::nullopt;
+}
+
+StopReport CurveSimulation::failure(const SolveError& what) {
+    return {Stop::solver_failed, flow_->time(), what.what(), another_resolution};
+}
+
+void CurveSimulation::summarise() {
+    describe({.time_tolerance = setup_.settings.tolerance, .counters = counters()}, summary);
 }
 
 // Of the difference of a pair: the smaller the more steps the tolerance has limited, as steps that only grow are alike
 // in both. Where the finer run has had fewer limited steps than the coarser one, what both had in common while their
 // steps grew may be most of their errors: an instability that it has set going amplifies it.
-double CurveAttempt::share(double t) const {
+double CurveSimulation::share(double t) const {
     const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
               other = coarser_->trace.limited_steps(step_growth_of(coarser(setup_.settings)), t);
     if (other >= few_steps && own < alike * other) return share_if_alike;
@@ -215,7 +269,7 @@ double CurveAttempt::share(double t) const {
 // The error is a share of the difference from the coarser run, or a part of the energy that is unaccounted for, as the
 // runs of a pair may have errors of their steps in common. That part is often too large: it alone never asks for a
 // finer run.
-void CurveAttempt::compare(double t, const Snapshot& s) {
+void CurveSimulation::compare(double t, const Snapshot& s) {
     if (!coarser_) return;
     const bool given = settings_given(setup_.c);
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
@@ -229,14 +283,14 @@ void CurveAttempt::compare(double t, const Snapshot& s) {
 // No law of motion lets the total energy, less the work of loads that change, rise: what it rises by is an error. Where
 // that is larger than the errors asked for and known, or the shape is none of a membrane, the run goes back to the last
 // good step.
-std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
-    const bool asked = out_.reported() && !settings_given(setup_.c);
+std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
+    const bool asked = !setup_.settings.is_coarser && !settings_given(setup_.c);
     const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
                  hopeless = hopeless_rise * summary.reference_energy,
                  wanted = setup_.c.accuracy.energy * summary.reference_energy,
                  allowed = asked ? std::max(wanted, std::min(error, hopeless)) : hopeless;
     if (!is_admissible(s) || !(rise <= allowed)) {
-        restart_flow(Eigen::VectorXd(past_.y), Eigen::VectorXd(past_.rate), past_.time);
+        restart_flow();
         return StopReport{
             Stop::resolution_lost, past_.time,
             fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
@@ -248,7 +302,7 @@ std::optional<StopReport> CurveAttempt::find_rise(const Snapshot& s) {
     return std::nullopt;
 }
 
-void CurveAttempt::keep_good() {
+void CurveSimulation::keep_good() {
     const int n = setup_.motion->layout().size;
     past_.y = Eigen::Map<const Eigen::VectorXd>(flow_->x(), n);
     past_.rate = Eigen::Map<const Eigen::VectorXd>(flow_->v(), n);
@@ -256,81 +310,14 @@ void CurveAttempt::keep_good() {
 }
 
 // IDA sees only guards that change their sign later.
-std::optional<StopReport> CurveAttempt::check_start() {
-    const double t = flow_->time();
-    if (outputs_.done()) return StopReport{Stop::finished, t, "reached time.end", ""};
-    auto event = find_event(now_, t);
-    if (event) write_row(t, now_, flow_->x());
-    return event;
+std::optional<StopReport> CurveSimulation::check_start() {
+    return initial_stop_ ? initial_stop_ : find_guard(now_, flow_->time());
 }
 
-std::optional<StopReport> CurveAttempt::find_event(const Snapshot& s, double t) const {
+std::optional<StopReport> CurveSimulation::find_guard(const Snapshot& s, double t) const {
     for (const CurveGuard& guard : curve_guards())
         if (!(guard.value(s, setup_.c.accuracy.r_min) > 0)) return guard.report(s, t);
     return std::nullopt;
-}
-
-void CurveAttempt::go() {
-    look_at_mesh();
-    std::optional<StopReport> stop = stop_ ? stop_ : check_start();
-    try {
-        while (!stop) stop = step();
-    } catch (const Paused& pause) {
-        stop = pause_report(pause, flow_->time());
-    }
-    summary.stop = *stop;
-    summary.energy = now_.o.energy;
-    if (const std::string doubt = doubt_after(setup_.c, stop->reason, past_.total_start,
-                                              now_.total() - work(flow_->time()), summary.reference_energy);
-        !doubt.empty())
-        summary.warnings.push_back(doubt);
-    summary.counters = counters();
-    out_.end(*stop, stop_ ? 0 : flow_->time(), [this] { return record(); });
-    describe_effort(summary);
-}
-
-void CurveAttempt::write_outputs(double until) {
-    while (outputs_.due(until)) {
-        const double t = outputs_.pass();
-        if (t == until) {
-            write_row(t, now_, flow_->x());
-            write_frame(t, now_, flow_->x(), flow_->v());
-        } else if (out_.reported()) {
-            Eigen::VectorXd y(setup_.motion->layout().size), rate(y.size());
-            flow_->interpolate(t, y.data(), rate.data());
-            const Snapshot between = measure(*setup_.motion, t, y.data(), rate.data());
-            write_row(t, between, y.data());
-            write_frame(t, between, y.data(), rate.data());
-        }
-    }
-}
-
-void CurveAttempt::write_row(double t, const Snapshot& s, const double* y) {
-    if (!out_.wants_row(t)) return;
-    out_.row(t, setup_.series.values({t, s, y, *setup_.motion, *flow_, defect(t, s), work(t), error_now_,
-                                      summary.elements, out_.seconds()}));
-}
-
-void CurveAttempt::write_frame(double t, const Snapshot& s, const double* y, const double* rate) {
-    out_.frame(t, [&] { return record(t, s, y, rate); });
-}
-
-Record CurveAttempt::record(double t, const Snapshot& s, const double* y, const double* rate) const {
-    const int n = setup_.motion->layout().size;
-    const CurveRestart state{setup_.space->splines().breaks(),
-                             Eigen::Map<const Eigen::VectorXd>(y, n),
-                             Eigen::Map<const Eigen::VectorXd>(rate, n),
-                             setup_.settings,
-                             past_.total_start,
-                             dissipated(t),
-                             error,
-                             summary.reference_energy,
-                             least_symbol,
-                             work(t),
-                             mesh_need};
-    Record out = curve_record(t, *setup_.motion, state, s.o.energy);
-    add_to_record(out, trace, coarser_);
-    return out;
 }
 
 }  // namespace tubule::axisym

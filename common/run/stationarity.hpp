@@ -1,0 +1,31 @@
+// Ends a run that has come to rest (time.stationary): its energy may be flat while the membrane still moves.
+#pragma once
+
+#include "common/case/case.hpp"
+#include "common/run/simulation.hpp"
+
+namespace tubule {
+
+// The energy is quadratic in the distance to a minimum and nearly flat along a soft mode: time.stationary = e allows
+// distances of sqrt(e) times the size of the membrane, and changes of the energy of e E_ref.
+class Stationarity : public Callback {
+public:
+    // The case must outlive it.
+    explicit Stationarity(const Case& c) : case_(c), law_(motion_law(c.model)) {}
+
+    std::optional<StopReport> after_step(const Simulation& run) override;
+    void save(Record& record) const override;
+    void restore(const Record& record) override;
+
+    // Whether the membrane will move by no more than that until the end, if its speed (from the dissipation) goes on to
+    // fall at its present rate. Call it after every step. True where the speed does not fall: waiting would not help.
+    bool is_settled(double time, double dissipation, double area);
+
+private:
+    const Case& case_;
+    MotionLaw law_;
+    double since_ = 0, speed_since_ = -1;  // where the measurement of the rate began; -1: not yet
+    double rate_ = 0, rate_is_known_ = 0;  // measured last; 1 once it was measured
+};
+
+}  // namespace tubule
