@@ -1,10 +1,9 @@
 #include "axisym/run.hpp"
 
-#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_run.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "axisym/graph/graph_run.hpp"
-#include "common/run/run_pairs.hpp"
 
 namespace tubule::axisym {
 
@@ -14,7 +13,7 @@ std::vector<std::string> series_names(const Case& c) {
 
 void check_restart(const Record& record) {
     if (kind_of(record) == RecordKind::curve)
-        curve_restart(record), pair_memory(record);
+        curve_restart(record), CoarserCurve::check_restart(record);
     else
         graph_restart(record);
 }

@@ -27,6 +27,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_least_symbol", s.least_symbol), f.number("restart_work", s.work);
     f.array("restart_density", s.settings.density), f.number("restart_excess", s.settings.excess);
     f.number("restart_lost", s.mesh_need.lost), f.array("restart_wanted", s.mesh_need.wanted);
+    EnergyTrace::fields(f, s.trace, "restart_trace");
 }
 
 // One point of the profile, with curvatures and flow.
@@ -120,9 +121,17 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     return out;
 }
 
+Record state_record(double time, const CurveRestart& state) {
+    Record out;
+    out.time = time, out.kind = RecordKind::curve;
+    restart_fields(RecordWriter(out), state);
+    return out;
+}
+
 CurveRestart curve_restart(const Record& record) {
     CurveRestart s;
     restart_fields(RecordReader(record, RecordKind::curve), s);
+    s.trace.cut_after(record.time);
     return s;
 }
 

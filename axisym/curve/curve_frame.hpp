@@ -6,6 +6,7 @@
 #include "axisym/curve/curve_start.hpp"
 #include "common/case/case.hpp"
 #include "common/result/result.hpp"
+#include "common/run/energy_trace.hpp"
 
 namespace tubule::axisym {
 
@@ -17,6 +18,7 @@ struct CurveRestart {
     double total_start = 0, dissipated = 0, error = 0, reference_energy = 0, least_symbol = 0;
     double work = 0;  // of loads that have changed
     MeshNeed mesh_need;
+    EnergyTrace trace;
 };
 
 // Numbers energy, length (of a period, or 0), velocities without the part (L_t/L) z e_z of a period L that is free;
@@ -24,6 +26,9 @@ struct CurveRestart {
 // flow u_t (along the profile, in the order of the points), p (pressure), u_theta (if it swirls), H0 (if it varies);
 // the restart state under names that begin with restart_.
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy);
+
+// The restart state alone.
+Record state_record(double time, const CurveRestart& state);
 
 // Throws as RecordReader.
 CurveRestart curve_restart(const Record& record);

@@ -3,17 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
 
-#include "axisym/curve/curve_simulation.hpp"
-#include "common/run/loop.hpp"
-#include "common/run/stall.hpp"
+#include "axisym/curve/coarser_curve.hpp"
+#include "common/run/driver.hpp"
 
 namespace tubule::axisym {
 namespace {
 
-constexpr int most_failures = 2;    // pairs of runs that fail, after which nothing else is tried
-constexpr int most_stalled = 2000;  // steps, shorter than this part of the end
-constexpr double tiny_step = 1e-9;
+constexpr int most_failures = 2;        // pairs of runs that fail, after which nothing else is tried
 constexpr double share_of_mesh = 1e-4;  // of the error allowed: what any state may lose to the mesh
 constexpr double too_early = 1e-6;      // of time.end: runs that fail so soon say nothing of each other's error
 
@@ -34,7 +34,9 @@ bool may_be_ill_posed(const Bending& energy, double coarse, double fine) {
     return symbol_may_vanish(energy) && fine < 2 * std::abs(coarse - fine);
 }
 
-class CurveRuns : public PairedRuns {
+// Errors estimated by pairs of runs: the energies of a coarser run tell the error of the finer one, which is reported.
+// Where that is more than asked, the finer run becomes the coarser one of the next pair.
+class CurveRuns : public EstimatedRuns {
 public:
     CurveRuns(const Case& c, RunObserver& watch, const RunClock& clock, const Record* restart)
         : case_(c),
@@ -42,37 +44,28 @@ public:
           clock_(clock),
           restart_(restart),
           start_(beginning_of(c)),
-          settings_(settings_for(c, start_, first_settings(c, start_.images()))) {
-        if (!restart) return;
-        begun_ = curve_restart(*restart).settings;
-        if (!begun_->is_coarser) settings_ = *begun_;
-    }
+          settings_(restart ? curve_restart(*restart).settings
+                            : settings_for(c, start_, first_settings(c, start_.images()))) {}
 
-    void show_start() override {
-        make(settings_, nullptr).begin();
-        loop().begin(start_.note);
-    }
-    RunSummary& run_coarser() override { return run(coarser(settings_), nullptr); }
-    RunSummary& run_reported(const EndedRun& coarser) override { return run(settings_, &coarser); }
-    EndedRun ended() override { return {run_->trace, run_->summary.stop, run_->least_symbol}; }
-
-    double error(const EndedRun& other) override {
-        RunSummary& s = run_->summary;
-        if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
-            s.warnings.emplace_back("too few elements for a coarser run to compare with: the error is unknown");
-        else if (!comparable(other.stop, s.stop, case_.time.end))
-            s.warnings.push_back(
-                fmt::format("the coarser run of the pair ended at t = {:.6g} with {}: the error is unknown",
-                            other.stop.time, name(other.stop.reason)));
-        else if (kind_of(s.stop.reason).exit_code == 0 &&
-                 may_be_ill_posed(case_.energy, other.least_symbol, run_->least_symbol))
-            s.warnings.push_back(fmt::format(
-                "the principal symbol fell to {:.2g}, in the coarser run of the pair to {:.2g}: the flow may be "
-                "ill-posed, and the error is unknown",
-                run_->least_symbol, other.least_symbol));
+    RunSummary& next() override {
+        const Record* restart = std::exchange(restart_, nullptr);
+        if (restart)
+            coarser_ = std::make_unique<CoarserCurve>(case_, start_, clock_, *restart);
+        else if (!coarser_)
+            coarser_ = std::make_unique<CoarserCurve>(case_, start_, clock_, coarser(settings_));
+        run_ = std::make_unique<CurveSimulation>(case_, start_, settings_, coarser_.get());
+        if (restart)
+            run_->resume(*restart);
         else
-            return run_->error;
-        return s.reference_energy;
+            run_->begin();
+        Loop loop = loop_of(*run_, case_, watch_, clock_);
+        if (restart)
+            loop.resume(*restart);
+        else
+            loop.begin(start_.note);
+        loop.go();
+        judge();
+        return run_->summary;
     }
 
     bool refine(const RunSummary& last) override {
@@ -89,6 +82,7 @@ public:
         } else
             settings_ = finer(settings_, mesh_growth(excess));
         settings_.excess = last.error_is_known() ? excess : CurveSettings{}.excess;
+        coarser_ = std::make_unique<CoarserCurve>(case_, std::move(run_));
         return true;
     }
 
@@ -97,15 +91,29 @@ public:
     }
 
 private:
-    CurveSimulation& make(const CurveSettings& settings, const EndedRun* coarser) {
-        return run_.emplace(case_, start_, settings, coarser);
-    }
-
-    Loop loop() {
-        Loop out(*run_, case_, watch_, clock_, run_->is_reported());
-        out.add(std::make_unique<Stall>(most_stalled, tiny_step * case_.time.end, case_.accuracy.energy,
-                                        "try another accuracy, discretisation.elements or parametrisation"));
-        return out;
+    // The stated error. The coarser run goes to its end first: only ends that are alike can be compared.
+    void judge() {
+        RunSummary& s = run_->summary;
+        if (!can_go_on(s.stop.reason)) coarser_->lead_to(HUGE_VAL);
+        const StopReport other = coarser_->stop().value_or(StopReport{s.stop.reason, s.stop.time, "", ""});
+        s.estimated_error = s.reference_energy > 0 ? run_->error / s.reference_energy : 1;
+        const auto unknown = [&](const std::string& why) {
+            s.warnings.push_back(why + ": the error is unknown");
+            s.estimated_error = 1;
+        };
+        if (can_go_on(other.reason))
+            s.stop = other;
+        else if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
+            unknown("too few elements for a coarser run to compare with");
+        else if (!comparable(other, s.stop, case_.time.end))
+            unknown(
+                fmt::format("the coarser run of the pair ended at t = {:.6g} with {}", other.time, name(other.reason)));
+        else if (kind_of(s.stop.reason).exit_code == 0 &&
+                 may_be_ill_posed(case_.energy, coarser_->least_symbol(), run_->least_symbol))
+            unknown(
+                fmt::format("the principal symbol fell to {:.2g}, in the coarser run of the pair to {:.2g}: the "
+                            "flow may be ill-posed",
+                            run_->least_symbol, coarser_->least_symbol()));
     }
 
     // Not where breaks are at jumps of curvature or of H0, nor where small elements make the waves of a fluid shorter.
@@ -113,30 +121,15 @@ private:
         return start_.meridian.seams.empty() && !case_.energy.H0_varies() && motion_law(case_.model).inertia == 0;
     }
 
-    // Resumes the interrupted run if that had the same role in its pair.
-    RunSummary& run(const CurveSettings& settings, const EndedRun* coarser) {
-        make(settings, coarser);
-        Loop steps = loop();
-        if (restart_ && begun_->is_coarser == settings.is_coarser) {
-            run_->resume(*restart_);
-            steps.resume(*std::exchange(restart_, nullptr));
-        } else {
-            run_->begin();
-            steps.begin(start_.note);
-        }
-        steps.go();
-        return run_->summary;
-    }
-
     const Case& case_;
     RunObserver& watch_;
     const RunClock& clock_;
     const Record* restart_;  // until the run resumes from it
     const Beginning start_;
-    std::optional<CurveSettings> begun_;  // of the run that was interrupted
-    CurveSettings settings_;              // of the run to be reported
-    int failures_ = 0;                    // of pairs
-    std::optional<CurveSimulation> run_;  // the last one
+    CurveSettings settings_;  // of the run to be reported
+    int failures_ = 0;        // of pairs
+    std::unique_ptr<CoarserCurve> coarser_;
+    std::unique_ptr<CurveSimulation> run_;  // the last one
 };
 
 }  // namespace
@@ -145,8 +138,7 @@ RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart
     const RunClock clock(c, observer);
     return clock.pausing([&] {
         CurveRuns runs(c, observer, clock, restart);
-        RunPairs pairs(runs, c, observer, 0, restart);
-        return drive(c, observer, clock, pairs);
+        return drive(c, observer, clock, runs);
     });
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_series.hpp"
 #include "axisym/integration/bdf_flow.hpp"
 #include "common/run/energy_checks.hpp"
@@ -50,21 +51,24 @@ struct CurveSimulation::View : StateView {
                                          run.summary.elements, wall_seconds});
     }
 
+    CurveRestart state() const {
+        return {run.setup_.space->splines().breaks(),
+                y,
+                rate,
+                run.setup_.settings,
+                run.past_.total_start,
+                dissipated,
+                run.error,
+                run.summary.reference_energy,
+                run.least_symbol,
+                work,
+                run.mesh_need,
+                run.trace};
+    }
+
     Record record() const override {
-        const CurveSetup& setup = run.setup_;
-        const CurveRestart state{setup.space->splines().breaks(),
-                                 y,
-                                 rate,
-                                 setup.settings,
-                                 run.past_.total_start,
-                                 dissipated,
-                                 run.error,
-                                 run.summary.reference_energy,
-                                 run.least_symbol,
-                                 work,
-                                 run.mesh_need};
-        Record out = curve_record(t, *setup.motion, state, s.o.energy);
-        add_to_record(out, run.trace, run.coarser_);
+        Record out = curve_record(t, *run.setup_.motion, state(), s.o.energy);
+        if (run.coarser_) run.coarser_->save(out);
         return out;
     }
 };
@@ -72,7 +76,7 @@ struct CurveSimulation::View : StateView {
 CurveSimulation::~CurveSimulation() = default;
 
 CurveSimulation::CurveSimulation(const Case& c, const Beginning& start, const CurveSettings& settings,
-                                 const EndedRun* coarser)
+                                 CoarserCurve* coarser)
     : setup_(c, start, settings), coarser_(coarser) {
     summary.reference_energy = setup_.reference_energy;
     summary.elements = setup_.elements();
@@ -124,7 +128,7 @@ void CurveSimulation::resume(const Record& restart) {
     least_symbol = state.least_symbol;
     mesh_need = state.mesh_need;
     summary.reference_energy = state.reference_energy;
-    trace = pair_memory(restart).own;
+    trace = state.trace;
     make_flow(state.y, state.rate, restart.time, 0);
     past_.least = now_.total() - past_.work;
     add_to_trace(restart.time);
@@ -144,7 +148,15 @@ Energetics CurveSimulation::energetics() const {
             .area = s.o.area};
 }
 
+Record CurveSimulation::restart_state() {
+    return state_record(time(), view(time())->state());
+}
+
 std::unique_ptr<StateView> CurveSimulation::at(double t) {
+    return view(t);
+}
+
+std::unique_ptr<CurveSimulation::View> CurveSimulation::view(double t) {
     if (initial_ && t == 0) return std::make_unique<View>(*initial_);
     const int n = setup_.motion->layout().size;
     if (t == flow_->time())
@@ -243,6 +255,7 @@ std::optional<StopReport> CurveSimulation::update_error() {
     const double t = flow_->time();
     least_symbol = std::min(least_symbol, now_.o.symbol);
     add_to_trace(t);
+    if (coarser_) coarser_->lead_to(t);
     compare(t, now_);
     return std::nullopt;
 }
@@ -260,7 +273,7 @@ void CurveSimulation::summarise() {
 // steps grew may be most of their errors: an instability that it has set going amplifies it.
 double CurveSimulation::share(double t) const {
     const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
-              other = coarser_->trace.limited_steps(step_growth_of(coarser(setup_.settings)), t);
+              other = coarser_->trace().limited_steps(step_growth_of(coarser(setup_.settings)), t);
     if (other >= few_steps && own < alike * other) return share_if_alike;
     const double growing = start_steps * beginnings(setup_.motion->law(), t);
     return std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
@@ -275,7 +288,7 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
                  unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0;
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
-    const std::optional<double> difference = coarser_->trace.difference(t, s.free_energy);
+    const std::optional<double> difference = coarser_->trace().difference(t, s.free_energy);
     error_now_ = std::max(difference ? share(t) * *difference : error_now_, least);
     error = std::max(error, error_now_);
 }

@@ -9,19 +9,26 @@
 #include "axisym/curve/curve_guards.hpp"
 #include "axisym/curve/curve_setup.hpp"
 #include "axisym/integration/effort.hpp"
-#include "common/run/run_pairs.hpp"
+#include "common/run/energy_trace.hpp"
 #include "common/run/simulation.hpp"
 
 namespace tubule::axisym {
+
+class CoarserCurve;
 
 // Many fields: the setup of a run, its state, and what has been seen of it.
 class CurveSimulation : public Simulation {
 public:
     // All references must outlive it. Then begin() from the initial shape or resume() from a frame or checkpoint.
-    CurveSimulation(const Case& c, const Beginning& start, const CurveSettings& settings, const EndedRun* coarser);
+    // `coarser`: the run to compare with, if any.
+    CurveSimulation(const Case& c, const Beginning& start, const CurveSettings& settings, CoarserCurve* coarser);
     ~CurveSimulation() override;
     void begin();
     void resume(const Record& restart);
+
+    // What a run resumes from, without what a frame shows.
+    Record restart_state();
+    void compare_no_more() { coarser_ = nullptr; }
 
     bool is_reported() const { return !setup_.settings.is_coarser; }
     double time() const override { return initial_stop_ ? 0 : flow_->time(); }
@@ -52,6 +59,7 @@ private:
         double time = 0;
     };
 
+    std::unique_ptr<View> view(double t);
     const Snapshot& observe(double t, const double* y, const double* rate);
     void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
     void restart_flow();
@@ -69,7 +77,7 @@ private:
     FlowCounters counters() const;
 
     CurveSetup setup_;
-    const EndedRun* coarser_;
+    CoarserCurve* coarser_;
     std::unique_ptr<Flow> flow_;
     Flow::Outcome outcome_ = Flow::Outcome::step;  // of the last step
     bool at_kink_ = false;                         // of the loads, where it ended

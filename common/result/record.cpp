@@ -102,4 +102,21 @@ void RecordReader::array(const std::string& name, Eigen::Matrix3Xd& values, std:
     values = Eigen::Map<const Eigen::Matrix3Xd>(data.data(), 3, static_cast<Eigen::Index>(data.size() / 3));
 }
 
+void nest(Record& in, const std::string& prefix, Record inner) {
+    in.numbers.emplace_back(prefix + "time", inner.time);
+    for (auto& [name, value] : inner.numbers) in.numbers.emplace_back(prefix + name, value);
+    for (Array& a : inner.arrays) in.arrays.push_back({prefix + a.name, std::move(a.shape), std::move(a.data)});
+}
+
+Record nested(const Record& record, const std::string& prefix, RecordKind kind) {
+    Record out;
+    RecordReader(record).number(prefix + "time", out.time);
+    out.kind = kind;
+    for (const auto& [name, value] : record.numbers)
+        if (name.starts_with(prefix)) out.numbers.emplace_back(name.substr(prefix.size()), value);
+    for (const Array& a : record.arrays)
+        if (a.name.starts_with(prefix)) out.arrays.push_back({a.name.substr(prefix.size()), a.shape, a.data});
+    return out;
+}
+
 }  // namespace tubule

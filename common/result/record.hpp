@@ -35,6 +35,10 @@ Array array(const std::string& name, const Eigen::MatrixBase<Matrix>& values) {
     return out;
 }
 
+// A record within another one, its names and its time after a prefix. nested() throws as RecordReader without a time.
+void nest(Record& in, const std::string& prefix, Record inner);
+Record nested(const Record& record, const std::string& prefix, RecordKind kind);
+
 // A state that a run resumes from lists its fields once, as a template over `Fields`, which is RecordWriter or
 // RecordReader (and State, which is const for the writer):
 //     template <class Fields, class State>

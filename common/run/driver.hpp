@@ -10,7 +10,8 @@
 namespace tubule {
 
 // The runs of a case, and how their error is estimated. There are: an error that the run itself carries along
-// (axisym/graph/graph_run), a run beside a coarser one (run_pairs.hpp), a shape on several meshes (surface3d/run/run).
+// (axisym/graph/graph_run), a run beside a coarser one (axisym/curve/curve_run, surface3d/run/motion_run), a shape on
+// several meshes (surface3d/run/run).
 class EstimatedRuns {
 public:
     virtual ~EstimatedRuns() = default;

@@ -30,7 +30,7 @@ public:
 
     // Of a record (common/result/record.hpp), under names that begin so.
     template <class Fields, class Trace>
-    static void fields(Fields& f, Trace& t, const std::string& name) {
+    static void fields(Fields&& f, Trace& t, const std::string& name) {
         f.array(name + "_time", t.time_);
         f.array(name + "_energy", t.energy_, t.time_.size());
         f.optional_array(name + "_slope", t.slope_, t.time_.size());

@@ -18,27 +18,16 @@ RunObserver nobody;  // who sees its rows; pauses come from the clock
 
 // What the record of a coarser run has beside its state.
 struct Saved {
-    double time = 0;
     int stop = -1;  // it goes on
     double stop_time = 0;
     SurfaceCells cells;
 };
 template <class Fields, class S>
 void saved_fields(Fields&& f, S& s) {
-    f.number("time", s.time), f.number("stop", s.stop), f.number("stop_time", s.stop_time);
+    f.number("stop", s.stop), f.number("stop_time", s.stop_time);
     f.number("order", s.cells.order), f.number("period", s.cells.period);
 }
-Record record_of(const Record& record, const std::string& prefix) {
-    Record out;
-    out.kind = RecordKind::surface;
-    for (const auto& [name, value] : record.numbers)
-        if (name.starts_with(prefix)) out.numbers.emplace_back(name.substr(prefix.size()), value);
-    for (const Array& a : record.arrays)
-        if (a.name.starts_with(prefix)) out.arrays.push_back({a.name.substr(prefix.size()), a.shape, a.data});
-    return out;
-}
-
-Saved saved_of(Record& record) {
+Saved saved_of(const Record& record) {
     Saved out;
     const RecordReader reader(record);
     saved_fields(reader, out);
@@ -59,7 +48,6 @@ Saved saved_of(Record& record) {
         throw std::runtime_error(
             "cannot resume from this frame: its coarser run ended for an unknown reason; run the case without "
             "--resume");
-    record.time = out.time;
     return out;
 }
 
@@ -103,7 +91,7 @@ void CoarserRun::begin() {
 
 std::unique_ptr<CoarserRun> CoarserRun::resumed(const Case& c, const Start& start, const RunClock& clock,
                                                 const Record& record, const std::string& prefix) {
-    Record own = record_of(record, prefix);
+    Record own = nested(record, prefix, RecordKind::surface);
     const Saved saved = saved_of(own);
     auto out = std::make_unique<CoarserRun>(c, start, clock, motion_restart(own, time_scheme(c)).memory.settings);
     const Restart restart{std::move(own), saved.cells};
@@ -124,7 +112,7 @@ bool CoarserRun::is_saved(const Record& record, const std::string& prefix) {
 
 void CoarserRun::check_restart(const Case& c, const Record& record, const std::string& prefix) {
     if (!is_saved(record, prefix)) return;
-    Record own = record_of(record, prefix);
+    const Record own = nested(record, prefix, RecordKind::surface);
     saved_of(own);
     motion_restart(own, time_scheme(c));
 }
@@ -132,15 +120,14 @@ void CoarserRun::check_restart(const Case& c, const Record& record, const std::s
 void CoarserRun::save(const std::string& prefix, Record& record) const {
     Record own = state_record(run_.state(), run_.memory());
     loop_->save_callbacks(own);
-    Saved saved{.time = own.time, .cells = cells_of(run_.mesh())};
+    Saved saved{.cells = cells_of(run_.mesh())};
     if (const auto& ended = stop(); ended && !can_go_on(ended->reason))
         saved.stop = static_cast<int>(ended->reason), saved.stop_time = ended->time;
     RecordWriter writer(own);
     saved_fields(writer, saved);
     writer.array("cells", std::vector<double>(saved.cells.cells.begin(), saved.cells.cells.end()));
     writer.array("shifts", std::vector<double>(saved.cells.shifts.begin(), saved.cells.shifts.end()));
-    for (auto& [name, value] : own.numbers) record.numbers.emplace_back(prefix + name, value);
-    for (Array& a : own.arrays) record.arrays.push_back({prefix + a.name, std::move(a.shape), std::move(a.data)});
+    nest(record, prefix, std::move(own));
 }
 
 bool CoarserRun::advance_to(double time, double growth) {

@@ -105,14 +105,12 @@ class Extended(Continued):
         self.assertAlmostEqual(energy[-1], series(self.folder / "whole.hdf")["energy"][-1], delta=1e-4 * whole["E_ref"])
         np.testing.assert_array_equal(energy[: len(first["energy"])], first["energy"])
 
-    def test_of_a_curve_an_interruption_of_the_coarser_run_loses_nothing(self):
+    def test_of_a_curve_an_interruption_loses_nothing(self):
         self.write("case.toml", CURVE)
         self.tubule("run", "case.toml", "--until", "0.03")
         before = series(self.result)["energy"]
-        out = self.tubule("run", "case.hdf", "--resume", "--until", "0.05", "--set", "time.limit=1e-3", status=5)[0]
-        self.assertIn("of the coarser run", out)
-        np.testing.assert_array_equal(series(self.result)["energy"], before)
-        self.assertEqual(about(self.result)["stop_time"], 0.03)
+        self.tubule("run", "case.hdf", "--resume", "--until", "0.05", "--set", "time.limit=1e-3", status=5)
+        np.testing.assert_array_equal(series(self.result)["energy"][: len(before)], before)
         self.tubule("run", "case.hdf", "--resume", "--set", "time.limit=1000")
         self.assertEqual(about(self.result)["stop"], "finished")
         np.testing.assert_array_equal(series(self.result)["energy"][: len(before)], before)

@@ -269,18 +269,6 @@ class Curve(ProgramTest):
             times = [file["frames"][name].attrs["time"] for name in sorted(file["frames"])]
         self.assertEqual(times, [0, 0.02, 0.05])
 
-    def test_stopped_in_its_coarser_run_it_goes_on_there(self):
-        limit = CURVE.replace("[time]", "[time]\nlimit = 1e-3")
-        self.write("case.toml", limit)
-        self.assertIn("of the coarser run", self.tubule("run", self.case, status=5)[0])
-        with h5py.File(self.result) as file:
-            first = file["checkpoint"].attrs["time"]
-            self.assertEqual(list(file["series/time"]), [0])
-            self.assertEqual(len(file["frames"]), 1)
-        self.tubule("run", self.case, "--resume", status=5)
-        with h5py.File(self.result) as file:
-            self.assertGreater(file["checkpoint"].attrs["time"], first)
-
     def test_signals_and_kills_lose_nothing(self):
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGINT):
             process = self.start("run", self.case, "--resume", "--quiet", **OFTEN)

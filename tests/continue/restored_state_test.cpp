@@ -10,7 +10,6 @@
 #include "axisym/run.hpp"
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"
-#include "common/run/run_pairs.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/run.hpp"
 
@@ -105,11 +104,9 @@ TEST(RestoredState, ofACurveAndItsPair) {
     w.array("restart_breaks", s.breaks), w.array("restart_y", s.y), w.array("restart_rate", s.rate);
     w.number("restart_dissipated", s.dissipated), w.number("restart_error", s.error);
     expect_holds(record, state);
-    // The end that the coarser run had, by which an extended run knows that it must be made again.
-    const PairMemory pair = pair_memory(record);
-    ASSERT_TRUE(pair.coarser);
-    EXPECT_EQ(pair.coarser->stop.reason, Stop::finished);
-    EXPECT_EQ(pair.coarser->end, c.time.end);
+    const axisym::CurveRestart coarser = axisym::curve_restart(nested(record, "restart_coarser_", RecordKind::curve));
+    EXPECT_TRUE(coarser.settings.is_coarser);
+    EXPECT_GE(coarser.trace.end(), record.time);  // it leads
 }
 
 TEST(RestoredState, ofASurface) {

@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include "common/result/record.hpp"
 #include "common/run/energy_trace.hpp"
 #include "common/run/output_times.hpp"
-#include "common/run/run_pairs.hpp"
 #include "tests/missing_fields.hpp"
 
 namespace tubule {
@@ -109,19 +109,30 @@ TEST(EnergyTrace, IsTheSameFromARecord) {
     EXPECT_FALSE(trace.difference(3.1, 0));
 
     Record record;
-    record.time = 2.5;
-    const EndedRun coarser{trace, {Stop::pinch_off, 3, "", ""}};
-    add_to_record(record, trace, &coarser);
-    const PairMemory memory = pair_memory(record);
-    EXPECT_EQ(memory.own.end(), 2.5);  // the run goes on from the record
-    ASSERT_TRUE(memory.coarser);
-    EXPECT_EQ(memory.coarser->trace(2.75), trace(2.75));
-    EXPECT_EQ(memory.coarser->stop.reason, Stop::pinch_off);
-    EXPECT_EQ(memory.coarser->stop.time, 3);
-    expect_each_field_is_needed<std::runtime_error>(record, "restart_", pair_memory);
-    Record first;
-    add_to_record(first, trace, nullptr);
-    EXPECT_FALSE(pair_memory(first).coarser);
+    EnergyTrace::fields(RecordWriter(record), trace, "restart_trace");
+    EnergyTrace restored;
+    EnergyTrace::fields(RecordReader(record), restored, "restart_trace");
+    EXPECT_EQ(restored(2.75), trace(2.75));
+    restored.cut_after(2.5);
+    EXPECT_EQ(restored.end(), 2.5);
+    expect_each_field_is_needed<std::runtime_error>(record, "restart_", [](const Record& damaged) {
+        EnergyTrace again;
+        EnergyTrace::fields(RecordReader(damaged), again, "restart_trace");
+    });
+}
+
+TEST(Record, HoldsAnotherOne) {
+    Record inner, outer;
+    inner.time = 2, inner.kind = RecordKind::curve;
+    inner.numbers = {{"step", 0.5}}, inner.arrays = {array("r", std::vector<double>{1, 2})};
+    outer.time = 3, outer.numbers = {{"step", 7}};
+    nest(outer, "coarser_", inner);
+    EXPECT_EQ(outer.numbers.front(), (std::pair<std::string, double>{"step", 7}));
+    const Record found = nested(outer, "coarser_", RecordKind::curve);
+    EXPECT_EQ(found.time, 2);
+    EXPECT_EQ(find_number(found, "step"), 0.5);
+    EXPECT_EQ(find_array(found, "r")->data, (std::vector<double>{1, 2}));
+    EXPECT_THROW(nested(inner, "coarser_", RecordKind::curve), std::runtime_error);
 }
 
 }  // namespace

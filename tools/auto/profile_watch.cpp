@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "common/run/run_pairs.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/auto/waves.hpp"
 
@@ -19,9 +18,7 @@ ProfileWatch::ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::se
       only_for_rates_(std::move(only_for_rates)),
       growth_(c.automatic.noise, c.automatic.modes) {}
 
-// A coarser run tells nothing of waves: its profile is not the one that is reported.
 void ProfileWatch::resume(const Record& frame) {
-    if (is_of_coarser_run(frame)) return;
     growth_.begin_with(amplitudes_of(frame));
     look_at(frame);
 }
@@ -62,7 +59,6 @@ void ProfileWatch::frame(const std::function<Record()>& make) {
 }
 
 void ProfileWatch::checkpoint(const Record& state) {
-    if (is_of_coarser_run(state)) return file_.checkpoint(state);
     look_at(state);
     file_.checkpoint(with_amplitudes(state));
 }

@@ -21,7 +21,6 @@
 #include "common/result/result.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
-#include "common/run/run_pairs.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/progress.hpp"
@@ -110,7 +109,6 @@ public:
           writer_(writer),
           defect_column_(static_cast<std::size_t>(std::ranges::find(series, "identity_defect") - series.begin())),
           quiet_(quiet),
-          keeps_state_(from && !is_of_coarser_run(*from)),
           progress_(from ? from->time : 0, c.time.end, {.quiet = quiet}) {}
     void row(std::span<const double> values) override {
         writer_.row(values);
@@ -123,11 +121,8 @@ public:
         if (const std::string cost = frames_++ == 0 ? cost_of_frames(case_, record) : ""; !cost.empty()) note(cost);
         writer_.frame(record);
     }
-    void checkpoint(const Record& state) override {
-        if (!keeps_state_ || !is_of_coarser_run(state)) writer_.checkpoint(state);
-    }
+    void checkpoint(const Record& state) override { writer_.checkpoint(state); }
     void discard() override {
-        keeps_state_ = false;
         defect_ = 0;
         writer_.discard();
     }
@@ -150,7 +145,6 @@ private:
     std::size_t defect_column_;
     double defect_ = 0;
     bool quiet_;
-    bool keeps_state_;  // no coarser run that is made again beside this one may replace it
     Progress progress_;
     std::optional<double> reached_;
     int frames_ = 0;

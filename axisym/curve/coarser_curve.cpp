@@ -1,0 +1,88 @@
+#include "axisym/curve/coarser_curve.hpp"
+
+#include <utility>
+
+#include "common/run/stall.hpp"
+
+namespace tubule::axisym {
+namespace {
+
+constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
+constexpr double tiny_step = 1e-9;
+
+const std::string prefix = "restart_coarser_";
+
+// How it ended, and under which conditions: a run that is extended may have others.
+struct Saved {
+    int stop = -1;  // it has not ended
+    double stop_time = 0, end = 0, stationary = 0;
+};
+template <class Fields, class S>
+void saved_fields(Fields&& f, S& s) {
+    f.number("stop", s.stop), f.number("stop_time", s.stop_time);
+    f.number("end", s.end), f.number("stationary", s.stationary);
+}
+
+bool continues(const Saved& s, const TimeSpan& time) {
+    if (s.stop < 0 || s.stop >= static_cast<int>(stop_kinds.size())) return true;
+    const auto stop = static_cast<Stop>(s.stop);
+    if (stop == Stop::finished) return s.stop_time < time.end * (1 - 1e-12);
+    return stop == Stop::stationary && (s.end != time.end || s.stationary != time.stationary.value_or(0));
+}
+
+RunObserver nobody;  // who sees its rows; pauses come from the clock
+
+}  // namespace
+
+Loop loop_of(CurveSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock) {
+    Loop out(run, c, watch, clock, run.is_reported());
+    out.add(std::make_unique<Stall>(most_stalled, tiny_step * c.time.end, c.accuracy.energy,
+                                    "try another accuracy, discretisation.elements or parametrisation"));
+    return out;
+}
+
+CoarserCurve::CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings)
+    : case_(c), run_(std::make_unique<CurveSimulation>(c, start, settings, nullptr)) {
+    run_->begin();
+    loop_.emplace(loop_of(*run_, c, nobody, clock));
+    loop_->begin();
+}
+
+CoarserCurve::CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const Record& record)
+    : case_(c) {
+    const Record own = nested(record, prefix, RecordKind::curve);
+    Saved saved;
+    saved_fields(RecordReader(own), saved);
+    run_ = std::make_unique<CurveSimulation>(c, start, curve_restart(own).settings, nullptr);
+    run_->resume(own);
+    loop_.emplace(loop_of(*run_, c, nobody, clock));
+    loop_->resume(own);
+    if (!continues(saved, c.time)) loop_->end({static_cast<Stop>(saved.stop), saved.stop_time, "", ""});
+}
+
+CoarserCurve::CoarserCurve(const Case& c, std::unique_ptr<CurveSimulation> ended) : case_(c), run_(std::move(ended)) {
+    run_->compare_no_more();
+}
+
+void CoarserCurve::check_restart(const Record& record) {
+    const Record own = nested(record, prefix, RecordKind::curve);
+    Saved saved;
+    saved_fields(RecordReader(own), saved);
+    curve_restart(own);
+}
+
+void CoarserCurve::save(Record& record) const {
+    Record own = run_->restart_state();
+    Saved saved{.end = case_.time.end, .stationary = case_.time.stationary.value_or(0)};
+    if (const auto ended = stop(); ended && !can_go_on(ended->reason))
+        saved.stop = static_cast<int>(ended->reason), saved.stop_time = ended->time;
+    saved_fields(RecordWriter(own), saved);
+    if (loop_) loop_->save_callbacks(own);
+    nest(record, prefix, std::move(own));
+}
+
+void CoarserCurve::lead_to(double t) {
+    while (loop_ && !loop_->stop() && run_->time() < t) loop_->step();
+}
+
+}  // namespace tubule::axisym

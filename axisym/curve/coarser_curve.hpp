@@ -1,0 +1,39 @@
+// The coarser run of a pair. It leads the run that is compared with it; or it is the reported run of the pair before,
+// which has ended.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "axisym/curve/curve_simulation.hpp"
+#include "common/run/loop.hpp"
+
+namespace tubule::axisym {
+
+// The loop of a run of a curve, once that has begun: with the callbacks that curves have. All references must outlive
+// it.
+Loop loop_of(CurveSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock);
+
+class CoarserCurve {
+public:
+    // References must outlive it. A new run; one that was saved (throws as RecordReader); one that has ended.
+    CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings);
+    CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const Record& record);
+    CoarserCurve(const Case& c, std::unique_ptr<CurveSimulation> ended);
+    static void check_restart(const Record& record);
+    void save(Record& record) const;
+
+    // Until its time is at least this, or it ends.
+    void lead_to(double t);
+
+    const EnergyTrace& trace() const { return run_->trace; }
+    double least_symbol() const { return run_->least_symbol; }
+    std::optional<StopReport> stop() const { return loop_ ? loop_->stop() : run_->summary.stop; }
+
+private:
+    const Case& case_;
+    std::unique_ptr<CurveSimulation> run_;
+    std::optional<Loop> loop_;  // none: the run has ended before this pair
+};
+
+}  // namespace tubule::axisym
