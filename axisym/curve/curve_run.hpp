@@ -6,7 +6,7 @@
 
 namespace tubule::axisym {
 
-// As run(). Runs come in pairs (common/run/run_pairs.hpp): the coarser one has fewer elements and a wider tolerance.
+// As run(). Each run is compared with a coarser one (coarser_curve.hpp), which has fewer elements and a wider tolerance.
 // The stated error is how far the two energies are apart at the times of the steps.
 RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart = nullptr);
 
