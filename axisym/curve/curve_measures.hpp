@@ -16,7 +16,7 @@ struct ShapeMeasures {
     double pole_curvature = 0;  // kappa at the south pole, negative where convex; 0 for tubes
     double asymmetry = 0;       // largest |r(s) - r(1 - s)|, |z(s) + z(1 - s) - 2 z(1/2)| sampled; 0 for halves
 };
-// Of the whole curve x, in units of the case.
+// Measures the whole curve x, in units of the case.
 ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x);
 
 // Parameters of two points at which the profile crosses itself, or of one (twice) where it is beyond the axis

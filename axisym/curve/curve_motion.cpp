@@ -256,7 +256,7 @@ PointNumbers CurveMotion::point_numbers(double t, const double* y) const {
     return {number(at_.drift), number(at_.shift), number(at_.supply), number(at_.stretch), law_.tension.at(t)};
 }
 
-// Of what pushes the membrane.
+// Weights of the forces on the membrane.
 Weights CurveMotion::force_weights(double t, const double* y) const {
     const Loads loads = loads_at(law_, t);
     const double tension = at_.tension < 0 ? loads.tension : y[at_.tension];
@@ -265,7 +265,7 @@ Weights CurveMotion::force_weights(double t, const double* y) const {
             .volume = at_.lambda < 0 ? -loads.pressure : y[at_.lambda]};
 }
 
-// Of what moves the curve beside the flow.
+// Weights of the velocity that moves the curve in addition to the flow.
 Weights CurveMotion::drift_weights(const double* y) const {
     return {.area = at_.area < 0 ? 0 : y[at_.area], .volume = at_.volume < 0 ? 0 : y[at_.volume], .gauge = gauge_};
 }

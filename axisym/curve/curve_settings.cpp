@@ -11,11 +11,11 @@ constexpr double finer_mesh = 1.5;  // elements of a pair of runs
 // From pair to pair; the least is enough for a pair to see what its mesh costs.
 constexpr double least_growth = 1.4, most_growth = 2.5;
 constexpr double finer_time = 0.1;  // tolerances of a pair of runs
-// Of the first run; the waves of a fluid, weakly damped, cost steps.
+// Time tolerances of the first run over the accuracy; the waves of a fluid, weakly damped, cost steps.
 constexpr double tolerance_per_accuracy = 0.5, tolerance_of_waves = 3;
 constexpr int most_pairs = 8, most_elements = 2000;
-// Of a coarser run. Backward Euler steps that grow by g have errors in proportion to (g - 1)/(g + 1): 0.33 for g = 2,
-// the growth of the finer run, and 0.78 for 8.
+// First step and growth of steps of a coarser run. Errors of backward Euler steps that grow by g are in proportion to
+// (g - 1)/(g + 1): 0.33 for g = 2, the growth of the finer run, and 0.78 for 8.
 constexpr double coarser_start = 4, coarser_growth = 8;
 
 }  // namespace

@@ -28,7 +28,7 @@ bool settings_given(const Case& c);
 double first_step_of(const CurveSettings& s);
 double step_growth_of(const CurveSettings& s);
 
-// Of the other run of a pair.
+// Settings of the other run of a pair.
 CurveSettings coarser(const CurveSettings& s);
 
 // By how much the next pair has more elements, after one whose runs differed `excess` times more than asked; or, where

@@ -268,9 +268,9 @@ void CurveSimulation::summarise() {
     describe({.time_tolerance = setup_.settings.tolerance, .counters = counters()}, summary);
 }
 
-// Of the difference of a pair: the smaller the more steps the tolerance has limited, as steps that only grow are alike
-// in both. Where the finer run has had fewer limited steps than the coarser one, what both had in common while their
-// steps grew may be most of their errors: an instability that it has set going amplifies it.
+// Error over difference of a pair: the smaller the more steps the tolerance has limited, since steps that only grow
+// are alike in both. Where it has limited fewer steps of the finer run, the errors that both had in common while steps
+// grew may dominate: an instability amplifies them.
 double CurveSimulation::share(double t) const {
     const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
               other = coarser_->trace().limited_steps(step_growth_of(coarser(setup_.settings)), t);

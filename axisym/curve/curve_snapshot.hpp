@@ -23,7 +23,7 @@ inline bool is_admissible(const Snapshot& s) {
     return std::isfinite(s.total()) && s.o.r_min > 0 && s.neck.radius > 0;
 }
 
-// Of the unknowns and their rates.
+// What the unknowns y and their rates describe.
 Snapshot measure(const CurveMotion& motion, double t, const double* y, const double* rate);
 
 // Amplitude of the wave of number n in r(z), also where that has several values.

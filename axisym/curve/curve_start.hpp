@@ -37,7 +37,7 @@ public:
     // From one end to the other, in units of the case.
     double total() const { return sum_.back(); }
     double parameter(double fraction) const;  // t at which this fraction of the length is reached
-    // Of the length, 0 to 1, up to the parameter t.
+    // The fraction of the length, 0 to 1, up to the parameter t.
     double fraction(double t) const;
     const Meridian& meridian() const { return meridian_; }
     std::array<double, 2> point(double fraction) const;  // r, z

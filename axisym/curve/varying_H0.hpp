@@ -45,7 +45,7 @@ private:
     std::vector<SlopeInH0<Pack>> f0_;
 };
 
-// Of any curve: the formula's `area` at these parameters, ascending.
+// The formula's `area` at these parameters, ascending, of any curve.
 std::vector<double> area_below(const CurveSpace& space, const Eigen::VectorXd& x, const std::vector<double>& s);
 
 }  // namespace tubule::axisym

@@ -15,8 +15,8 @@
 namespace tubule::axisym {
 namespace {
 
-// Of multipliers of what is held: sum of slopes times multipliers = wanted, the equation of a free period, theory.md
-// (3.19); no slopes at a fixed one.
+// Condition on the multipliers where the period is free, theory.md (3.19): slopes . multipliers = wanted. No slopes
+// where it is fixed.
 struct StretchBalance {
     Eigen::VectorXd slopes;
     double wanted = 0;
@@ -27,7 +27,7 @@ void append(Eigen::VectorXd& v, double value) {
     v[v.size() - 1] = value;
 }
 
-// Those that minimise |force + columns multipliers|; of the balance, among those that meet it.
+// The multipliers that minimise |force + columns multipliers|, among those that meet the balance.
 Eigen::VectorXd multipliers_for(const Eigen::MatrixXd& columns, const Eigen::VectorXd& force,
                                 const StretchBalance& balance) {
     // Area and volume are one constraint on a sphere or a tube: least squares of least norm, up to the mesh's error.

@@ -26,7 +26,7 @@ StopReport overhang(const Observation& o, const GraphStage& stage, const double*
 // Whether the profile is so steep that a failure there is due to an overhang.
 bool is_about_to_overhang(const Observation& o);
 
-// Of the first observation of a run.
+// The least symbol of the first observation of a run.
 double least_symbol_of(const Bending& energy, const Observation& o);
 
 }  // namespace tubule::axisym

@@ -90,7 +90,7 @@ public:
     const ProfileSpace& splines() const { return splines_; }
     const Field& r() const { return r_; }
     const Field& z() const { return z_; }
-    // Of a curve: the coefficients of r and z alone; with a rise that is free, which stands last.
+    // Numbers of coefficients: of r and z; and with a free rise, which stands last.
     int shape_size() const { return r_.size() + z_.size(); }
     int size() const { return shape_size() + (free_period_ ? 1 : 0); }
 

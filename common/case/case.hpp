@@ -88,10 +88,10 @@ struct SurfaceDiscretisation {
     std::optional<int> elements;  // about how many triangles
     std::optional<int> order;     // of the elements: 2, 3, 4; default: element_order()
     MeshKind mesh = MeshKind::uniform;
-    // Of a shape at rest:
+    // Single shapes only:
     Recovery recovery = Recovery::patch;
     double smoothing = 0;  // length (squared) of the paper's smoothing step of H and K; 0: none. Of its scheme, too
-    // Of a motion:
+    // Motion only:
     std::optional<Scheme> scheme;          // by default that of the model, see default_scheme()
     std::optional<double> step;            // the same for all steps; switches their control off
     std::optional<double> time_tolerance;  // error of the positions in a step, relative to the root of the area
@@ -109,16 +109,16 @@ struct TimeSpan {
     std::vector<double> output;        // times of frames; 0 and end are always written
     std::optional<double> stationary;  // stop when the energy could change by less than this * E_ref until end
     std::optional<double> limit;       // wall clock seconds
-    // Of tier axisym:
+    // Tier axisym only:
     Integrator integrator = Integrator::ida;
-    int max_order = 5;  // of IDA
+    int max_order = 5;  // IDA's
 };
 
-// Tier "auto": when an axisymmetric run goes on in three dimensions.
+// Tier "auto": when an axisymmetric run continues in three dimensions.
 struct AutoChoices {
-    double noise = 1e-6;    // amplitude of every wave around the axis at the start, relative to the largest radius
-    double largest = 1e-2;  // amplitude at which they are computed, likewise
-    int modes = 4;          // waves e^{i m phi} with m = 1 ... modes
+    double noise = 1e-6;    // initial amplitude of every mode m, relative to the largest radius
+    double largest = 1e-2;  // amplitude at which three dimensions take over, likewise
+    int modes = 4;          // modes e^{i m phi} with m = 1 ... modes
 };
 
 // Where a run of tier surface3d begins instead of at the shape: not in case files, but from tier "auto".
@@ -183,7 +183,7 @@ inline Held held_of(const Case& c) {
     return c.equilibrium->held.value_or(default_held(c.model));
 }
 
-// Of curved triangles: fourth order follows motion better, third is enough for a shape at rest
+// Order of curved triangles: the fourth is more accurate in motion, the third suffices for a single shape
 // (docs/decisions/surface_motion.md).
 inline int element_order(const Case& c) {
     return c.surface.order.value_or(c.moves() ? 4 : 3);

@@ -333,7 +333,7 @@ void keys(Keys& k, Expect& expect, double end) {
     for (const StopKind& kind : stop_kinds) stops.emplace_back(kind.name, kind.reason);
     k.choice("stop", expect.stop, stops);
 
-    // Of series "time", the end has the time of stopping, also called so; at a moment, `time` is that moment.
+    // At the end the series "time" is the time of stopping, also called stop_time; at a moment, `time` is that moment.
     const std::string form = "a table, such as {value = 1.5, rel = 1e-3}";
     OpenNames in_end{expectable_series(), [](std::string_view n) { return n == "stop_time" || is_expectable(n); },
                      form};
@@ -413,7 +413,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     return parameter == vary_H0 ? c.energy.H0 : modulus(c.energy, parameter);
 }
 
-// Of equilibria of tier axisym.
+// Refuses what axisymmetric equilibria do not combine with.
 template <class Keys>
 void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     for (const auto& [key, load] :
@@ -451,7 +451,7 @@ void check_equilibrium_keys(Keys& k, const Case& c, const MotionLaw& law) {
     });
 }
 
-// Of a spontaneous curvature that varies: what has no law for it. Long: a line for each.
+// Refuses what has no law for a varying spontaneous curvature. Long: a line for each.
 template <class Keys>
 void check_varying_H0(Keys& k, const Case& c) {
     if (!c.energy.H0_varies()) return;
@@ -510,7 +510,7 @@ void check_surface_scheme(Keys& k, const Case& c, const MotionLaw& law, const Sc
     });
 }
 
-// Of model.kind = "auto": what only a certain model has.
+// Refuses, with model.kind = "auto", what only some of the models have.
 template <class Keys>
 void check_chosen_model(Keys& k, const Case& c) {
     if (c.model.kind != ModelKind::automatic) return;

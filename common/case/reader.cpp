@@ -56,7 +56,7 @@ std::string meant(const std::string& suggestion) {
     return suggestion.empty() ? "" : fmt::format("; did you mean '{}'?", suggestion);
 }
 
-// Of "lo:hi:n", n >= 2 numbers from lo to hi; nothing if the text has not that form.
+// The n >= 2 numbers from lo to hi that "lo:hi:n" stands for; nothing if the text has another form.
 std::optional<std::vector<double>> evenly_spaced(const std::string& text) {
     const std::vector<std::string> parts = split(text, ':');
     std::vector<double> given;
@@ -216,7 +216,7 @@ void Reader::number_or_formula(const std::string& key, double& number, std::shar
     });
 }
 
-// Of a character of a string, if it stands in the file as it is, in quotes on one line.
+// The place of a character of a string, if the file has it literally, in quotes on one line.
 std::string Reader::where_in(const toml::node& node, std::size_t character) const {
     toml::source_region at = node.source();
     const std::string& text = node.as_string()->get();

@@ -6,8 +6,8 @@
 
 namespace tubule {
 
-// Of profiles: the part of the area that is below (from the lower pole, or from the lower end of a period), and the
-// point of the profile. Of surfaces: the point in space.
+// Variables on profiles: the part of the area that is below (from the lower pole, or from the lower end of a period),
+// and the point of the profile. On surfaces: the point in space.
 inline constexpr std::array<std::string_view, 3> H0_of_profile{"area", "r", "z"}, H0_of_surface{"x", "y", "z"};
 
 }  // namespace tubule

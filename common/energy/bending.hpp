@@ -132,7 +132,7 @@ std::string term_name(const EnergyTerm& term);
 // In mathtext for pictures, as BendingTerm::label; also by what follows energy_ in the name of its series.
 std::string term_label(const EnergyTerm& term);
 std::string term_label(std::string_view name);
-// Of all terms, in order.
+// The names of all terms, in order.
 std::vector<std::string> term_names(const Bending& bending);
 // The modulus of a term in case files: energy.k20, energy.term.0.modulus.
 std::string term_key(const Bending& bending, std::size_t term);
@@ -180,7 +180,7 @@ CurvatureJet<T> chain(const CurvatureJet<T>& a, const T& f, const T& f1, const T
     return {f, f1 * a.H, f1 * a.K, f1 * a.HH + f2 * a.H * a.H, f1 * a.HK + f2 * a.H * a.K, f1 * a.KK + f2 * a.K * a.K};
 }
 
-// Of a term with modulus 1. T is a number or a pack of them, or what formulas are evaluated on.
+// The density of a term with modulus 1. T is a number, a pack of numbers, or what formulas are evaluated on.
 template <class T, class T0>
 T value_of(const EnergyTerm& term, const T& H, const T& K, const T0& H0) {
     if (!term.formula) return raised(T(H - T(H0)), term.H) * raised(K, term.K);
@@ -261,7 +261,7 @@ struct SlopeInH0 {
 };
 template <class T>
 SlopeInH0<T> slope_in_H0(const Bending& bending, const T& H0, const T& H, const T& K) {
-    // Of the jet's two variables the second is H0, and the first is H, then K.
+    // The first variable of the jet is H, then K; the second one is H0.
     const auto sum = [&](const T& along_H, const T& along_K) {
         using J = CurvatureJet<T>;
         const J h{H, along_H}, k{K, along_K}, h0{H0, T(0.0), T(1.0)};

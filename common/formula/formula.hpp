@@ -52,8 +52,8 @@ struct Formula {
         double value = 0;  // of a constant, an exponent
         int number = 0;    // of a variable, a whole exponent >= 2
         std::size_t column = 1;
-        // Of a fit, for x in [0, 1]: of a polynomial those of T_k(1 - 2 x), k = 0, 1, ..., Chebyshev's; of waves those
-        // of 1, cos(2 pi x), sin(2 pi x), cos(4 pi x), ...
+        // A fit on [0, 1]: a polynomial, in Chebyshev's T_k(1 - 2 x), k = 0, 1, ...; or waves, in 1, cos(2 pi x),
+        // sin(2 pi x), cos(4 pi x), ...
         std::shared_ptr<const std::vector<double>> coefficients = {};
     };
     std::string text;  // empty: made from numbers, not from a text

@@ -43,7 +43,7 @@ struct Seal {
     bool operator==(const Seal&) const = default;
 };
 
-// Of an open file; throws durable::Error.
+// The bytes of an open file. Throws durable::Error.
 class Source {
 public:
     explicit Source(int descriptor) : fd_(descriptor) {

@@ -95,7 +95,7 @@ public:
 private:
     double number_of(const std::string& name) const;
     int integer_of(const std::string& name) const;
-    // Of `width` numbers a row; 1 for a vector.
+    // Rows have `width` numbers; 1 for a vector.
     const std::vector<double>& data_of(const std::string& name, std::optional<Eigen::Index> count,
                                        std::size_t width) const;
 

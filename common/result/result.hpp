@@ -48,7 +48,7 @@ struct Record {
     double time = 0;
     std::vector<std::pair<std::string, double>> numbers;
     std::vector<Array> arrays;
-    // Of a curved surface: the number of its SurfaceCells. Then there must be an array "points" [nodes, 3], and arrays
+    // The number of SurfaceCells of a curved surface. Then there must be an array "points" [nodes, 3], and arrays
     // [nodes], [nodes, 3] and [nodes, 6] are data of the nodes for VTK (except "restart_...").
     std::optional<std::size_t> mesh = std::nullopt;
     std::optional<RecordKind> kind = std::nullopt;  // kind_of() (record.hpp) knows that of older results

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double rounding = 1e-12;  // of E_ref: no energy is known better
 
-// Of a run that is not refined any more, although it may be less accurate than asked.
+// Reports that the last run is less accurate than asked, where it is.
 void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
     if (s.as_accurate_as_asked || can_go_on(s.stop.reason)) return;
     const std::string error = s.error_is_known() ? fmt::format("the estimated error of the energy is {:.2g} of E_ref",

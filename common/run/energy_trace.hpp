@@ -18,7 +18,7 @@ public:
     int size() const { return static_cast<int>(time_.size()); }
     double end() const { return time_.back(); }
     int points_after(double t) const;
-    // Of the steps until t, those that did not grow (nearly) by this factor: their lengths were chosen for accuracy.
+    // The number of steps until t that grew by (clearly) less than this factor: their lengths were chosen for accuracy.
     int limited_steps(double growth, double t) const;
 
     // Between two points the cubic with their slopes, or the polynomial through them and their neighbours that are not
@@ -28,7 +28,7 @@ public:
     // step, as the energy of a start that is not smooth falls like a root of the time.
     std::optional<double> difference(double t, double energy) const;
 
-    // Of a record (common/result/record.hpp), under names that begin so.
+    // The fields of a record (common/result/record.hpp), with names that begin with `name`.
     template <class Fields, class Trace>
     static void fields(Fields&& f, Trace& t, const std::string& name) {
         f.array(name + "_time", t.time_);

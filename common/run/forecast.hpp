@@ -32,11 +32,11 @@ public:
     bool last_run() const { return last_; }    // as far as is known
     bool moved() const { return steps_ > 0; }  // or it has not come to its first step
 
-    // Its steps have become so short, by now, that it says nothing of a run that goes on.
+    // Whether the steps have become too short, by now, to predict a longer run.
     bool has_collapsed() const { return steps_ * step_ < 0.1 * time_; }
 
-    // Of a run that pauses here, until `end`: the factor from the steps done to all of them, if they stay as long as
-    // the last one, or, where they still grow, go on to do so for the most part.
+    // All steps until `end` over those done, if they stay as long as the last one or, where they still grow, mostly
+    // continue to grow.
     double all_by_done(double end) const {
         double left = std::max(end - time_, 0.0) / step_;
         if (growth_ > 1.1) left = std::min(left, 1.5 * std::log1p(left * (growth_ - 1)) / std::log(growth_));

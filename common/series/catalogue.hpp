@@ -83,7 +83,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
 // The entry of a series, be it a member of a family; nullptr if there is none.
 const SeriesEntry* find_series(std::string_view name);
 
-// Of a series with that entry, with its number in place of <...>.
+// The meaning of the series `name`, with its number in place of <...>.
 std::string meaning_of(const SeriesEntry& entry, std::string_view name);
 
 // Whether a series of this name can be expected, and the names to suggest: families as such but for the energy terms.

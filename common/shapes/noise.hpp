@@ -8,7 +8,7 @@ namespace tubule {
 struct Tube;
 struct Sphere;
 
-// Of all waves up to these numbers.
+// Random sum of all modes up to these numbers.
 struct ShapeNoise {
     double amplitude = 0;  // root of the mean square of what is added to the radius; of spheres relative to it
     int along = 8;         // n of tubes, l of spheres

@@ -47,7 +47,7 @@ struct SmoothProfile {
     Eigen::VectorXd r, z;  // coefficients: of a cell by k, else 1, cos, sin, cos, sin, ...
     double distance = 0;   // of the points, at most, from the curve
     int points = 0, waves = 0;
-    // Of the part of the area below, from 0 to 1, where the file has it: with as few waves as suffice, too.
+    // H0 as a function of the part of the area below, 0 to 1, where the file has it; fitted by as few waves as suffice.
     std::shared_ptr<const Formula> H0 = {};
     double H0_distance = 0;  // of the values, at most
 

@@ -67,7 +67,7 @@ void subtract_below(int rows, int columns, int k, const Scalar* A, int lda, cons
     parallel_for(static_cast<std::size_t>((columns + tile_columns - 1) / tile_columns), tile, parallel);
 }
 
-// Of the lower triangle of A (n x n), in place and column by column.
+// Replaces the lower triangle of A (n x n) by its factors, column by column.
 template <class Scalar>
 void eliminate_block(int n, Scalar* A, std::ptrdiff_t lda, double smallest_pivot, Elimination& found) {
     for (int j = 0; j < n; ++j) {

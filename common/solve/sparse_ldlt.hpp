@@ -49,9 +49,9 @@ public:
         return x;
     }
 
-    // Of the last factors: number of negative pivots, which is that of negative eigenvalues; the smallest pivot; the
-    // largest l_ij^2 |d_j|, at most 1 for definite matrices. Rounding in the factors is about growth * epsilon of the
-    // scaled matrix.
+    // The last factors' number of negative pivots, which is that of negative eigenvalues; smallest pivot; largest
+    // l_ij^2 |d_j|, at most 1 for definite matrices. Rounding in the factors is about growth * epsilon of the scaled
+    // matrix.
     struct Pivots {
         int negative = 0;
         double smallest = 0, growth = 0;

@@ -107,7 +107,7 @@ struct StableTensions {
     double q_lowest = 0, q_highest = 0;
 };
 std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m);
-// Of m = 0 ... last together.
+// The tensions that are stable for all of m = 0 ... last.
 std::optional<StableTensions> common_stable_tensions(const UniformTube& tube, int last);
 
 // The f_KK (2 k42) above which no wave of m = 0 grows, all else fixed. Empty if long waves grow for every f_KK.

@@ -46,7 +46,7 @@ Line line_through(const std::vector<Point>& points, int from, int to) {
 
 GrowthFit fitted(const std::vector<Point>& points, int from, int to) {
     const Line whole = line_through(points, from, to);
-    // Of the three thirds, which share a point with their neighbours. Two halves could agree by symmetry.
+    // Slopes of the three thirds, which share a point with their neighbours. Two halves could agree by symmetry.
     double least = std::numeric_limits<double>::infinity(), most = -least;
     for (int third = 0; third < 3; ++third) {
         const int last = to - from - 1;

@@ -25,7 +25,7 @@ Vector3d area_vector(const TriangleMesh& mesh, const std::array<int, 3>& t) {
     return (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]) / 2;
 }
 
-// Of linear elements: the stiffness matrix, and a third of the area of the triangles at each vertex.
+// Linear elements: the stiffness matrix, and a third of the area of the triangles at each vertex.
 struct Laplacian {
     Sparse stiffness;
     Eigen::VectorXd area;

@@ -26,9 +26,9 @@ class ClosestPoint {
 public:
     explicit ClosestPoint(const CurvedMesh& mesh);
 
-    // Of all points whose outward normal makes an angle below 90 degrees with `normal`, the one nearest to x: of two
-    // sheets close to each other the one that faces the right way. Boxes around the cells select the candidates;
-    // there Newton's method finds it to rounding, if x is nearer than the radii of curvature. Cell -1 if there is none.
+    // The point nearest to x of those whose outward normal makes an angle below 90 degrees with `normal`: of two close
+    // sheets, on the one that faces the right way. Boxes around the cells select the candidates; there Newton's method
+    // finds it to rounding, if x is nearer than the radii of curvature. Cell -1 if there is none.
     MeshPoint operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const;
 
 private:

@@ -23,7 +23,7 @@ struct HalfEdges {
     // Half-edges of the same triangle, counter-clockwise and clockwise.
     static int next(int h) { return h % 3 == 2 ? h - 2 : h + 1; }
     static int previous(int h) { return h % 3 == 0 ? h + 2 : h - 1; }
-    // Of all half-edges, removed ones included.
+    // The number of half-edges, removed ones included.
     int size() const { return static_cast<int>(origin.size()); }
     bool exists(int h) const { return origin[h] >= 0; }
     int target(int h) const { return origin[next(h)]; }

@@ -28,7 +28,7 @@ using ExactPoint =
 // For elements of this order, the worst of 8 meridians. `point` is called by several threads at once.
 Resolution measure_resolution(const ExactPoint& point, const Profile& profile, int order);
 
-// Of the surface map(profile); `map` as for mapped_mesh.
+// Measures the surface map(profile); `map` as for mapped_mesh.
 template <class Map>
 Resolution resolution_of(const Map& map, const Profile& profile, int order) {
     return measure_resolution(

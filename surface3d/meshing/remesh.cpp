@@ -23,7 +23,7 @@ using Eigen::Vector3d;
 constexpr double too_long = 4.0 / 3, too_short = 4.0 / 5;
 constexpr double most_scale = 1.2;
 constexpr int passes = 8, last_passes = 6, most_rounds = 10;
-// Of triangles that a change of the mesh may leave, if they were no worse before.
+// Least scores of triangles that a change of the mesh may leave, if they were no worse before.
 constexpr double fair_collapse = 0.4, fair_flip = 0.6, fair_move = 0.5;
 // A node farther than this from the old mesh, over the width wanted there, is not on the same surface.
 constexpr double near_foot = 0.5, near_graph = 0.02;
@@ -50,14 +50,14 @@ struct Work {
     double stretch(int h) const {
         return edges.vector(h).norm() * 2 / (scale * (width[edges.origin[h]] + width[edges.target(h)]));
     }
-    // Of the triangle of h, with the origin of h at x.
+    // Score of the triangle of h with the origin of h at x.
     double score_with(int h, const Vector3d& x, const Vector3d& n) const {
         const int second = HalfEdges::next(h), third = HalfEdges::previous(h);
         return score({x, edges.position(second), edges.position(third)},
                      {n, normal[edges.origin[second]], normal[edges.origin[third]]});
     }
     double score_of(int h) const { return score_with(h, edges.position(h), normal[edges.origin[h]]); }
-    // The least one of the triangles around a vertex, as they are or with it moved.
+    // Least score of the triangles around a vertex, as they are or with it moved.
     double score_around(int v, const Vector3d& move, const Vector3d& n) const {
         double least = 1;
         edges.around(v, [&](int h) { least = std::min(least, score_with(h, edges.position(h) + move, n)); });

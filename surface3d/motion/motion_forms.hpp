@@ -11,7 +11,7 @@
 
 namespace tubule::surface3d {
 
-// Of the pressure's elements, on surfaces of this order: Taylor-Hood where the surface flows; 0 without a pressure.
+// Order of the pressure on surfaces of this order: Taylor-Hood elements where the surface flows; 0 without a pressure.
 int pressure_order(const SurfaceLaw& law, int order);
 
 // The fields of a law, and the numbers of their unknowns.

@@ -57,7 +57,7 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
     return of_cell.rowwise().sum();
 }
 
-// Of the narrowest place. The curvature around a neck must be shared by all nodes of a cell, as single nodes may be
+// Radius and place of the narrowest neck. All nodes of a cell must have the curvature of a neck, as single nodes may be
 // inaccurate.
 void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
     m.neck_radius = std::numeric_limits<double>::infinity();

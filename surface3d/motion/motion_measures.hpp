@@ -41,8 +41,8 @@ struct MotionMeasures {
     Eigen::Vector3d least_defined = Eigen::Vector3d::Zero();  // where that node is
 };
 
-// Of a state on the mesh of `surface`, whose projection is brought there. `before`: where the step that led to it
-// began; the acceleration is 0 without.
+// Measures a state on the mesh of `surface`, whose projection is brought there. `before`: where the step that led to it
+// began; without it the acceleration is 0.
 MotionMeasures measure(MovingSurface& surface, const MotionState& state, const MotionState* before = nullptr);
 
 Smoothness smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values);

@@ -31,8 +31,8 @@ struct MotionState {
     double lambda = 0;               // multiplier of the volume; 0 where that is free
     double tension = 0;              // multiplier of the area as a whole; 0 where that is free or p holds it
     double period = 0, stretch = 0;  // of a tube: length, and the rate at which it grows over itself
-    // Of the scheme that made the step; null at the start, and for schemes that need none. Steps share it: it is never
-    // modified, each step creates its own.
+    // What the scheme that made the step keeps; null initially, and for schemes that keep nothing. Steps share it: it
+    // is never modified, each step creates its own.
     std::shared_ptr<const SchemeMemory> memory;
 };
 

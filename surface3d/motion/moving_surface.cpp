@@ -224,7 +224,7 @@ bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f
     return variation < control_.least_variation && std::abs(lack_of_volume(mesh)) < control_.most_drift;
 }
 
-// Of what is conserved; zero of what is not.
+// How much conserved area and volume have lost; 0 of what is not conserved.
 Extent MovingSurface::lack(const CurvedMesh& mesh) const {
     const Extent now = extent(space_, mesh);
     return {control_.area && !law_.area_is_free() ? *control_.area - now.area : 0,

@@ -66,7 +66,7 @@ public:
     // The velocity of the nodes for the normal velocity of the surface given by `flux`; `fields` are the last ones.
     VectorField mesh_velocity(const CurvedMesh& mesh, const MotionFields& fields, const Eigen::VectorXd& flux,
                               double relaxation);
-    // Of nodes that are material, or as above.
+    // The velocity of material nodes, or as above.
     VectorField node_velocity(const MotionState& state, const CurvedMesh& mesh, const MotionFields& fields,
                               const Eigen::VectorXd& flux, double relaxation);
     // At the nodes of the mesh: velocities of the surface, pressures.

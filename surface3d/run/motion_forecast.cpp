@@ -24,16 +24,16 @@ constexpr double cost_power = 1.2;        // of the number of triangles: the cos
 constexpr double with_coarser_run = 1.35, with_coarser_runs = 1.6;
 constexpr double threads_power = 0.6;                         // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
-// Fluids of whose steps so many lead to rough surfaces may need finer runs, where less than this is asked.
+// Fluids of which this part of the steps leads to rough surfaces may need finer runs, for tolerances below this.
 constexpr double rough_part = 0.1, asked_of_rough = 5e-3;
 constexpr double usual_steps = 100, usual_step = 0.5e-3;  // at the loosest tolerance; seconds for a triangle
 
-// Seconds that this process has used, over those that so many threads save on a quiet machine.
+// CPU seconds of this process over the speedup by its threads on a quiet machine.
 double quiet_seconds() {
     return std::clock() / (CLOCKS_PER_SEC * std::pow(loop_threads(), threads_power));
 }
 
-// Of both runs: their matrices and factors.
+// Memory of both runs: their matrices and factors.
 double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
     const double width = MotionUnknowns(mesh, motion_law(c.model), c.energy).width();
     return bytes_at_rest + bytes_per_entry * triangles * width * width;

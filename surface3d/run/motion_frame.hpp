@@ -67,7 +67,7 @@ struct MotionRestart {
     MotionMemory memory;
 };
 
-// Of a run with this scheme. Throws as RecordReader.
+// The restart of a run with this scheme. Throws as RecordReader.
 MotionRestart motion_restart(const Record& record, Scheme scheme);
 
 }  // namespace tubule::surface3d

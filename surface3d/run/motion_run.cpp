@@ -12,10 +12,10 @@
 namespace tubule::surface3d {
 namespace {
 
-// Of the error asked for: where a finer run is to replace it, a run that is so far off is not finished.
+// Error over the tolerance beyond which a run is not finished, where a finer run can replace it.
 constexpr double beyond_use = 3;
 
-// Nothing of it is cured by a finer run.
+// Whether a finer run cannot help.
 bool ended_by_physics(const StopReport& stop) {
     return exit_code(stop.reason) == exit_code(Stop::pinch_off);
 }

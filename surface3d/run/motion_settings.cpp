@@ -40,7 +40,7 @@ double tolerance_for(const Case& c) {
     return std::clamp(tolerance, 1e-13, loosest_tolerance);
 }
 
-// Of errors, from a mesh to the coarser one; elements of one order less count as a mesh.
+// Factor of errors from a mesh to the coarser one; elements of one order less count as a mesh.
 double growth_in_space(const MotionSettings& coarser, double order) {
     return coarser.role == Role::other_order ? order : std::pow(coarser.coarser_by, order / 2);
 }

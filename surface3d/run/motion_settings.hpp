@@ -74,7 +74,7 @@ struct MotionErrors {
     double defect = 0;
 };
 
-// Of the next pair, after one with these errors, where less is asked.
+// Settings of the next pair, after one with these errors, for the tolerance `asked`.
 MotionSettings finer(const MotionSettings& s, double asked, const MotionErrors& errors);
 
 // Whether more triangles are worth a try.

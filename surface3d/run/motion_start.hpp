@@ -16,8 +16,8 @@ Observables observe_start(const Case& c, const StartMesh& start);
 
 // F at the start, and E_ref of a run with it. The latter throws CaseError as tubule::reference_energy.
 double free_energy(const Case& c, const Observables& start, double period);
-// Of this energy on a mesh of so many elements, absolute; from a finer mesh, since where the shape is not smooth, a
-// coarser one may be off by the same. 0 where there is none.
+// Absolute error of this initial energy on a mesh of this number of elements, by a finer mesh, since where the shape is
+// not smooth a coarser one may be off by the same. 0 where there is none.
 double error_of_start(const Case& c, const Start& start, int elements, double energy);
 double reference_energy(const Case& c, const Observables& start, double period);
 

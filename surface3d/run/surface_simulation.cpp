@@ -202,13 +202,13 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
     }
 }
 
-// Of the step before; 0 where a load has changed its slope since: rates have a kink there.
+// Length of the step before; 0 where a load changed its slope at its end: rates have a kink there.
 double SurfaceSimulation::since_kink() const {
     const double before = std::nextafter(state_.time, -HUGE_VAL);
     return surface().law().next_kink(before) == state_.time ? 0 : state_.step;
 }
 
-// Of the loads in a step, in which none changes its slope.
+// Work of the loads in a step, in which none changes its slope.
 double SurfaceSimulation::work_of(const MotionStep& next, const MotionMeasures& m) const {
     const auto power = [&](const Extent& e) { return surface().law().power(state_.time, e); };
     return sum_of_step(next.state.step, state_.step, power({m.bending.area, m.bending.volume, next.state.period}),
@@ -423,7 +423,7 @@ std::optional<StopReport> SurfaceSimulation::update_error() {
     return std::nullopt;
 }
 
-// Of a volume that is to be kept, relative to that of the start.
+// Change of a volume that is to be kept, relative to the initial one.
 double SurfaceSimulation::volume_drift() const {
     return surface().law().keeps_volume ? now_.bending.volume / memory_.scale.volume - 1 : 0;
 }

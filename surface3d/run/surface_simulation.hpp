@@ -20,7 +20,7 @@ namespace tubule::surface3d {
 
 class MotionError;
 
-// Of two times of a run: by more than rounding.
+// Whether t is before the other time by more than rounding.
 inline bool is_before(double t, double other) {
     return t < other * (1 - 1e-12);
 }
@@ -58,8 +58,8 @@ public:
     CurvedMesh mesh() const { return surface().mesh(state_); }
     double shortest_usual_step() const;  // a run of shorter ones may have stalled
 
-    // Of a coarser run that follows: the length to try next; a mesh of about so many triangles, beside a run that has
-    // so many of them now, or why there is none.
+    // For coarser runs that follow: the length of the next step; a mesh of about `triangles` beside a run that has
+    // `of_run` of them now, or why there is none.
     void set_next_step(double tau) { memory_.next_step = tau; }
     std::optional<StopReport> coarsen_to(int triangles, int of_run);
 
@@ -67,7 +67,7 @@ private:
     class View;
     // Why a trial step was rejected; empty if it is accepted.
     struct Refusal {
-        double shrink = 0.25;  // the next trial is so much shorter; 0: there is none
+        double shrink = 0.25;  // length of the next trial over this one; 0: there is none
         StopReport report;     // if no step is short enough
     };
 

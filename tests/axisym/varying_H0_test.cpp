@@ -133,8 +133,8 @@ Outcome run_text(const std::string& text, const std::vector<std::string>& sets =
     return out;
 }
 
-// Of the last frame, a tube with E = 0: the largest |H - H0|, and the largest differences of theory.md (4.17) where H0
-// is constant to 1e-6, in either half.
+// The last frame, a tube with E = 0, has this largest |H - H0| and these largest differences of theory.md (4.17) where
+// H0 is constant to 1e-6, in either half.
 struct Delaunay {
     double curvature = 0, low = 0, high = 0, rounder = 0;
     explicit Delaunay(const Outcome& o) {

@@ -253,7 +253,7 @@ class NoEquilibrium(ProgramTest):
         )
 
     def test_a_volume_that_no_tube_has(self):
-        # Of period 4: a ball of area 6 encloses 1.38198, more than a cylinder, 36/(16 pi).
+        # In a period of 4 a ball of area 6 encloses 1.38198, more than a cylinder, 36/(16 pi).
         tube = 'tier = "axisym"\n[energy]\nk20 = 1.0\n[shape]\nkind = "tube"\nradius = 0.25\nlength = 4.0\n'
         self.fails(
             tube + "[equilibrium]\narea = 6.0\nvolume = 1.4\n",

@@ -118,7 +118,7 @@ class MeshesTest(ProgramTest):
         self.stl("contour.stl", points, triangles)
         rows, said, words = self.run_mesh("contour.stl")
         self.assertAlmostEqual(rows["volume"][-1] / abs(volume(points, triangles)), 1, delta=1e-5)  # STL has floats
-        # Of the smooth ellipsoid, 4 pi abc/3 and INT H^2; without smoothing INT H^2 would be hundreds.
+        # The smooth ellipsoid has 4 pi abc/3 and INT H^2 = 58.98; without smoothing INT H^2 would be hundreds.
         self.assertAlmostEqual(rows["volume"][-1] / (4 / 3 * np.pi * 0.48), 1, delta=0.02)
         self.assertAlmostEqual(rows["energy"][-1] / 58.98, 1, delta=0.1)
         count = int(re.search(r"(\d+) new triangles instead of", words).group(1))

@@ -56,7 +56,7 @@ TEST(Extension, WordsJoinBehind) {
 }
 
 TEST(Extension, ANewAxisHasTheValueOfThePoints) {
-    // Of the case, of an override, and the default.
+    // The value of the case, of an override, and the default.
     Extension e = extended(made_up({"energy.H0=-1,0"}), {"energy.k42=1"});
     EXPECT_EQ(e.scan.axes[1].values, (std::vector<std::vector<std::string>>{{"0.5"}, {"1"}}));
     EXPECT_EQ(known_and_in_place(e), 2u);

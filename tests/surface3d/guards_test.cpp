@@ -124,7 +124,7 @@ TEST(Guards, SpeakWhereANumberIsNone) {
         o.integral_H2 = H ? none : 16 * pi, o.integral_K = H ? 4 * pi : none;
         EXPECT_TRUE(find_impossible_curvature(o, sphere)) << H;
     }
-    // Of a shape that has nothing else amiss.
+    // A shape with no other defect.
     const MotionMeasures well = sound_shape();
     EXPECT_FALSE(find_bad_shape(well, 1e-3, 3));
     MotionMeasures m = well;

@@ -18,7 +18,7 @@ std::string refusal(ImportedMesh mesh) {
     return test::message_of<MeshError>([&] { close_mesh(mesh); });
 }
 
-// Of a file of these vertices and faces, with the name cut to "a.obj".
+// Why a file of these vertices and faces is refused, with its name cut to "a.obj".
 std::string refusal_of_obj(const std::string& text) {
     const TemporaryDirectory directory;
     ImportedMesh mesh = read_mesh(directory.write("a.obj", text));

@@ -231,7 +231,7 @@ TEST(MotionSettings, SmoothnessIsTheOrderOfLinearInterpolation) {
         for (int i = 0; i < mesh.size(); ++i) out[i] = f(mesh.nodes[i]);
         return out;
     };
-    // Of a quadratic on flat triangles it misses f'' h^2/8 everywhere: order 2 exactly.
+    // Interpolation of a quadratic on flat triangles misses f'' h^2/8 everywhere: order 2 exactly.
     const Eigen::VectorXd quadratic = values([](const Eigen::Vector3d& x) { return 1 + x[0] * x[0] - x[1] * x[2]; });
     const Smoothness s = smoothness_of(mesh, quadratic), tenfold = smoothness_of(mesh, 10 * quadratic);
     EXPECT_NEAR(s.order, 2, 1e-9);

@@ -39,7 +39,7 @@ CurvedMesh sheared_ellipsoid(int n, int order, double amount) {
     return mapped_mesh(icosphere(n), order, sheared(map_of(ellipsoid), [=](double z) { return amount * z; }));
 }
 
-// Of period 2, narrowest at z = `neck`.
+// A tube of period 2, narrowest at z = `neck`.
 Tube necked(double neck) {
     return {.radius = 0.5, .length = 2, .modes = {{0.25, 1, 0, pi * (1 - neck)}}};
 }
@@ -115,7 +115,7 @@ TEST(MeshQuality, IsOneForEquilateralTrianglesAndNoneWhereTheyFold) {
     const Vector3d o = Vector3d::Zero(), x = Vector3d::UnitX(), y = Vector3d::UnitY();
     for (int k = 2; k <= 4; ++k) {
         EXPECT_NEAR(mesh_quality(one_triangle(o, x, x / 2 + std::sqrt(0.75) * y, k)).worst, 1, 1e-12);
-        // Of a flat triangle: 4 sqrt(3) area/(sum of squared sides), here 4 sqrt(3)/2/(1 + 1 + 2).
+        // A flat triangle has 4 sqrt(3) area/(sum of squared sides), here 4 sqrt(3)/2/(1 + 1 + 2).
         EXPECT_NEAR(mesh_quality(one_triangle(o, x, y, k)).worst, std::sqrt(0.75), 1e-12);
         EXPECT_NEAR(mesh_quality(one_triangle(o, x, 1e-3 * y, k)).worst, 2e-3 * std::sqrt(0.75), 1e-6);
     }

@@ -89,7 +89,7 @@ class Raster(unittest.TestCase):
             samples = raster.sample(cells, cells, cells, 4, closed, raster.View(), (-1.25, 1.25), 80, 200, 200)
             near = samples.depth > 0.4 * 80  # away from the rim, where both sides meet
             outside.append((near.sum() > 10000, samples.outside[near].mean() if near.any() else None))
-        # Of a closed surface only what faces the eye is drawn: inside out, nothing of the near half.
+        # Only what faces the eye is drawn of a closed surface: inside out, nothing of the near half.
         self.assertEqual(outside, [(True, 1), (True, 0), (True, 1), (False, None)])
 
     def test_shading_is_smooth_and_outlined(self):

@@ -346,7 +346,7 @@ TEST(Thresholds, theFastestWaveIsTheFastest) {
                 }
                 EXPECT_EQ(growth(tube, law, fastest->q, m).rate(), fastest->rate);
             }
-        // Of those that fit: the best of all.
+        // The best of all that fit.
         const MotionLaw law = law_of(ModelKind::fluid, 2, 0.3);
         theory::FittingWave best;
         for (int m = 0; m <= 2; ++m)

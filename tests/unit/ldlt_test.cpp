@@ -61,7 +61,7 @@ int negative_eigenvalues(const Dense& A) {
     return static_cast<int>((Eigen::SelfAdjointEigenSolver<Dense>(A).eigenvalues().array() < 0).count());
 }
 
-// Of the answer of dense LU, in units in which the diagonal is 1, relative.
+// Error relative to the answer of dense LU, in units in which the diagonal is 1.
 template <class Scalar>
 double error(const SparseLdlt<Scalar>& factors, const Dense& A, const Vector& b) {
     const Vector units = A.diagonal().cwiseAbs().cwiseSqrt();

@@ -77,7 +77,7 @@ struct Past {
     }
     int points() const { return static_cast<int>(ago.size()); }
 
-    // Of the value at state j in that of the polynomial through the first n states at the end of the step.
+    // Weight of state j in the polynomial through the first n states, evaluated at the end of the step.
     double weight(int j, int n) const {
         double out = 1;
         for (int i = 0; i < n; ++i)
@@ -102,7 +102,7 @@ struct Past {
         for (int j = 1; j < k; ++j) out += te(k) / ago[j] * weight(j, k) * *values[j];
         return out;
     }
-    // Of the nodes.
+    // Velocity of the nodes in state j.
     VectorField rate(int j) const { return *w[j] + stretched(*X[j], *stretch[j]); }
 };
 
@@ -143,8 +143,8 @@ public:
     }
 
 private:
-    // Of order 4 twice, the second time on the surface that the first has found: extrapolation alone, on which that is
-    // solved, is of order 3.
+    // Solves order 4 twice, the second time on the surface that the first has found: the extrapolated surface, on which
+    // the first is solved, is of order 3.
     StageSolution solve(const MotionState& from, const Past& past, int order, double tau) {
         const int through = std::clamp(order, 1, most_extrapolated);
         Stage stage{from.time + tau,

@@ -6,8 +6,8 @@
 namespace tubule::surface3d {
 namespace {
 
-// Of the positions along the normal, largest. From a past, by Adams-Bashforth of second order for comparison; the
-// constants of both errors are known (Milne).
+// Largest error of the positions along the normal. With a past, from the difference to Adams-Bashforth of second order,
+// since the constants of both errors are known (Milne).
 double estimated_error(const MotionState& from, const PastState* past, const OneStage& stage, const VectorField& normal,
                        const MotionState& to) {
     const double tau = to.step;

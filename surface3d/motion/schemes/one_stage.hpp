@@ -42,7 +42,7 @@ public:
     const StepSolver& solver() const { return solver_; }
 
 protected:
-    // Of the first step of all these schemes.
+    // Backward Euler, the first step of all these schemes.
     static OneStage euler(const MotionState& from, double tau) { return {1, tau, from.X, from.period, from.u, 0}; }
 
     // Solved on what the last two states extrapolate to, or on that of `from` if there is no past, with `missed` more

@@ -54,7 +54,7 @@ public:
 
 struct NoMemory {};
 
-// Of a state that this scheme made, else nullptr.
+// The memory of a state that this scheme made, else nullptr.
 template <class Memory>
 const Memory* memory_of(const MotionState& state) {
     return dynamic_cast<const Memory*>(state.memory.get());
