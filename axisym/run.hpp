@@ -13,7 +13,7 @@ namespace tubule::axisym {
 // Names of the series a run of this case writes, "time" first.
 std::vector<std::string> series_names(const Case& c);
 
-// Throws std::runtime_error if the record does not hold what a run goes on from.
+// Throws std::runtime_error if a run cannot resume from the record.
 void check_restart(const Record& record);
 
 // Tubes in gradient flow are computed as graphs r(z), from the beginning as curves if one overhangs; all else as

@@ -57,7 +57,7 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
-// A curve through so many points that the spline between them is not what limits the accuracy.
+// A curve through enough points that the spline between them does not limit the accuracy.
 Meridian sampled(const WavedProfile& surface, const ResultFrame& from) {
     int waves = 0;
     for (const FrameMode& mode : from.modes) waves = std::max(waves, mode.l ? *mode.l : *mode.n);

@@ -28,14 +28,14 @@ bool comparable(const StopReport& coarse, const StopReport& fine, double end) {
     return coarse.reason == fine.reason && std::min(coarse.time, fine.time) > too_early * end;
 }
 
-// Whether a flow may have been ill-posed without being seen to be: the two runs of a pair are at least half as far
-// apart as the finer one is from that. A symbol that cannot change its sign may come as close to 0 as it likes.
+// Whether the flow may have been ill-posed unnoticed: the least symbols of the two runs of a pair differ by at least
+// half of that of the finer one. A symbol that cannot change its sign may come arbitrarily close to 0.
 bool may_be_ill_posed(const Bending& energy, double coarse, double fine) {
     return symbol_may_vanish(energy) && fine < 2 * std::abs(coarse - fine);
 }
 
-// Errors estimated by pairs of runs: the energies of a coarser run tell the error of the finer one, which is reported.
-// Where that is more than asked, the finer run becomes the coarser one of the next pair.
+// Errors estimated by pairs of runs: that of the finer one, which is reported, from the energies of a coarser one.
+// Where it exceeds the tolerance, the finer run becomes the coarser one of the next pair.
 class CurveRuns : public EstimatedRuns {
 public:
     CurveRuns(const Case& c, RunObserver& watch, const RunClock& clock, const Record* restart)

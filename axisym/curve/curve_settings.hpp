@@ -31,12 +31,12 @@ double step_growth_of(const CurveSettings& s);
 // Settings of the other run of a pair.
 CurveSettings coarser(const CurveSettings& s);
 
-// By how much the next pair has more elements, after one whose runs differed `excess` times more than asked; or, where
-// the part of the mesh is known, after one that lost that much too much to its mesh. That part is an estimate: if
-// smaller tolerances did not make the error smaller, more elements may.
+// Factor of the elements of the next pair, after one whose runs differed by `excess` times the tolerance; or, where the
+// error due to the mesh is known, after one where that was `excess_of_mesh` times what is allowed. It is an estimate:
+// where smaller time tolerances did not reduce the error, more elements may.
 double mesh_growth(double excess);
 double mesh_growth(double excess_of_mesh, bool error_falls);
-// The next pair: a tenth of the tolerance, and so many times more elements.
+// The next pair: a tenth of the tolerance, and `mesh` times as many elements.
 CurveSettings finer(const CurveSettings& s, double mesh);
 
 // Whether another pair is worth a try.

@@ -17,10 +17,10 @@ namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions/curves.md, "Curves in motion".
-// Elements at a seam, where the curvature jumps: no more than this part of those elsewhere, and, for the energy that a
-// smooth spline loses there, no more than so much of the asked accuracy; of the length of the profile.
-// The run's own are not smaller than `least_seam`, or rounding there keeps the integrator from starting; its first step
-// smooths the seam over far more than that.
+// Elements at a seam, where the curvature jumps: at most this part of those elsewhere and, for the energy that a smooth
+// spline loses there, at most the accuracy times `seam_per_accuracy`, of the length of the profile. Those of the run
+// are not smaller than `least_seam`, or rounding there prevents the integrator from starting; its first step smooths
+// the seam over far more than that.
 constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 3e-4;
 constexpr double most_risen = 0.1;     // of E_ref: the energy of a first step that cannot be believed
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
@@ -46,9 +46,9 @@ double gauge_of(const Case& c, double energy, double area) {
     return law.viscosity != 0 ? energy * c.model.Re : energy;
 }
 
-// Elements of the asked size, small ones at seams. These shrink faster than the rest, for the error is of first order
-// there and the difference of a pair must exceed it; not in a fluid, whose waves they make shorter: ten times the
-// steps.
+// Elements of the asked size, small ones at seams. These shrink faster than the rest, since the error is of first order
+// there and the difference of a pair must exceed it; but not in a fluid, where they allow shorter waves, which take ten
+// times the steps.
 std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Case& c, double least) {
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();

@@ -1,4 +1,4 @@
-// From a case to the system of equations of one run: mesh, law of motion, start.
+// From a case to the system of equations of one run: mesh, law of motion, initial state.
 #pragma once
 
 #include <memory>
@@ -16,13 +16,13 @@ namespace tubule::axisym {
 
 CurveLaw law_of(const Case& c);
 
-// The common start of all runs of a case: half of the profile if it is symmetric and the case allows it.
+// The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct Beginning {
     Meridian meridian;
     double area = 0, volume = 0;
     ShapeEnergy bending;
     std::optional<StartVelocity> velocity = {};
-    std::string note = {};  // what there is to say of it
+    std::string note = {};  // for the user
 
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
     int images() const;                              // of the meridian in the whole shape
@@ -39,7 +39,7 @@ struct CurveSetup {
     std::unique_ptr<CurveSpace> space;
     std::unique_ptr<CurveMotion> motion;
     double reference_energy = 0;  // what errors are relative to
-    double magnitude = 0;         // of the terms of the energy at the start
+    double magnitude = 0;         // of the terms of the initial energy
     SeriesTable<CurveRow> series;
 
     int elements() const { return space->splines().elements() * space->images(); }
@@ -52,7 +52,7 @@ struct CurveSetup {
     TimeControl control(double first_step) const;
 };
 
-// Unknowns and rates at the start: those to compute from, and those to show, with the exact curve.
+// Initial unknowns and rates: those to compute from, and those to show, with the exact curve.
 struct CurveBegin {
     Eigen::VectorXd y, rate, shown;
     double time = 0, first_step = 0;  // when the unknowns are those to compute from

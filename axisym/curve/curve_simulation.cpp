@@ -25,7 +25,7 @@ constexpr int few_steps = 8;
 const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
 constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
 
-// How often the integrator has begun by this time: at the start, and at each kink of the loads.
+// Number of starts of the integrator until t: the first one, and one at each kink of the loads.
 int beginnings(const MotionLaw& law, double t) {
     int count = 1;
     for (double kink = next_kink(law, 0); kink < t; kink = next_kink(law, kink)) ++count;
@@ -293,9 +293,9 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
     error = std::max(error, error_now_);
 }
 
-// No law of motion lets the total energy, less the work of loads that change, rise: what it rises by is an error. Where
-// that is larger than the errors asked for and known, or the shape is none of a membrane, the run goes back to the last
-// good step.
+// No law of motion lets the total energy, less the work of loads that change, rise: a rise is an error. Where it
+// exceeds the tolerance and the known error, or the shape is not that of a membrane, the run returns to the last good
+// step.
 std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
     const bool asked = !setup_.settings.is_coarser && !settings_given(setup_.c);
     const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,

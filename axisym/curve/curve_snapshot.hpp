@@ -18,12 +18,12 @@ struct Snapshot {
     double total() const { return free_energy + balance.kinetic; }
 };
 
-// Whether the state is one of a membrane at all: what else is seen of it means something.
+// Whether the state is that of a membrane, so that other measurements mean something.
 inline bool is_admissible(const Snapshot& s) {
     return std::isfinite(s.total()) && s.o.r_min > 0 && s.neck.radius > 0;
 }
 
-// What the unknowns y and their rates describe.
+// Measures the state of unknowns y and their rates.
 Snapshot measure(const CurveMotion& motion, double t, const double* y, const double* rate);
 
 // Amplitude of the wave of number n in r(z), also where that has several values.

@@ -21,7 +21,7 @@ int images(const Meridian& m) {
     return m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1;
 }
 
-// Calls visit(from, width) for about so many panels, none of which contains a seam.
+// Calls visit(from, width) for about this number of panels, none of which contains a seam.
 template <class Visit>
 void each_panel(const Meridian& m, int panels, const Visit& visit) {
     std::vector<double> edges{0};

@@ -404,7 +404,8 @@ public:
         double error = std::numeric_limits<double>::infinity();
         if (elements_ > 0) {
             const double change = std::abs(energy - energy_);
-            // Two energies may be close by accident. By the order of convergence, or 8, the change before tells too.
+            // Two energies may be close by accident. The previous change, reduced by the order of convergence (at most
+            // 8), bounds the error, too.
             const int order = std::min(2 * (degree - 1), 8);
             error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, order));
             change_ = change;

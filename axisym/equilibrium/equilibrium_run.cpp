@@ -215,7 +215,7 @@ struct ShapeRow {
 };
 
 // The first mode whose growth is found: with a free period, axisymmetric displacements change the period, too, and
-// negative_directions alone tells about them.
+// only negative_directions counts them.
 int first_mode(const Case& c) {
     return c.model.free_period ? 1 : 0;
 }

@@ -3,8 +3,8 @@
 namespace tubule::axisym {
 namespace {
 
-// Measured choices: docs/decisions/graphs.md. The error is carried on after so many steps, or when
-// the logarithm of the dissipation changed so much.
+// Measured choices: docs/decisions/graphs.md. The error is transported after this number of steps, or when the
+// logarithm of the dissipation has changed by this.
 constexpr int error_steps = 8;
 constexpr double error_change = 0.25;
 

@@ -47,9 +47,9 @@ public:
     // M(x) v + grad F(x), which vanishes for the rate v of the gradient flow. Arrays of space().size() numbers.
     // False, with `out` unusable, if at a quadrature point the radius is not positive or the energy is not defined.
     bool residual(const double* x, const double* v, double* out) const;
-    // Its derivative in v, the mass, into the values of a matrix with pattern().
+    // Jacobian dF/dv of this residual F, the mass, into the values of a matrix with pattern().
     void mass(const double* x, double* values) const;
-    // Its derivative in x + cj that in v, likewise.
+    // Jacobian dF/dx + cj dF/dv, likewise.
     void jacobian(const double* x, const double* v, double cj, double* values) const;
     // Compressed columns shared by hessian, mass and jacobian.
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }

@@ -69,7 +69,7 @@ private:
     const Case& case_;
     RunObserver& watch_;
     const RunClock& clock_;
-    const Record* restart_;  // until the run goes on from it
+    const Record* restart_;  // until a run has resumed from it
     GraphSettings settings_;
     std::string fallback_;  // why IDA integrates what Rosenbrock's method should have
     int count_ = 1, left_ = most_attempts;

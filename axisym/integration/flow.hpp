@@ -16,7 +16,7 @@ struct TimeControl {
     double absolute = 1e-9;  // added to that, times the unknown's scale
     int max_order = 5;       // of the backward differences
     double first_step = 0;   // 0: chosen by IDA
-    double growth = 2;       // a step is at most so many times as long as the one before; at least 2
+    double growth = 2;       // largest ratio of a step to the one before; at least 2
     double newton = 0.01;    // tolerance of the iteration, relative to that of the error test
     // At least two iterations. IDA accepts one where earlier ones converged quickly; then constraints hold only to
     // the error of the step, because they are nonlinear.
@@ -51,14 +51,14 @@ struct FlowSystem {
     std::function<double(double t, const double* x, const double* v)> dissipation;
     std::function<double(double t, const double* x, const double* v)> work;  // its rate; empty: none is done
     std::function<Guards(double t, const double* x, const double* v)> guards;
-    std::size_t n_guards = 0;  // how many these are
+    std::size_t n_guards = 0;  // their number
 };
 
 // Gauss points and weights of a step: what is integrated along its path is so there.
 inline constexpr std::array path_points{0.1127016653792583, 0.5, 0.8872983346207417};
 inline constexpr std::array path_weights{5.0 / 18, 8.0 / 18, 5.0 / 18};
 
-// A system on its way. Which method takes the steps is the choice of who makes it.
+// The integration of a system in time, by one of several methods.
 class Flow {
 public:
     Flow() = default;
@@ -81,7 +81,7 @@ public:
     virtual double step_size() const = 0;           // of the last step
     virtual int order() const = 0;
     virtual int tripped() const = 0;          // index of the guard that ended the step
-    virtual std::string failure() const = 0;  // why
+    virtual std::string failure() const = 0;  // why the last step failed
     virtual FlowCounters counters() const = 0;
 };
 

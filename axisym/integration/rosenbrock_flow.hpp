@@ -9,7 +9,7 @@
 namespace tubule::axisym {
 
 // For systems M(x) v + G(x) = 0 that do not depend on the time. One Jacobian and one factorisation a step, no history:
-// a flow that begins anew, on another mesh, goes on with steps as long as before.
+// on a new mesh a flow continues with steps as long as before.
 class RosenbrockFlow : public Flow {
 public:
     // From x0 with rates v0, which solve the system. Of the control, max_order, newton and two_iterations mean nothing.

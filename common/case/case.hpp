@@ -40,7 +40,7 @@ using Shape =
 inline bool is_tube(const Shape& shape) {
     return std::holds_alternative<Tube>(shape);
 }
-// A tube of any kind; of a result only reading it tells.
+// Whether the shape is, or may be, a periodic tube: of a result that is not known before it is read.
 inline bool may_have_period(const Shape& shape) {
     const auto* formula = std::get_if<FormulaShape>(&shape);
     const auto* profile = std::get_if<ProfileFile>(&shape);

@@ -113,7 +113,7 @@ void keys(Keys& k, Shape& shape) {
     std::visit([&](auto& which) { keys(k, which); }, shape);
 }
 
-// The keys of what a membrane keeps and, where it is free, of what acts on it.
+// The keys of fixed area, volume and period, and of the loads that act where they are free.
 template <class Keys>
 void ensemble_keys(Keys& k, Model& model) {
     const bool inextensible = model_entry(model.kind).inextensible;

@@ -29,7 +29,7 @@ CaseInputs inputs_of(const Case& c);
 
 // The name under which the file of a shape is kept; empty if it has none.
 std::string input_name(const Shape& shape);
-// Where the file of a shape is, and its bytes, at most so many. Throws CaseError.
+// Where the file of a shape is, and its bytes, at most `most`. Throws CaseError.
 std::filesystem::path beside(const Case& c, const std::string& path);
 std::string shape_bytes(const Case& c, const std::string& path, std::size_t most);
 // The smooth curve through the points of a file. Throws CaseError.

@@ -61,7 +61,7 @@ struct Formula {
     std::size_t depth = 0;  // of the stack
 };
 
-// Variables are told apart by their names. Allowed: numbers, pi, + - * / ^ and parentheses, sqrt exp log sin cos sinh
+// Variables have distinct names. Allowed: numbers, pi, + - * / ^ and parentheses, sqrt exp log sin cos sinh
 // cosh tanh atan. Exponents are constants. Throws FormulaError.
 Formula parse_formula(const std::string& text, std::span<const std::string_view> variables);
 
@@ -77,7 +77,7 @@ public:
     explicit FormulaDomain(const Formula& formula);
     bool restricted() const { return !limits_.empty(); }
 
-    // The arguments at a point; `place` tells points apart.
+    // The arguments at a point; `place` identifies the point.
     void look(std::span<const double> variables, double place);
 
     // How far the arguments stayed from where the formula is not defined, relative to what they are sums of, and where
@@ -86,7 +86,7 @@ public:
         double value = std::numeric_limits<double>::infinity(), place = 0, argument = 0;
         const Formula::Step* step = nullptr;
 
-        bool is_small() const { return value < 1e-3; }  // too near to go on
+        bool is_small() const { return value < 1e-3; }  // too near to continue
     };
     Margin margin() const;
 

@@ -16,8 +16,8 @@ class EstimatedRuns {
 public:
     virtual ~EstimatedRuns() = default;
 
-    // One run with the present settings; the first one goes on where an earlier one was interrupted, if that is so. It
-    // sets stop, energy, E_ref and the estimated error of the summary, which lives until the next call.
+    // One run with the present settings; the first one resumes an interrupted one, if there is one. It sets stop,
+    // energy, E_ref and the estimated error of the summary, which lives until the next call.
     virtual RunSummary& next() = 0;
 
     // Makes the settings finer. False if the run is accurate enough, or nothing finer is worth a try.

@@ -10,7 +10,7 @@
 namespace tubule {
 namespace {
 
-constexpr double no_change = 1e-9;  // of E_ref: a surface that was at rest
+constexpr double no_change = 1e-9;  // of E_ref: the shape was in equilibrium
 
 constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it has cancelled away
 

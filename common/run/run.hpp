@@ -19,7 +19,7 @@ struct RunObserver {
     virtual void frame(const std::function<Record()>& /*make*/) {}
     virtual void checkpoint(const Record&) {}
     virtual void discard() {}  // the run begins again with finer settings: forget all rows and frames
-    virtual void next_run(int /*number*/, int /*of*/) {}  // a run begins, of so many as far as is known
+    virtual void next_run(int /*number*/, int /*of*/) {}  // a run begins; the number of runs as far as is known
     virtual void progress(double /*time*/, double /*energy*/, double /*step*/) {}
     virtual bool interrupted() { return false; }
     virtual void note(const std::string& /*words*/) {}  // a message to show at once

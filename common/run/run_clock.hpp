@@ -9,9 +9,9 @@
 
 namespace tubule {
 
-// How a run stops that pauses, having come to `time`.
+// The stop of a run that pauses at `time`.
 StopReport pause_report(const Paused& pause, double time);
-// The summary of a run that pauses before it has a state to go on from.
+// The summary of a run that pauses before it has a state to resume from.
 RunSummary paused_at_start(const Paused& pause);
 
 class RunClock {
@@ -22,7 +22,7 @@ public:
     double seconds() const { return watch_.seconds(); }
     // The run, which has come to `time`, is to pause: the time limit is used up, or the observer interrupts it.
     std::optional<StopReport> find_pause(double time) const;
-    // What `run` returns; where it pauses with nothing to go on from, a summary that says so.
+    // What `run` returns; a summary that says so where it pauses with nothing to resume from.
     template <class Run>
     auto pausing(Run&& run) const {
         try {

@@ -14,7 +14,7 @@
 namespace tubule {
 
 // Energies and rates at the end of the last step. `total` can only fall: the free energy with the kinetic energy, less
-// the work of loads that change; `start` and `least` are its values at the start and least so far.
+// the work of loads that change; `start` and `least` are its initial and least values so far.
 struct Energetics {
     double bending = 0, free_energy = 0, total = 0, start = 0, least = 0;
     double kinetic = 0, dissipation = 0, acceleration = 0, area = 0;
@@ -48,7 +48,7 @@ public:
     // One step, not beyond `until`: refused and repeated as often as its method does. The reason if no step leads on,
     // or if all raise the energy: the state is then the last good one.
     virtual std::optional<StopReport> advance(double until) = 0;
-    virtual bool lands_on_outputs() const { return false; }  // or its steps go over them, and at() tells what was there
+    virtual bool lands_on_outputs() const { return false; }  // or its steps pass over them, and at() interpolates
     // Brings the estimated error to the time of the step. The reason if finer settings should replace this run.
     virtual std::optional<StopReport> update_error() = 0;
     // Rows at times within the last step, for methods of long steps.

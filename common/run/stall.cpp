@@ -5,8 +5,8 @@
 namespace tubule {
 namespace {
 
-constexpr double least_progress = 1e-3;  // of the time reached, by so many steps: else they lead nowhere
-constexpr double least_fall = 0.1;       // or of the energy, of the accuracy asked
+constexpr double least_progress = 1e-3;  // increase of the time that counts as progress, relative
+constexpr double least_fall = 0.1;       // fall of the energy that does, relative to the tolerance
 
 }  // namespace
 

@@ -17,8 +17,8 @@ public:
     void save(Record& record) const override;
     void restore(const Record& record) override;
 
-    // Whether the membrane will move by no more than that until the end, if its speed (from the dissipation) goes on to
-    // fall at its present rate. Call it after every step. True where the speed does not fall: waiting would not help.
+    // Whether the membrane will move by no more than that until the end, if its speed (from the dissipation) continues
+    // to fall at its present rate. Call it after every step. True where the speed does not fall: waiting is of no use.
     bool is_settled(double time, double dissipation, double area);
 
 private:

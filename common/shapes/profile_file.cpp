@@ -218,7 +218,7 @@ void refuse_crossing(const std::filesystem::path& path, const std::vector<Point>
         }
 }
 
-// Points that are none of half a profile, or in no order, are told from profiles that are not closed.
+// Refuses points off the half plane r >= 0, or in no order, with other words than profiles that are not closed.
 void refuse_disorder(const std::filesystem::path& path, const std::vector<Point>& points, double size) {
     const auto negative = std::ranges::find_if(points, [&](const Point& p) { return p.r < -at_end * size; });
     if (negative != points.end())
@@ -360,8 +360,7 @@ double area_of(const std::array<double, 4>& point) {
     return point[0] * length_of(point);
 }
 
-// Fits of so many waves: coefficients, and how far the points are.
-// The parameters of the points come with it.
+// A fit: coefficients, the distance of the points, and their parameters s.
 struct Fit {
     SmoothProfile profile;
     std::vector<double> s;
@@ -388,7 +387,7 @@ Fit fit_waves(Kind kind, const std::vector<Point>& points, double length, int wa
     return {fit, s};
 }
 
-// More waves are not determined by so many points, or take too long.
+// More waves are not determined by this number of points, or take too long.
 int most_waves_of(Kind kind, std::size_t points) {
     return std::min(static_cast<int>(points) / (kind == Kind::cell ? 2 : 4), most_waves);
 }

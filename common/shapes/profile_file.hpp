@@ -62,7 +62,7 @@ SmoothProfile read_profile(const std::filesystem::path& path, const std::string&
 // r, dr/ds, z, dz/ds
 std::array<double, 4> point_at(const SmoothProfile& profile, double s);
 Meridian meridian(const SmoothProfile& profile);
-// Through so many points that the fit counts for more than what is between them.
+// The curve through enough points that errors between them are below that of the fit.
 ProfileCurve profile_curve(const SmoothProfile& profile);
 // On that curve, as along_curve() has functions: its second one is the part of the area below, without that of s where
 // the curve is no cell.

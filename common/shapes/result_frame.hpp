@@ -10,7 +10,7 @@
 
 namespace tubule {
 
-// l for a closed surface, n for a tube or ring: which of them it is only reading the frame tells.
+// l for a closed surface, n for a tube or ring: which of them it is, is known once the frame is read.
 struct FrameMode {
     double amplitude = 0;
     std::optional<int> l, n;

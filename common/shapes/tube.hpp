@@ -16,7 +16,7 @@ namespace tubule {
 struct TubeMode {
     double amplitude = 0;
     int n = 1;         // waves per length
-    int m = 0;         // waves around the axis; tier axisym takes m = 0 only
+    int m = 0;         // azimuthal mode number; tier axisym takes m = 0 only
     double phase = 0;  // radians
 };
 

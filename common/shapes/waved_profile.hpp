@@ -1,5 +1,5 @@
-// A surface of revolution with waves around its axis, and how it moves: what a run of tier "auto" goes on from in three
-// dimensions.
+// A surface of revolution with non-axisymmetric modes, and its velocity: from it a run of tier "auto" continues in
+// three dimensions.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
-// Words for people who watch: messages, progress, reports. No work depends on them: where they cannot be written,
-// because a disk is full, a pipe has no reader or a stream was closed, it goes on without them.
+// Words for people who watch: messages, progress, reports. Where they cannot be written, because a disk is full, a pipe
+// has no reader or a stream was closed, work continues without them.
 #pragma once
 
 #include <fmt/format.h>

@@ -90,7 +90,7 @@ private:
 
     const int threads_;
     Loop* loop_ = nullptr;
-    std::atomic<std::uint32_t> calls_ = 0;  // so many loops have been begun
+    std::atomic<std::uint32_t> calls_ = 0;  // number of loops begun
     std::atomic<std::uint32_t> gate_ = 0;   // whether the loop takes helpers, and how many are inside
     std::atomic<bool> ended_ = false;
     std::vector<std::thread> helpers_;

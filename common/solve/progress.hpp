@@ -32,7 +32,7 @@ public:
     Progress& operator=(const Progress&) = delete;
     ~Progress();
 
-    // A run begins, of so many as far as is known; it is named where there are several.
+    // A run begins, of `of` as far as is known; it is named where there are several.
     void next_run(int number, int of);
     // Call after every step with the time reached, the energy and the step size; costs one reading of the clock.
     void operator()(double time, double energy, double step);

@@ -29,9 +29,9 @@ struct UniformSphere {
 double radius_rate(const UniformTube& tube);
 double radius_rate(const UniformSphere& sphere);
 
-// The tension at which a tube is at rest under a pressure: that of laws that keep the area and leave the volume free.
+// The equilibrium tension of a tube under a pressure: that of laws that keep the area and leave the volume free.
 double tension_of_free_volume(const Bending& energy, double radius, double pressure = 0);
-// The pressure at which the tube and the sphere are at rest: theory.md (3.21), (3.23).
+// The equilibrium pressure of the tube and the sphere: theory.md (3.21), (3.23).
 double pressure_at_rest(const UniformTube& tube);
 double pressure_at_rest(const UniformSphere& sphere);
 // The axial force on the tube under a pressure: theory.md (3.21).

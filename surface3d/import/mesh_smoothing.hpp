@@ -24,7 +24,7 @@ TriangleMesh with_volume(const TriangleMesh& mesh, double volume);
 
 double mesh_area(const TriangleMesh& mesh);
 double mesh_volume(const TriangleMesh& mesh);  // of a closed mesh, > 0 if it faces outward
-// The length of the edges of so many equilateral triangles of this area.
+// The edge length of `triangles` equilateral triangles of this total area.
 double even_edge(double area, double triangles);
 
 }  // namespace tubule::surface3d

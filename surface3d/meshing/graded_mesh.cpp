@@ -242,7 +242,7 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
         PatchDefect patch_defect(order);
         const auto defect = [&](double t, double theta, double dt, double dtheta) {
             double approximation = curve_defect([&](double x) { return at(t + x * dt, theta); });
-            if (dtheta <= 2 * pi)  // beyond, near a pole, the other direction tells
+            if (dtheta <= 2 * pi)  // beyond, near a pole, the other direction suffices
                 approximation =
                     std::max(approximation, curve_defect([&](double x) { return at(t, theta + x * dtheta); }));
             // Straight ahead from the profile's surface: no angle is needed, and poles are points like others.

@@ -20,7 +20,7 @@ struct MotionMeasures {
     MotionFields fields;
     VectorField velocity;    // at the nodes
     double free_energy = 0;  // F = E + tension A - pressure V - force L, of what is given
-    // Given, or what holds the area, the volume and the period; 0 where nothing tells.
+    // Given, or what holds the area, the volume and the period; 0 where that is undetermined.
     double tension = 0, pressure = 0, force = 0;
     double kinetic = 0;       // inertia INT |u|^2/2
     double dissipation = 0;   // INT 2 viscosity |sigma|^2 + friction |u|^2

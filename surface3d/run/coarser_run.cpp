@@ -10,15 +10,15 @@
 namespace tubule::surface3d {
 namespace {
 
-// It gets over some steps of the run in so many trials at most: the trials of one whose mesh is no longer good enough
-// would otherwise have no end.
+// Most trials of a coarser run for some steps of the run: those of one whose mesh is no longer good enough would
+// otherwise have no end.
 constexpr int most_at_once = 40;
 
 RunObserver nobody;  // who sees its rows; pauses come from the clock
 
-// What the record of a coarser run has beside its state.
+// The record of a coarser run in addition to its state.
 struct Saved {
-    int stop = -1;  // it goes on
+    int stop = -1;  // it has not ended
     double stop_time = 0;
     SurfaceCells cells;
 };

@@ -1,4 +1,4 @@
-// A coarser run that follows another one, which it is to be compared with.
+// A coarser run that follows another one, for comparison.
 #pragma once
 
 #include <cmath>
@@ -26,7 +26,7 @@ public:
     // In one step, or in several where that is refused or more than `growth` times as long as the last. Without inertia
     // these are as few as can grow evenly. False if it has ended before.
     bool advance_to(double time, double growth = HUGE_VAL);
-    // Continues with about so many triangles, beside a run that has so many of them now.
+    // Continues with about `triangles`, beside a run that has `of_run` of them now.
     void follow_to(int triangles, int of_run);
 
     bool has_begun() const { return run_.has_state(); }

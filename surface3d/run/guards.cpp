@@ -68,7 +68,7 @@ int images(const CurvedMesh& mesh) {
     return 1 + static_cast<int>((high - low) / mesh.period);
 }
 
-// The flat triangles between the nodes; of a tube, which is cut open, so many images.
+// The flat triangles between the nodes; of a tube, which is cut open, `images` periods.
 TriangleMesh flattened(const CurvedMesh& mesh, int images) {
     TriangleMesh flat;
     std::map<std::array<int, 2>, int> number;  // of a node, in the period where a cell sees it

@@ -108,7 +108,7 @@ bool MotionError::catch_up(double smoothness) {
 }
 
 // Where the run has got fewer triangles after this step, so do the coarser ones. If that is interrupted they begin
-// again when the run goes on, since which of them has followed is not known.
+// again when the run resumes, since which of them has followed is not known.
 void MotionError::follow_mesh(std::size_t i) try {
     const FollowedRun& r = of_run_;
     for (std::size_t k = 0; k < r.coarser_at.size(); ++k)
@@ -139,7 +139,7 @@ void MotionError::coarsen(int asked, int triangles) {
     if (!failure_) attempt([&] { follow_mesh(last); }, r.times[last]);
 }
 
-// Where one coarser run tells errors in space and in time: theory.md (11.2), and (11.3) where the motion has sped up.
+// With one coarser run for errors in space and time: theory.md (11.2), and (11.3) where the motion has sped up.
 double MotionError::error_at_once(std::size_t i, double smoothness) {
     const FollowedRun& r = of_run_;
     Comparison& c = compared_;

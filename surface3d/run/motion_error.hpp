@@ -62,7 +62,7 @@ public:
     // Why and when a coarser run ended, if it has.
     std::optional<StopReport> stop() const;
 
-    double give_up = HUGE_VAL;  // beyond this error, of E_ref, the run is not worth going on
+    double give_up = HUGE_VAL;  // beyond this error, of E_ref, the run is not worth continuing
 
 private:
     void begin(int triangles);
@@ -87,7 +87,7 @@ private:
     std::optional<StopReport> failure_;  // there are no coarser runs
 };
 
-// Throws as RecordReader if a run with an error could not go on from this.
+// Throws as RecordReader if a run with an estimated error could not resume from this.
 void check_error_restart(const Case& c, const Record& record);
 
 }  // namespace tubule::surface3d

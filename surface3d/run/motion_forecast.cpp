@@ -54,7 +54,7 @@ struct PilotRun {
     std::string ill_posed = {};  // why it cannot begin
 };
 
-// On so many triangles. What the mesh loses is lost by few triangles only; another one may do.
+// A pilot run on `triangles`. What stops its mesh concerns few triangles only; another one may do.
 PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double tolerance) {
     Case c = asked;
     c.time.limit = pilot_limit;

@@ -13,7 +13,7 @@ namespace tubule::surface3d {
 // ends a pilot run.
 Forecast forecast_motion(const Case& c, const Start& start);
 
-// Whether the run might take more than a minute, told from its settings and its start alone.
+// Whether the run might take more than a minute, by its settings and its initial shape alone.
 bool may_be_long(const Case& c, const Start& start);
 
 }  // namespace tubule::surface3d

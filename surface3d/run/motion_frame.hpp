@@ -1,4 +1,4 @@
-// Moving surfaces as records of the result file, and as what a run goes on from.
+// Moving surfaces as frames of the result file and as restarts.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace tubule::surface3d {
 
-// What the start of a run determines.
+// What the initial shape determines.
 struct MotionScale {
     double area = 0, volume = 0;
     double relaxation = 0;       // the time in which the mesh relaxes
@@ -20,14 +20,13 @@ struct MotionScale {
     double length() const { return std::sqrt(area); }
 };
 
-// The free energy with kinetic energy, less the work of loads that change: what can only fall, and what has become of
-// it.
+// Balance of the total energy, which can only fall: free and kinetic energy, less the work of loads that change.
 struct MotionBalance {
-    double total_start = 0, lowest_total = 0;  // then and since
+    double total_start = 0, lowest_total = 0;  // initially, and least so far
     double work = 0;                           // of the loads: dF at constant area and volume
     Extent past;                               // area, volume and period at the step before
     double dissipated = 0, corrected = 0;
-    double dissipation_past = 0;  // rate then
+    double dissipation_past = 0;  // its rate at the step before
     double defect = 0;            // largest defect of the dissipation identity
 
     double defect_at(double total) const { return total - total_start + dissipated; }
@@ -39,7 +38,7 @@ struct MotionCounters {
     int rough = 0;    // steps to surfaces that are rough for their mesh
 };
 
-// Beside the state of the surface, what a run has to remember.
+// What a run remembers in addition to the state of the surface.
 struct MotionMemory {
     MotionSettings settings;
     MotionScale scale;
@@ -47,9 +46,9 @@ struct MotionMemory {
     MotionCounters count;
     double next_step = 0;
     int order = 1;       // of the last step, in time
-    int grid = 0;        // the mesh is that of the start for this number of triangles; 0: another one
+    int grid = 0;        // the mesh is the initial one of this number of triangles; 0: another one
     double error = 0;    // largest so far, of the energy, absolute
-    double moved = 0;    // the nodes, at most, since the last look for self-intersection
+    double moved = 0;    // largest path of a node since the last check for self-intersection
     Eigen::VectorXd H0;  // at the nodes, where it varies
     LinearWork linear_work;
 };

@@ -91,7 +91,7 @@ private:
     const Start& start_;
     RunObserver& watch_;
     const RunClock& clock_;
-    const Restart* restart_;  // until the run goes on from it
+    const Restart* restart_;  // until a run has resumed from it
     MotionSettings settings_;
     Ended ended_;
 };

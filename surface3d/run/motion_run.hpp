@@ -11,10 +11,10 @@
 
 namespace tubule::surface3d {
 
-// Throws std::runtime_error if the record does not hold what a run goes on from.
+// Throws std::runtime_error if a run cannot resume from the record.
 void check_restart(const Case& c, const Record& record);
 
-// A coarser run goes along with each run and tells its error (MotionError). Runs become finer until the energy is as
+// A coarser run follows each run, to estimate its error (MotionError). Runs become finer until the energy is as
 // accurate as asked at all times.
 RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart);
 

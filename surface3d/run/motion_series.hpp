@@ -6,7 +6,7 @@
 
 namespace tubule::surface3d {
 
-// What a row has beside what is measured of the surface.
+// Values of a row that are not measured on the surface.
 struct MotionRow {
     const MotionState& state;
     const MotionMeasures& measures;

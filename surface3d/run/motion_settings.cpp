@@ -15,9 +15,9 @@ constexpr double fewer = 2.25;                         // times fewer triangles 
 constexpr double smooth_order = 4, rough_order = 2;    // of errors in the mesh width
 constexpr double per_smoothness = 2.1;                 // order, for each order of interpolation of H
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
-constexpr double growth_of_start = 1.22;               // of that number, until the energy of the start is accurate
-constexpr double spare = 1.5;                          // the next pair is to be so many times better than asked
-constexpr double part_of_asked = 0.4;                  // of space and of time, where they are known apart
+constexpr double growth_of_start = 1.22;               // of that number, until the initial energy is accurate
+constexpr double spare = 1.5;                          // tolerance over the error that the next pair aims at
+constexpr double part_of_asked = 0.4;                  // of space and of time, where they are known separately
 constexpr double later = 2;                            // errors grow from the start on
 constexpr double tolerance_per_accuracy = 0.8;         // tolerance = this * asked accuracy^1.5, of order 2
 constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * asked accuracy^1.25

@@ -1,4 +1,4 @@
-// How fine a run in motion is, and the coarser run that tells its error.
+// The resolution of a run in motion, and of the coarser run from which its error is estimated.
 #pragma once
 
 #include <optional>
@@ -21,53 +21,53 @@ struct MotionSettings {
     double difference = 0;  // of the energies, absolute, by a pair on this mesh with a looser tolerance
     int pair = 1;           // its number
     Role role = Role::reported;
-    double coarser_by = 1;  // of a coarser run: so many times fewer triangles
+    double coarser_by = 1;  // of a coarser run: triangles of the run over its own
 };
 
 // The case's, or the default of its model and accuracy.
 Scheme time_scheme(const Case& c);
 
-// What the case gives, or what its accuracy asks for: as many triangles as the energy of the start takes.
+// What the case gives, or what its accuracy requires: as many triangles as the initial energy needs.
 MotionSettings first_settings(const Case& c, const Start& start);
 bool settings_given(const Case& c);
 
 // About how many triangles the coarser run is to have.
 int fewer_triangles(int triangles);
 constexpr int steps_at_once = 3;  // of the run, that the coarser one goes over
-// The coarser run, which has so many times fewer triangles (elements of another order: 1).
+// The coarser run, which has `coarser_by` times fewer triangles (elements of another order: 1).
 MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
 
-// How much longer than its last step the next one of the coarser run may be, by the H of the start on the mesh of the
-// run. Where H is rough, errors of the first moments are large, and only several steps at once tell them.
+// How much longer than its last step the next one of the coarser run may be, by the initial H on the mesh of the run.
+// Where H is rough, errors of the first moments are large, and only several steps at once show them.
 double growth_of_coarser(const Case& c, const Smoothness& start);
 
 // Whether the mesh does not resolve what it has to represent, by H.
 bool is_rough(const Smoothness& smoothness);
 
-// Rough starts of fluids leave waves that no step resolves. Their energy is off by more at some times than what the
-// coarser run and the balance tell of others: what is stated is so many times that, else 1.
+// Fluids with rough initial shapes keep waves that no step resolves. The error of their energy is larger at some times
+// than the coarser run and the balance show at others: the factor by which the stated error is larger, else 1.
 double spare_for_waves(const Case& c, const Smoothness& start);
 
-// The error of a run over its difference from the coarser one, by the least orders that errors can be relied on to
-// have where H is so smooth (MotionMeasures).
+// The error of a run over its difference from the coarser one, by the least orders of errors that can be relied on for
+// this smoothness of H (MotionMeasures).
 double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
 
-// Where surfaces leave a state in which they have nearly rested, errors made before become a delay, and grow with the
-// rate at which the energy falls. Whether one has left the slowest time so far, by the dissipation then and the largest
-// since (models without inertia under constant loads: elsewhere it changes for other reasons); the error over what the
-// difference from the coarser run has changed by since then, if the run has made so many times more steps.
+// Where a surface leaves the vicinity of a saddle point, earlier errors become a delay, and grow with the rate at which
+// the energy falls. Whether it has left the slowest time so far, by the dissipation then and the largest since (models
+// without inertia under constant loads: elsewhere dissipation changes for other reasons); the error over the change
+// since then of the difference from the coarser run, if the run has made `more_steps` times its steps.
 bool has_sped_up(const Case& c, double fastest, double slowest);
 double error_by_change(double more_steps);
 
-// Whether steps have so high an order that errors in time grow far more than those in space when several are made at
-// once: the two are then told apart. Errors in space over the difference from the coarser run with the same steps; in
-// time over that of steps of this order from several at once.
+// Whether steps are of so high an order that errors in time grow far more than those in space when several are made at
+// once: both are then separated. Errors in space over the difference from the coarser run with the same steps; errors
+// in time over the difference between steps of this order and several at once.
 bool is_of_high_order(const Case& c);
 double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness);
 double error_in_time(int order);
 
-// What is known of the errors of a run, absolute: of the energy; the part that is due to time, where it is known apart;
-// of the balance.
+// Known absolute errors of a run: of the energy; the part that is due to time, where it is known separately; of the
+// balance.
 struct MotionErrors {
     double energy = 0;
     std::optional<double> in_time;

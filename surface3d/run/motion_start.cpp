@@ -13,9 +13,9 @@ namespace tubule::surface3d {
 namespace {
 
 // Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
-constexpr double relaxes_in = 0.2;  // of the time that the shape needs to change
-// H counts as constant if it varies by less than this, or by less than so many times the difference of two recoveries.
-constexpr double much_finer = 2.25;  // times more triangles: errors of the start fall at least by this
+constexpr double relaxes_in = 0.2;   // of the time that the shape needs to change
+constexpr double much_finer = 2.25;  // times more triangles: errors of the initial shape fall at least by this
+// H counts as constant if it varies by less than this, or by `times_noise` times the difference of two recoveries.
 constexpr double same_everywhere = 1e-9, times_noise = 4;
 
 // The time that the model needs to change the shape as a whole, from what drives it (E/R^2) and what resists.

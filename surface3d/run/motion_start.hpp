@@ -1,4 +1,4 @@
-// What a run in motion takes from its start and remembers.
+// The initial state of a run in motion, and what the run remembers of it.
 #pragma once
 
 #include "surface3d/run/motion_frame.hpp"
@@ -8,13 +8,13 @@ namespace tubule::surface3d {
 
 double begin_time(const Case& c);
 
-// Velocities at the nodes; none at rest.
+// Initial velocities at the nodes; empty where there are none.
 VectorField start_velocity(const Case& c, const StartMesh& start);
 
-// Energies, area and volume of a start, as its motion sees them.
+// Energies, area and volume of an initial shape, computed as in motion.
 Observables observe_start(const Case& c, const StartMesh& start);
 
-// F at the start, and E_ref of a run with it. The latter throws CaseError as tubule::reference_energy.
+// The initial F, and E_ref of a run with it. The latter throws CaseError as tubule::reference_energy.
 double free_energy(const Case& c, const Observables& start, double period);
 // Absolute error of this initial energy on a mesh of this number of elements, by a finer mesh, since where the shape is
 // not smooth a coarser one may be off by the same. 0 where there is none.
@@ -25,11 +25,11 @@ double reference_energy(const Case& c, const Observables& start, double period);
 // or not the same at both ends of a period.
 Eigen::VectorXd start_H0(const Case& c, const StartMesh& start);
 
-// Area, volume, reference energy, relaxation of the mesh, how well H is known.
 // Throws CaseError where the formula of the energy is not defined for H, K and H0 at the nodes of the start.
 void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K,
                      const Eigen::VectorXd& H0 = {});
 
+// Remembers area, volume, reference energy, relaxation of the mesh, and how accurate H is.
 void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory);
 
 }  // namespace tubule::surface3d

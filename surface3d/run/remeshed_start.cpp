@@ -156,7 +156,7 @@ TriangleMesh smooth_mesh(const Body& body, double edge, double length) {
     return with_volume(mesh, body.volume);
 }
 
-// Whether a way of at most so many neighbours leads from one triangle to the other.
+// Whether a path over at most `neighbours` triangles leads from one triangle to the other.
 bool are_near(const TriangleMesh& mesh, std::size_t from, std::size_t to, int neighbours) {
     std::vector<std::vector<std::size_t>> at(mesh.points.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -193,7 +193,7 @@ CurvedMesh curved(const std::string& name, const TriangleMesh& mesh, int order) 
     return fit_surface(made, {.order = order}).surface;
 }
 
-// The smallest angle of the surface over an edge for which so many triangles are enough.
+// The smallest angle of the surface over an edge for which `triangles` are enough.
 std::optional<double> angle_for(const CurvedMesh& surface, int triangles) {
     const CurvatureField curvature = PatchRecovery(surface).nodal(surface);
     const auto enough = [&](double angle) {
@@ -244,7 +244,7 @@ std::optional<std::string> why_unusable(const CurvedMesh& surface) {
     return std::nullopt;
 }
 
-// A surface of so many triangles, or why there is none.
+// A surface of this number of triangles, or why there is none.
 std::variant<RemeshedStart, std::string> resolved(const Body& body, const TriangleMesh& smooth, int triangles,
                                                   int order) {
     try {

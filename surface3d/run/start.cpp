@@ -33,7 +33,7 @@ constexpr double jitter = 0.2;
 constexpr unsigned seed = 1;
 
 // Tubes of as many triangles as the accuracy needs: points in a circle from which their width follows, and the largest
-// width over that of equal sides. What is as small as rounding tells nothing.
+// width over that of equal sides. Values as small as rounding count as 0.
 constexpr int samples = 32, most_rings = 256;
 constexpr double widest = 2.5, axisymmetric = 1e-9, rounding = 1e-13;
 
@@ -49,7 +49,7 @@ int even(double n, int least, int most) {
     return std::max(2 * static_cast<int>(std::lround(std::min(n, most - 1.0) / 2)), least);
 }
 
-// About so many equal triangles on a base surface.
+// About `triangles` equal triangles on a base surface.
 TriangleMesh divided(const UnitSphere&, int triangles) {
     return icosphere(std::max(static_cast<int>(std::lround(std::sqrt(triangles / 20.0))), 1));
 }

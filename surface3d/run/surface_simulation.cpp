@@ -24,14 +24,15 @@ constexpr double first_step = 1e-4;            // of the time in which the mesh 
 constexpr double moment = 1e-2;                // of the first step, see set_moving()
 constexpr double growth = 1.6, safety = 0.85;  // of steps
 constexpr double shortest_step = 1e-9;         // of the relaxation time: shorter ones are a failure
-// A new mesh is made below this quality, or where a neck turns by so much from node to node, and not for some steps.
-// Nodes of the coarser run of a pair are so much farther apart, and turn so much more.
+// A new mesh is made below this quality, or where the normal on a neck turns by this from node to node; then none for
+// some steps.
+// Nodes of the coarser run of a pair are farther apart, and normals turn more, by this factor.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
-// Errors of a coarser run may be so many times larger: with 2.25 times fewer triangles they are at order 4.
+// Errors of a coarser run over those of the run: with 2.25 times fewer triangles of order 4.
 constexpr double larger_errors = 5;
-// Coarser meshes for what has become smooth: looked for after so many steps, at most so often, where the energy jumps
-// by at most this part of what is asked, and triangles are good; the first step there, of the one before.
+// Coarser meshes once the motion is smooth: steps from try to try, most of them; the largest jump of the energy over
+// the tolerance, the least quality of triangles; the first step there over the one before.
 constexpr int steps_between_looks = 6, most_coarser = 2;
 constexpr double part_of_jump = 0.25, quality_of_coarser = 0.5, shorter_first_step = 0.1;
 constexpr int most_stalled = 100;       // steps
@@ -39,7 +40,7 @@ constexpr double one_condition = 1e-6;  // lack of volume, relative: below, mesh
 constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
 constexpr double kept = 1e-8;           // area and volume, relative: a larger drift is reported
 
-// What comes together in a step of length tau after one of length `before`: the parabola through three rates.
+// Integral over a step of length tau, after one of length `before`, of the parabola through three rates.
 double sum_of_step(double tau, double before, double rate, double now, double past) {
     const double slope = (rate - now) / tau;
     const double bend = before > 0 ? (slope - (now - past) / before) / (tau + before) : 0;
@@ -95,8 +96,8 @@ void SurfaceSimulation::begin(const Start& from) {
     error_now_ = std::max(error_now_, memory_.error);
 }
 
-// Without inertia the surface is not at rest at the start: the velocity of a very short step, which the error of the
-// first one is measured by. Where there is none, the first step says why.
+// Without inertia the surface moves from t = 0 on: takes the velocity of a very short step, against which the error of
+// the first one is measured. If that fails, the first step says why.
 void SurfaceSimulation::set_moving() {
     try {
         const MotionState soon = scheme_->step(state_, moment * memory_.next_step).state;
@@ -119,7 +120,7 @@ void SurfaceSimulation::resume(const Restart& restart, const Start& start) {
     if (error_) error_->resume(restart.record, summary.elements);
 }
 
-// Whether the initial shape means anything.
+// Why the initial shape is not valid.
 std::optional<StopReport> SurfaceSimulation::check_start() {
     if (initial_stop_) return initial_stop_;
     if (auto stop = check_state()) return stop;
@@ -264,8 +265,8 @@ bool SurfaceSimulation::may_be_coarser() const {
     return error_ ? fewer_triangles(next) >= least_triangles && error_->is_at(state_.time) : next >= least_triangles;
 }
 
-// The start's mesh of about so many triangles, with its nodes where the same points of the start are now. False where
-// that is not a good mesh, or the energy would jump by more, absolutely.
+// Takes the mesh of about `triangles` of the initial shape, with its nodes where the same points are now. False where
+// that is not a good mesh, or the energy would jump by more than `most_jump`, absolutely.
 bool SurfaceSimulation::make_coarser(int triangles, double most_jump) {
     if (memory_.grid == 0) return false;
     const int order = element_order(case_);
@@ -301,7 +302,7 @@ std::optional<StopReport> SurfaceSimulation::coarsen_to(int triangles, int of_ru
     return std::nullopt;
 }
 
-// At the nodes, what goes along to another mesh: velocities, and H0 where it varies.
+// Nodal fields to carry to another mesh: velocities, and H0 where it varies.
 Eigen::MatrixXd SurfaceSimulation::carried() const {
     const Eigen::Index n = state_.X.cols(), d = state_.u.size() / n;
     Eigen::MatrixXd out = state_.u.reshaped(n, d).transpose();
@@ -311,8 +312,8 @@ Eigen::MatrixXd SurfaceSimulation::carried() const {
     return out;
 }
 
-// To another mesh of the same surface, with what is carried there. The jump of the energy counts as an error. Where it
-// would be larger, or area and volume cannot be kept, the old mesh is.
+// Changes to another mesh of the same surface, with the fields carried there. The jump of the energy counts as an
+// error. Where it would exceed `most_jump`, or area and volume cannot be kept, the old mesh is kept.
 bool SurfaceSimulation::change_mesh(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, double most_jump) {
     const int d = surface().law().components();
     const double energy = comparable(), before = total();
@@ -386,7 +387,7 @@ StopReport SurfaceSimulation::failure(const SolveError& error) {
             "try another discretisation.elements or discretisation.order"};
 }
 
-// Whether the surface and its energy can be believed.
+// Why the surface or its energy is not valid.
 std::optional<StopReport> SurfaceSimulation::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
     if (auto bad = find_bad_shape(now_, least_neck(case_, memory_.scale.area), t)) return bad;
@@ -395,8 +396,8 @@ std::optional<StopReport> SurfaceSimulation::check_state() const {
     return std::nullopt;
 }
 
-// Looked for at outputs, and when nodes have moved so far since the last look: what crosses and parts again in between
-// is no deeper than that.
+// Checks at outputs, and when nodes have moved by `unseen_move` since the last check: parts that cross and separate
+// again in between are no deeper than that.
 std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
     const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / element_order(case_);
     memory_.moved += state_.step * (now_.speed + std::abs(state_.stretch) * state_.period);
@@ -410,8 +411,8 @@ std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
     return crossing;
 }
 
-// What a row states is at least what its energy has risen by, and the defect of its balance: there both runs of the
-// pair may be wrong alike.
+// The error stated in a row is at least the rise of its energy, and the defect of its balance: both runs of the pair
+// may have these errors in common.
 std::optional<StopReport> SurfaceSimulation::update_error() {
     if (!is_reported()) return std::nullopt;
     std::optional<double> error;

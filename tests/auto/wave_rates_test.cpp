@@ -1,4 +1,4 @@
-// Growth rates that tier auto gives waves around the axis, under tension, pressure and axial force, against closed
+// Growth rates that tier auto gives non-axisymmetric modes, under tension, pressure and axial force, against closed
 // forms.
 #include <gtest/gtest.h>
 

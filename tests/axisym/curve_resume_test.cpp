@@ -16,7 +16,7 @@ Case sharp(const std::string& model) {
                       {}, "case.toml");
 }
 
-// Keeps what a result file would, and interrupts after so many looks at whether it should.
+// Keeps what a result file would, and interrupts after `most_looks` calls of interrupted().
 struct Watch : Recorder {
     int looks = 0, most_looks = 1000000;
     bool interrupted() override { return ++looks > most_looks; }
@@ -93,7 +93,7 @@ TEST(CurveResume, theCoarserRunResumesToo) {
     EXPECT_GT(nested(next.checkpoints[0], "restart_coarser_", RecordKind::curve).time, coarser.time);
 }
 
-// A coarser run that had come to its end goes on where the case ends later now: else the error would be unknown.
+// A coarser run that had come to its end continues where the case ends later now: else the error would be unknown.
 TEST(CurveResume, aLaterEndHasAKnownError) {
     Case c = sharp("gradient-flow");
     c.time.output.clear();

@@ -61,7 +61,7 @@ void expect_balanced(const Outcome& o, const Case& c) {
         EXPECT_LE(std::abs(defect), 20 * c.accuracy.energy * o.summary.reference_energy);
 }
 
-// Stable against changes of the radius where d/dR of the pressure at rest is positive: here for the tension -0.3.
+// Stable against changes of the radius where dP/dR > 0 for the equilibrium pressure P(R): here for the tension -0.3.
 TEST(Ensembles, tubesComeToRestUnderTensionAndPressure) {
     const double R = 1, tension = -0.3, pressure = tube_pressure(all_terms, R, tension),
                  force = tube_force(all_terms, R, tension, pressure);
@@ -135,7 +135,7 @@ TEST(Ensembles, spheresComeToRestUnderTensionAndPressure) {
     EXPECT_NEAR(run_case(c).last("pressure"), pressure, 1e-7);
 }
 
-// The radius R + a under the pressure of R changes as a' = -(dP/dR)/resistance a, with the pressure at rest P(R) of
+// The radius R + a under the pressure of R changes as a' = -(dP/dR)/resistance a, with the equilibrium pressure P(R) of
 // theory.md (3.21), (3.23), and resistance 1 in gradient flow, gamma + 2 mu/R^2 of a tube and gamma + 4 mu/R^2 of a
 // sphere in Stokes flow, whose membrane stretches in one direction and in two.
 TEST(Ensembles, unstableStatesAreLeftAtTheirRate) {

@@ -197,7 +197,7 @@ TEST(EquilibriumCase, whatIsHeld) {
     EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("tension", 0), 0, 0);
 }
 
-// theory.md (3.21), (3.23): the radius at rest under a tension and a pressure, also where a motion would leave it.
+// theory.md (3.21), (3.23): the equilibrium radius under a tension and a pressure, also where a motion would leave it.
 TEST(EquilibriumCase, restsUnderTensionAndPressure) {
     const std::string sphere = R"(tier = "axisym"
 [energy]
@@ -277,7 +277,7 @@ energy = 1e-10
 descend = false
 )";
 
-// theory.md (3.21): the straight tube of radius 1 and length 3 at rest under its force, with area, volume or both kept.
+// theory.md (3.21): the straight tube of radius 1, length 3 in equilibrium under its force, area, volume or both kept.
 TEST(EquilibriumCase, straightTubesRestUnderForce) {
     const double h = -0.3, f = 0.5 * h * h + 0.03 * std::pow(h, 4), f_H = h + 0.12 * std::pow(h, 3), tension = 0.2;
     const auto text = [](const char* key, double value) { return fmt::format("{}={:.17g}", key, value); };

@@ -255,7 +255,7 @@ TEST(Equilibrium, halfPeriodsOfTubes) {
     EXPECT_NEAR(tube.observed.r_max, 1, 1e-5);
 }
 
-// A pearled tube with a period that is kept is at rest with a free one, too, under the force which it measures, and
+// A pearled equilibrium of fixed period is one of free period, too, under the force which it measures, and
 // gives that force as the slope of its energy.
 TEST(Equilibrium, atTheMeasuredForceAFreePeriodStays) {
     const StationaryProblem kept{bending(1, 0, 0, 0.1), {48, 20, {}}};

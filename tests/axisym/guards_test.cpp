@@ -1,4 +1,4 @@
-// Each way in which a run can end before its time: detected, told apart, its state saved, reported with time and place.
+// Each way in which a run can end early: detected, distinguished, its state saved, reported with time and place.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace tubule::axisym {
 namespace {
 
-// The last state is there to be looked at or gone on from, and the rows end with it.
+// The last state can be looked at or resumed from, and the rows end with it.
 void expect_saved(const Outcome& o) {
     const bool resumable = o.summary.stop.reason == Stop::time_limit || o.summary.stop.reason == Stop::interrupted;
     const auto& records = resumable ? o.log.checkpoints : o.log.frames;

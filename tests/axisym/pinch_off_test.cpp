@@ -1,4 +1,4 @@
-// A neck that closes: followed to the floor, and told apart from one that does not.
+// A neck that closes: followed to r_min, and distinguished from one that does not.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// A run that was interrupted goes on from its record as if nothing had happened, within the asked accuracy.
+// An interrupted run resumes from its record as if nothing had happened, within the asked accuracy.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -45,7 +45,7 @@ TEST(Restart, endsWithinTheAskedAccuracy) {
             if (second.log.discards == 0) {  // else it had to begin again with finer settings
                 EXPECT_GT(second["time"].front(), record.time);
                 EXPECT_EQ(second.summary.reference_energy, first.summary.reference_energy);
-                EXPECT_GE(second.summary.estimated_error, 0.999 * first.summary.estimated_error);  // goes on from there
+                EXPECT_GE(second.summary.estimated_error, 0.999 * first.summary.estimated_error);  // and continues
             }
             EXPECT_NEAR(second.summary.energy, whole.summary.energy, asked * E_ref);
             EXPECT_NEAR(second.summary.stop.time, whole.summary.stop.time, 100 * asked * whole.summary.stop.time);

@@ -1,4 +1,4 @@
-// A spontaneous curvature that varies along a profile: derivatives, forces, motions and shapes at rest.
+// A spontaneous curvature that varies along a profile: derivatives, forces, motions and equilibria.
 #include <gtest/gtest.h>
 
 #include <algorithm>

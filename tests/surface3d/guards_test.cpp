@@ -1,4 +1,4 @@
-// Signs that a surface in motion cannot go on.
+// Signs that a surface in motion cannot continue.
 #include "surface3d/run/guards.hpp"
 
 #include <gtest/gtest.h>

@@ -119,7 +119,7 @@ TEST_P(EveryOrder, MovesAlongWithTheMeshWhateverTheNumbering) {
 }
 
 // Noise of standard deviation 0.024 of an edge. One smoothing divides the errors of normals by 4 and of H by 5 at
-// least, a second one helps again; the report tells noise (0.020, measured) from none.
+// least, a second one helps again; the report separates noise (0.020, measured) from none.
 TEST_P(EveryOrder, SmoothingTakesNoiseOut) {
     const int n = 18;
     TriangleMesh noisy = irregular(bumpy, n);

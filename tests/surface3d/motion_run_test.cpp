@@ -1,4 +1,4 @@
-// Runs of moving surfaces: what is kept, what stops them, and how they go on.
+// Runs of moving surfaces: what is conserved, what stops them, and how they resume.
 #include "surface3d/run/motion_run.hpp"
 
 #include <gtest/gtest.h>
@@ -193,7 +193,7 @@ TEST(MotionSettings, WhatHasSpedUpMayBeLate) {
 
 TEST(MotionRun, WhatLeavesASaddleStatesItsDelay) {
     // Waves l = 4 decay, and l = 2 takes their area: the energy, which nearly rests, falls faster again. The steps come
-    // late by far more than the energy was off before. The same mesh with a twentieth of the tolerance tells by how
+    // late by far more than the energy was off before. The same mesh with a twentieth of the tolerance shows by how
     // much.
     const std::string saddle = R"(
 [energy]
@@ -381,7 +381,7 @@ TEST(MotionRun, FewerTrianglesWhereTheMotionHasBecomeSmooth) {
         for (const double value : o.series(kept)) EXPECT_NEAR(value / o.series(kept).front(), 1, 1e-8) << kept;
     for (const char* none : {"momentum_x", "momentum_y", "momentum_z"})
         for (const double value : o.series(none)) EXPECT_NEAR(value, o.series(none).front(), 1e-9) << none;
-    // The energy jumps by at most a quarter of what is asked, and goes on as if there had been no change.
+    // The energy jumps by at most a quarter of what is asked, and continues as if there had been no change.
     const double asked = o.c.accuracy.energy * o.summary.reference_energy;
     const std::vector<double> energy = o.series("energy");
     const auto change = std::find(elements.begin(), elements.end(), 80) - elements.begin();
@@ -526,7 +526,7 @@ TEST(CoarserRun, StepsOfACoarserRunGrowEvenlyWithoutInertia) {
 }
 
 TEST(MotionRun, TheOtherRunHasOtherElementsWhereFewerTrianglesLoseTheSurface) {
-    // 80 triangles of order 3 turn by two radians from node to node at t = .0095, where 180 of order 2 go on.
+    // 80 triangles of order 3 turn by two radians from node to node at t = .0095, where 180 of order 2 do not.
     const Outcome o = run_case(R"(
 [energy]
 k20 = 0.125
@@ -826,7 +826,7 @@ TEST(MotionRun, ResumedRunsEndAsUndisturbedOnes) {
         const double asked = whole.c.accuracy.energy * whole.summary.reference_energy;
         for (const char* name : {"energy", "kinetic_energy", "identity_defect", "correction_energy"})
             EXPECT_NEAR(second.last(name), whole.last(name), 1e-2 * asked) << name;
-        // Nothing of the past is forgotten: steps go on as if there had been no end.
+        // Nothing of the past is forgotten: steps continue as if there had been no end.
         EXPECT_EQ(first.watch.rows.size() + second.watch.rows.size(), whole.watch.rows.size());
         EXPECT_NEAR(second.summary.estimated_error, whole.summary.estimated_error, 0.5 * whole.summary.estimated_error);
     }

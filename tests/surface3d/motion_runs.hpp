@@ -66,7 +66,7 @@ inline EnergyRun run_steps(TimeScheme& scheme, double tau, int steps,
     return out;
 }
 
-// The largest total energy of so many steps over the first, on the paper's perturbed sphere with eps = .01 h^2.
+// The largest total energy of the steps over the first, on the paper's perturbed sphere with eps = .01 h^2.
 inline double growth_by_the_paper(int n, double k42, double tau, int steps) {
     const CurvedMesh mesh = mapped_mesh(icosphere(n), 3, map_of(perturbed_sphere()));
     const Bending bending{.k = {0.125, 0, k42}, .H0 = 0};

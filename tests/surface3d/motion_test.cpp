@@ -106,7 +106,7 @@ TEST(SphereFlow, RadiusFollowsItsEquation) {
     // theory.md (6.2); without k20 also (6.4): R^6 = 1 + 12 (k42 + 16 k40) t in closed form.
     EXPECT_NEAR(sphere_at(1, {.k = {0, 0.02, 0.1}}, 1).radius, std::pow(1 + 12 * 0.42, 1.0 / 6), 1e-12);
     const double end = 0.4, exact = sphere_at(end, all_terms, 1).radius;
-    const auto error = [&](Scheme scheme, int steps, double uneven) {  // steps in turn short and so many times as long
+    const auto error = [&](Scheme scheme, int steps, double uneven) {  // steps short and `uneven` times as long in turn
         Motion motion(mesh_of(Sphere{}, icosphere(2), 4), {}, all_terms, {}, scheme);
         const double pair = 2 * end / steps, first = pair / (1 + uneven);
         for (int i = 0; i < steps; i += 2) motion.steps(first, 1), motion.steps(pair - first, 1);
@@ -280,7 +280,7 @@ TEST(MeshWaves, DoNotGrowWhereTheSurfaceRunsPastTheMesh) {
 
 TEST(MeshWaves, DoNotGrowWhereTrianglesAreWideForTheCurvature) {
     // H of the mesh answers by 15 % more than the smooth operator: with that alone a change of 1 became 17, and 107 in
-    // the scene above.
+    // the case above.
     const CurvedMesh mesh = mesh_of(Sphere{.radius = 0.6, .modes = {{0.3, 2, 0}}}, icosphere(2), 4);
     EXPECT_LT(change_left(mesh, {.k = {0.125}, .H0 = -2}, 0, 1e-2, 80), 10);
 }
@@ -424,7 +424,7 @@ TEST(Models, MomentumDecaysByFriction) {
 
 TEST(Models, RotatingTubeStaysStraight) {
     // theory.md (5.4): lambda0 = b0 + p0/R + omega^2 R. On a straight tube the pressure stands for lambda; without
-    // friction the rotation goes on.
+    // friction the rotation continues.
     const double R = 0.8, omega = 0.7;
     const Bending energy{.k = {0.5, 0, 0.1}, .H0 = -0.4};
     Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4),

@@ -181,7 +181,7 @@ TEST(Start, MeshesDoNotDependOnThoseMadeBefore) {
 
 TEST(Start, WavesAlongATubeAskForWideTriangles) {
     // Differences of degree 5 of 0.25 sin(pi z) exceed those of the circle by about 0.25 pi^5, whose fifth root is 2.4.
-    // Equal sides where the triangles are given, or where waves around the axis add to those along it.
+    // Equal sides where the triangles are given, or where azimuthal waves add to axial ones.
     const auto lowest_points = [](const std::string& rest) {
         const Case c = parse_case(
             "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"tube\"\nradius = 1.0\nlength = 2.0\n" + rest,
@@ -211,7 +211,7 @@ TEST(SurfaceRun, InterruptedAtOnce) {
             parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\n" + perturbed + elements, {}, "case.toml");
         const RunSummary s = run(c, watch);
         EXPECT_EQ(s.stop.reason, Stop::interrupted);
-        EXPECT_EQ(s.estimated_error, 1);  // one mesh tells nothing
+        EXPECT_EQ(s.estimated_error, 1);  // one mesh does not show the error
         for (const double value : watch.values) EXPECT_TRUE(std::isfinite(value));
         EXPECT_EQ(watch.frames.size(), 1u);
     }

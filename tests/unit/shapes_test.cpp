@@ -94,7 +94,7 @@ TEST(ShapeKeys, ImpossibleShapes) {
     EXPECT_EQ(refused("kind = \"torus\"\nradius = 1\ntube_radius = 1\n"),
               "case.toml:7:15: shape.tube_radius must be below shape.radius: the torus intersects itself");
     EXPECT_EQ(refused("kind = \"file\"\n"), "case.toml:4:1: missing key shape.path: a string");
-    // A wave around the axis that the meridian theta = 0 does not show: r0 = 1 - 1.1 sin(theta).
+    // A mode m = 1 that the meridian theta = 0 does not show: r0 = 1 - 1.1 sin(theta).
     EXPECT_EQ(refused("kind = \"tube\"\nradius = 1\nlength = 2\n[[shape.mode]]\namplitude = 1.1\nn = 0\nm = 1\n"
                       "phase = 1.5707963267948966\n"),
               "case.toml:4:1: shape must have r0 > 0 everywhere, but r0 = -0.0162675 at z = 0, theta = 1.1781");
