@@ -1,5 +1,5 @@
-// A spontaneous curvature that varies along a profile, at its quadrature points: fixed to the parameter, or a function
-// of the area below a point.
+// A spontaneous curvature that varies along a profile, at its quadrature points: fixed to the parameter, or given by
+// the area below a point.
 #pragma once
 
 #include <Eigen/Core>

@@ -181,8 +181,8 @@ void append(Matrix& columns, const Vector& column) {
     columns.col(columns.cols() - 1) = column;
 }
 
-// Smallest eigenvalues of A v = mu M v, with the vectors. By way of the inverse, which finds them to the accuracy
-// of small numbers, however large the others are.
+// Smallest eigenvalues of A v = mu M v, with the vectors, to their own relative accuracy however large the others are:
+// by the inverse.
 Eigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
     double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
     for (int k = 0; k < 60; ++k, shift *= 4) {

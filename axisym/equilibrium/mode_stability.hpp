@@ -1,8 +1,8 @@
-// Stability of a stationary shape against normal displacements w(s) cos(m theta): growth rates by the second variation
-// of E + sigma A + lambda V and the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2, theory.md (3.14), one
-// eigenproblem for each m. Inertia is neglected. Of a law without inextensibility u is w nu alone, and the constraints
-// of the problem hold (for m = 0; for others they hold by themselves). With it what the law keeps is fixed, too, and
-// the tangential velocity the one of least dissipation; with a reservoir its divergence is the same everywhere.
+// Stability of a stationary shape against normal displacements w(s) cos(m theta): growth rates from the second
+// variation of E + sigma A + lambda V and the dissipation 2 viscosity INT |D(u)|^2 + friction INT |u|^2, theory.md
+// (3.14), one eigenproblem for each m. Inertia is neglected. Without inextensibility u is w nu alone, and the problem's
+// constraints hold (for m = 0; for others they hold by themselves). With it what the law keeps is fixed, too, and the
+// tangential velocity is the one of least dissipation; with a reservoir its divergence is the same everywhere.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,9 +23,9 @@ struct ModeRates {
 };
 
 // The second variation of E + sigma A + lambda V as a quadratic form in (w, w_s, w_theta, w_ss, w_s_theta,
-// w_theta_theta), at each quadrature point of the shape. A shape that is not stationary moves, and the rates are those
-// of the flow linearised about that motion at this instant, of the gradient flow only, theory.md (8.8): the force b on
-// it adds -INT b H w^2 dS to the form of displacements along straight normals.
+// w_theta_theta), at each quadrature point of the shape. A shape that is not stationary moves, and the rates, in
+// gradient flow only, are those of the flow linearised about that motion at this instant, theory.md (8.8): the force b
+// on it adds -INT b H w^2 dS to the form of displacements along straight normals.
 class ModeStability {
 public:
     // Copies both.

@@ -14,14 +14,14 @@ namespace tubule::axisym {
 // reduced problem. With `symmetry` off: the whole period.
 Cell cell_of(const Tube& tube, bool symmetry);
 
-// Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by that
-// of the present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the
-// same grading at most `most`.
+// Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by the
+// present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the same
+// grading at most `most`.
 std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
                                    int fewest, int most);
 
-// The same by division of the present elements: the new space contains the old one. It ends early, and short of the end
-// of the cell, where there would be more than `most`.
+// The same by division of the present elements: the new space contains the old one. Ends early, before the end of the
+// cell, where there would be more than `most`.
 std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
                                    int most);
 

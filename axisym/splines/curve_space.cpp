@@ -7,8 +7,8 @@
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
-// Raw spline i of degree p has the knots i ... i + p + 1; element e sees the splines from e m + m - 1 - p on, for knots
-// of multiplicity m. Reflection at the start takes spline i to low - i, at the end to high - i.
+// Raw spline i of degree p has the knots i ... i + p + 1; element e sees the splines from e m + m - 1 - p on, m being
+// the multiplicity of knots. Reflection at s = 0 takes spline i to low - i, at s = 1 to high - i.
 Field::Field(const ProfileSpace& splines, Parity parity) : splines_(&splines) {
     const int w = splines.width(), n = splines.elements();
     if (!splines.cell().mirror) {

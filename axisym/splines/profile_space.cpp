@@ -225,8 +225,8 @@ Eigen::SparseMatrix<double> ProfileSpace::prolongation(const ProfileSpace& coars
             const int dof = dofs(e)[a];
             if (done[dof]) continue;
             done[dof] = 1;
-            // Coefficient a is the blossom of the coarse polynomial of this element at the p inner knots
-            // of spline a; de Boor's triangle with one of them a level, for all coarse splines at once.
+            // Coefficient a is the blossom of the coarse polynomial of this element at the p inner knots of spline a;
+            // de Boor's triangle with one of them a level, for all coarse splines at once.
             double d[max_width][max_width] = {};
             for (int b = 0; b <= p; ++b) d[b][b] = 1;
             for (int level = 1; level <= p; ++level) {

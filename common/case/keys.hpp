@@ -523,7 +523,7 @@ void check_chosen_model(Keys& k, const Case& c) {
     k.check("model.kind", [&]() -> std::string {
         if (c.equilibrium)
             return "must not be \"auto\" with [equilibrium]: nothing moves; \"fluid\" and \"overdamped\" have the same "
-                   "shapes at rest";
+                   "equilibria";
         if (!c.surface.scheme || entry(*c.surface.scheme).general) return {};
         return fmt::format(
             "must not be \"auto\" with discretisation.scheme = \"{}\", which does not support all models; name one",

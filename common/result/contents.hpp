@@ -14,8 +14,8 @@ namespace tubule {
 // More bytes of frames than these are not written again and again, but move to a segment; the tests lower it.
 inline std::size_t most_rewritten = std::size_t{100} << 20;
 
-// A file beside a large result with some of its frames, which are not written again: those before `end`, from the end
-// of the segment before.
+// A file beside a large result with some of its frames, which are not written again: those from the previous segment's
+// end to `end`.
 struct Segment {
     std::string file;  // without its folder
     std::size_t end;

@@ -1,5 +1,5 @@
-// Curved cells and the frames on them as VTKHDF unstructured grids: what frames share (/meshes/000000), what each has
-// of its own, and all of them in the order of time (/VTKHDF). Layout: docs/results.md.
+// Curved cells and the frames on them as VTKHDF unstructured grids: what frames share (/meshes/000000), what each frame
+// adds, and all of them in the order of time (/VTKHDF). Layout: docs/results.md.
 #pragma once
 
 #include <hdf5.h>

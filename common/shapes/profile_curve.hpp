@@ -1,5 +1,5 @@
-// A surface of revolution from points along its profile, in order: what a frame of tier axisym holds of a closed cell,
-// of a tube that overhangs, and of a torus.
+// A surface of revolution from points along its profile, in order, as frames of tier axisym have them: a closed cell, a
+// tube that overhangs, or a torus.
 #pragma once
 
 #include <algorithm>
@@ -58,8 +58,8 @@ struct ProfileCurve {
 // neighbours, ends that do not fit, and a surface inside out.
 ProfileCurve profile_curve(const std::vector<double>& r, const std::vector<double>& z, double length);
 
-// Two more functions on the curve, from their values at the points that it was made from, as `functions` has r and z:
-// of a cell the first one over sin(pi s). For value_at(), at s or c. Throws std::invalid_argument unless there is one
+// Two more functions on the curve, from their values at the points that it was made from, as `functions` has r and z
+// (on a cell the first one over sin(pi s)). For value_at(), at s or c. Throws std::invalid_argument unless there is one
 // value a point.
 BlendedCurve along_curve(const ProfileCurve& curve, const std::vector<double>& first,
                          const std::vector<double>& second);

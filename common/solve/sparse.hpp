@@ -23,9 +23,9 @@ struct SolveError : std::runtime_error {
 // The order in which unknowns are eliminated: entry k is the number of the k-th one.
 using Ordering = std::vector<int>;
 
-// Nested dissection (METIS) of the graph of A + A^T. Given the node of each unknown, numbered from 0, it is the graph
-// of the nodes that is dissected, and the unknowns of a node follow each other by number, so multipliers should have
-// the higher ones. This is quicker by the square of the unknowns per node and leads to less fill. Several solvers may
+// Nested dissection (METIS) of the graph of A + A^T. Given the node of each unknown, numbered from 0, the graph of the
+// nodes is dissected, and the unknowns of a node follow each other by number, so multipliers should have the higher
+// ones. This is quicker by the square of the unknowns per node and leads to less fill. Several solvers may
 // share the answer. std::invalid_argument when A is not square or the nodes do not fit it.
 Ordering nested_dissection(const Eigen::SparseMatrix<double>& A, const std::vector<int>& node_of_unknown = {});
 

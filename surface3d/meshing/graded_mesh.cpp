@@ -67,8 +67,7 @@ private:
     Eigen::MatrixXd remainder_;
 };
 
-// How far the curvatures that PatchRecovery would find are from the exact ones: a vertex amid six equilateral triangles
-// of exact nodes.
+// Error of the curvatures that PatchRecovery would find, at a vertex amid six equilateral triangles with exact nodes.
 class PatchDefect {
 public:
     explicit PatchDefect(int order)

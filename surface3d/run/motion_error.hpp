@@ -26,8 +26,8 @@ struct Comparison {
     double between = 0;      // then, of the two coarser runs
     double sum_in_time = 0;  // then, of the parts that steps have added to the error in time
     double in_time = 0;      // largest error in time
-    // At the slowest of the times compared: its number, the dissipation, the difference of the energies, and the steps
-    // of the coarser run until then. The largest dissipation since then.
+    // At the slowest of the times compared: its number, the dissipation, the difference of the energies, the number of
+    // steps of the coarser run until then. The largest dissipation since then.
     double slowest_at = 0, slowest = 0, difference_then = 0, steps_then = 0, fastest = 0;
 };
 

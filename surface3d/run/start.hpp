@@ -19,8 +19,8 @@ struct StartMesh {
     Eigen::VectorXd H0 = {};              // of the nodes, where the file of a profile has it
 };
 
-// The shape of the case, or what is handed over to it. Files are read, checked and fitted once, and so is what meshes
-// of all sizes have in common.
+// The shape of the case, or what is handed over to it. Files are read, checked and fitted once, and so is everything
+// that meshes of all sizes have in common.
 class Start {
 public:
     // Throws CaseError that names the key to blame: a file that cannot be read or used, a result without such a frame,

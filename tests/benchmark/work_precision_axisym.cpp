@@ -1,5 +1,5 @@
-// Prints a table for the chart docs/work_precision_axisym.svg: error of the energy relative to E_ref against CPU time
-// of whole runs of the figure's case, for accuracies asked of the program and for spline spaces with settings tuned by
+// Prints a table for the chart docs/work_precision_axisym.svg: error of the energy relative to E_ref against CPU time,
+// in whole runs of the figure's case, for accuracies asked of the program and for spline spaces with settings tuned by
 // hand (the fastest of a grid of elements and time tolerances for each error). `tools/figures work-precision-axisym`.
 #include <fmt/core.h>
 

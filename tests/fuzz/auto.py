@@ -1,4 +1,4 @@
-"""The model that the program chooses (`model.kind = "auto"`) and the tier that it chooses, for shapes that move and shapes at rest,
+"""The model that the program chooses (`model.kind = "auto"`) and the tier that it chooses, for shapes that move and equilibria,
 by viscosities and friction of any size: a case ends soon after its time limit, `check` soon, too, and rows are possible."""
 
 import re

@@ -29,8 +29,8 @@ Matrix sparse(const Dense& A) {
 
 using test::message_of;
 
-// Symmetric, with this many positive and negative diagonal blocks' unknowns in random order: a random B between them,
-// of which a few entries a row are not zero, and diagonals that outweigh it or not. In units that differ by unknown.
+// Symmetric, with this many positive and negative diagonal blocks' unknowns in random order: a random B between them
+// with a few nonzero entries a row, and diagonals that outweigh it or not. In units that differ by unknown.
 Dense quasi_definite(int positive, int negative, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> number(-1, 1);

@@ -45,8 +45,8 @@ protected:
     // Backward Euler, the first step of all these schemes.
     static OneStage euler(const MotionState& from, double tau) { return {1, tau, from.X, from.period, from.u, 0}; }
 
-    // Solved on what the last two states extrapolate to, or on that of `from` if there is no past, with `missed` more
-    // of area and volume than is expected to be lacking.
+    // Solves on the surface that the last two states extrapolate to, or on that of `from` if there is no past. Area and
+    // volume are restored as if `missed` were lacking in addition.
     StageSolution solve(const MotionState& from, const PastState* past, const OneStage& stage, double tau,
                         const Extent& missed = {});
 

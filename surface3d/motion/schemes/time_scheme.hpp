@@ -10,8 +10,8 @@
 namespace tubule::surface3d {
 
 // Moves a surface on one mesh. A step begins from any state, of which it is a function alone, so that a step can be
-// refused and tried again; what a scheme knows of steps before is in the state (SchemeMemory). A state without a memory
-// of this scheme, at a start, on a new mesh or of another scheme, makes its step a first one.
+// refused and tried again; what a scheme knows of steps before is in the state (SchemeMemory). From a state without its
+// memory, initially, on a new mesh or by another scheme, a scheme makes a first step.
 class TimeScheme {
 public:
     TimeScheme(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending, const MotionControl& control)
