@@ -10,7 +10,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Between these parameters, from a place nearby: Newton's method for r' = 0, as far as it leads to smaller radii.
+// Newton's method for r' = 0 between these parameters, from a point nearby, as long as radii decrease.
 CurvePoint minimum_near(const CurveSpace& space, const Eigen::VectorXd& x, double s, double low, double high) {
     CurvePoint best = space.evaluate(x, s);
     for (int i = 0; i < 4 && best.r2 > 0; ++i) {

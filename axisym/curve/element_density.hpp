@@ -10,7 +10,7 @@ namespace tubule::axisym {
 // Elements per parameter in equal parts of a profile, relative to equal elements. Empty: not known.
 using ElementDensity = std::vector<double>;
 
-// What the states of a run have asked of their mesh.
+// The mesh that the states of a run required.
 struct MeshNeed {
     // `defect`: the energy lost in each element of the space, which falls with the power 2 (degree - 1) of its size.
     void add(const ProfileSpace& space, const std::vector<double>& defect);
@@ -21,7 +21,7 @@ struct MeshNeed {
     std::vector<double> wanted;  // the largest 1/size in equal parts of the profile, for a loss per length of 1
 };
 
-// So many elements of that density, whose sizes change slowly along the profile.
+// Breaks of `elements` elements of that density, whose sizes change slowly along the profile.
 std::vector<double> breaks_of(ElementDensity density, int elements);
 
 }  // namespace tubule::axisym

@@ -14,11 +14,11 @@ class GraphError {
 public:
     // The transport begins anew with this observation.
     void begin(const Observation& o) { dissipation_last_ = o.dissipation, steps_since_ = 0; }
-    // Whether it is time, after a step, to carry the error on: after each long step of a one-step method, or when some
-    // short ones of backward differences have changed the shape.
+    // Whether to transport the error after a step: after each long step of a one-step method, or when some short ones
+    // of backward differences have changed the shape.
     bool due(const Observation& o, bool long_steps);
     void carry_on(GraphStage& stage, const Observation& o);
-    // Beyond what is allowed, for a reason that finer settings remedy.
+    // Whether it exceeds what is allowed, for a reason that finer settings remedy.
     bool is_curable(const GraphSettings& settings, double allowed) const;
 
     double now() const { return std::abs(latest.total); }

@@ -53,7 +53,7 @@ bool is_about_to_overhang(const Observation& o) {
     return o.steepness > overhang_steepness / 4;
 }
 
-// A symbol that cannot change its sign may come as close to 0 as it likes.
+// A symbol that cannot change its sign may come arbitrarily close to 0.
 double least_symbol_of(const Bending& energy, const Observation& o) {
     return symbol_may_vanish(energy) ? symbol_lost * o.symbol : 0;
 }

@@ -25,8 +25,8 @@ GraphSettings first_graph_settings(const Case& c, bool one_step) {
             one_step};
 }
 
-// The error was caught when it passed what is allowed, not at its largest: the more often that happened, the bolder the
-// next try.
+// An attempt ends when its error exceeds what is allowed, before it is largest: after the first attempt, settings aim
+// at less.
 GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt) {
     const double boldness = attempt == 1 ? 1 : 0.3;
     const auto shrink = [&](double goal, double part) {

@@ -143,7 +143,7 @@ GraphLimits GraphSimulation::limits() const {
     return {case_.accuracy.r_min, least_symbol_.value_or(0)};
 }
 
-// Carries the error on; the reason if it is beyond what was asked and something can be done about it.
+// Transports the error; the reason to stop if it exceeds the tolerance and finer settings would help.
 std::optional<StopReport> GraphSimulation::give_up_if_curable() {
     error_.carry_on(*stage_, now_.o);
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
@@ -152,8 +152,8 @@ std::optional<StopReport> GraphSimulation::give_up_if_curable() {
     return StopReport{Stop::resolution_lost, flow_->time(), "the error exceeds the requested accuracy", ""};
 }
 
-// Gradient flow does not let the energy rise: what it rises by is an error. Where that is more than the error known and
-// more than the error asked for, the run goes back to the last good state.
+// In gradient flow the energy cannot rise: a rise is an error. Where it exceeds the known error and the tolerance, the
+// run returns to the last good state.
 std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
     const double rise = o.free_energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
     if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.carry_on(*stage_, o);
@@ -336,9 +336,9 @@ std::unique_ptr<StateView> GraphSimulation::at(double t) {
     return out;
 }
 
-// Long steps have rows on their way, where guards have looked at the path. Its order is below that of the steps: the
-// balance of energy shows what its energy is off by, which counts as an error of the run. Where that is too much, a
-// shorter step gets to the middle.
+// Long steps have rows on their path, where guards have been checked. The path is of lower order than the step: the
+// balance of energy shows the error of its energy, which counts as an error of the run. Where that is too large, a
+// shorter step leads to the middle.
 void GraphSimulation::write_path(double from, double until, RunOutput& out) {
     const double asked = case_.accuracy.energy * summary.reference_energy,
                  error = std::max(error_before_, error_.now());

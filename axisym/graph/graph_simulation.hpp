@@ -59,7 +59,7 @@ private:
         double least_energy = std::numeric_limits<double>::infinity();  // so far
         int failures = 0;                                               // of the integrator since
     };
-    // What is known of the end of the last step.
+    // The end of the last step.
     struct Now {
         double time = std::numeric_limits<double>::quiet_NaN();
         Observation o;

@@ -61,11 +61,11 @@ std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x
         try {
             lu.factor(matrix.valuePtr());
         } catch (const SolveError&) {
-            continue;  // a step this long goes nowhere; shorter ones may
+            continue;  // no step of this length; a shorter one may exist
         }
         const Eigen::VectorXd ahead = x - lu.solved(force);
         const Observation o = forms.observe(ahead.data(), rest.data(), &defect);
-        if (!(o.r_min > 0 && o.symbol > 0)) continue;  // not where the flow goes
+        if (!(o.r_min > 0 && o.symbol > 0)) continue;  // the flow does not lead there
         for (std::size_t e = 0; e < defect.size(); ++e) largest[e] = std::max(largest[e], defect[e]);
     }
     return largest;

@@ -79,7 +79,7 @@ struct Discretisation {
     int order = 5;                                   // polynomial degree of the spline: 3, 5, 7
     std::optional<int> smoothness;                   // continuous derivatives at knots, 1 ... order-1; default order-1
     std::optional<double> time_tolerance;            // relative tolerance of the time integrator
-    bool symmetry = true;                            // solve one cell of a start that repeats or mirrors itself
+    bool symmetry = true;                            // solve one cell of a periodic or mirror symmetric shape
     std::optional<Parametrisation> parametrisation;  // by default as the model and the shape have it
 };
 

@@ -41,9 +41,9 @@ inline std::string wrong_branch(double from, double to, double step) {
 
 struct EquilibriumChoices {
     std::optional<Held> held;                            // by default what [model] leaves: see held_of()
-    std::optional<double> area, volume, reduced_volume;  // where absent: those of the start
+    std::optional<double> area, volume, reduced_volume;  // where absent: those of the initial shape
     std::optional<Family> family;                        // where the search begins; absent: at [shape]
-    bool descend = true;                                 // to a minimum; if not, to a stationary shape near the start
+    bool descend = true;                                 // to a minimum; if not, to the closest stationary shape
     std::optional<int> modes;  // stability against e^{i m theta}, m = 0 ... modes, by the dissipation of [model]
     BranchChoices branch;
 };

@@ -38,13 +38,13 @@ double pressure_at_rest(const UniformSphere& sphere);
 double axial_force(const UniformTube& tube, double pressure);
 
 // The tension that a straight tube has in the ensemble of a law, with the loads of t = 0: given, or that of its
-// balance, theory.md 5. Empty where area, volume and period are kept: there its waves determine it.
+// balance, theory.md 5. Empty where area, volume and period are fixed: there its waves determine it.
 std::optional<double> tension_of(const MotionLaw& law, const Bending& energy, double radius);
-// How fast the radius of a straight tube changes at t = 0 by its law: 0 where something keeps it. A reservoir with free
-// volume: without inertia; infinite where nothing resists.
+// dR/dt of a straight tube at t = 0 by its law: 0 where a constraint fixes R. A reservoir with free volume: without
+// inertia; infinite where nothing resists.
 double radius_rate_of(const MotionLaw& law, const UniformTube& tube);
-// Where its radius goes, with the tension of the tube and the pressure of t = 0: to the nearest stable radius in that
-// direction. Empty where there is none from 1e-3 to 1e3 times the radius.
+// The radius that it approaches, with the tension of the tube and the pressure of t = 0: the nearest stable one in the
+// direction of the rate. Empty where there is none from 1e-3 to 1e3 times the radius.
 std::optional<double> radius_at_rest(const MotionLaw& law, const UniformTube& tube);
 
 // Sigma of theory.md (5.20): (f + f_H/R + sigma0) R^2/f_HH. Not finite where f_HH = 0.

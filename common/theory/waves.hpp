@@ -9,7 +9,7 @@
 
 namespace tubule::theory {
 
-// amplitude cos(2 pi n z/length + m theta + phase), n and |m| not both 0; for a fluid also its rate at the start.
+// amplitude cos(2 pi n z/length + m theta + phase), n and |m| not both 0; for a fluid also its initial rate.
 struct Wave {
     int n = 1, m = 0;
     double amplitude = 0, rate = 0;
@@ -32,12 +32,11 @@ struct WaveState {
 std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& law, double length,
                                      const std::vector<Wave>& waves, const std::vector<double>& times);
 
-// The tension that the constraints ask for at the start, theory.md (5.17), (5.19), where area, volume and period are
-// kept.
+// The initial tension that the constraints require, theory.md (5.17), (5.19), where area, volume and period are fixed.
 double tension_of_waves(const UniformTube& tube, const MotionLaw& law, double length, const std::vector<Wave>& waves);
 
-// A time-dependent case that starts as a tube: that tube made straight, and its waves. The tension is that of the
-// start; 0 where nothing determines it (fixed volume, no waves).
+// A time-dependent case that starts as a tube: that tube made straight, and its waves. The tension is the initial one;
+// 0 where nothing determines it (fixed volume, no waves).
 struct TubeStart {
     UniformTube tube;
     double length = 1;

@@ -71,7 +71,7 @@ Case case_of_coarser(const Case& c, Role role) {
     if (role == Role::other_order) out.surface.order = order > 2 ? order - 1 : 3;
     out.surface.step.reset();
     out.time.output.clear();
-    out.time.stationary.reset();  // it goes as far as the run does
+    out.time.stationary.reset();  // it continues as long as the run
     return out;
 }
 

@@ -56,7 +56,7 @@ std::vector<std::array<int, 3>> lattice_triangles(int order) {
     return out;
 }
 
-// How many images of a tube, one above the other, it takes for all that may meet to be among them.
+// The number of periods of a tube among which are all triangles that may meet.
 int images(const CurvedMesh& mesh) {
     if (mesh.period == 0) return 1;
     double low = HUGE_VAL, high = -HUGE_VAL;

@@ -21,7 +21,7 @@ std::string where(const Eigen::Vector3d& x) {
     return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
 }
 
-// A neck that gets too thin for its triangles closes; of one that is too thin at the start nobody knows.
+// A neck that becomes too thin for its triangles closes; one that is too thin initially may open.
 StopReport find_sharp_turn(const MeshTurn& turn, double time) {
     const bool closes = turn.saddle && time > 0;
     return {closes ? Stop::pinch_off : Stop::resolution_lost, time,

@@ -17,10 +17,10 @@ namespace {
 
 // Measured choices: docs/decisions/time_and_memory.md, "What will a run take?".
 constexpr double pilot_limit = 6;         // seconds of each pilot run
-constexpr double limit = 15;              // of all of them, and their starts
-constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than it takes to know their number
+constexpr double limit = 15;              // of all of them, with their initial meshes
+constexpr double pilot_tolerance = 3e-5;  // tighter ones take more steps than a forecast needs
 constexpr double cost_power = 1.2;        // of the number of triangles: the cost of a step
-// Runs, the coarser ones that tell the error included: one, or two where orders are high.
+// Cost of a run with its coarser ones, over its own: with one, or with two where orders are high.
 constexpr double with_coarser_run = 1.35, with_coarser_runs = 1.6;
 constexpr double threads_power = 0.6;                         // two of them are worth 1.5
 constexpr double bytes_at_rest = 25e6, bytes_per_entry = 70;  // of the matrices of all triangles
@@ -84,7 +84,7 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
     return {};
 }
 
-// Whether a finer run would follow if a fluid states more than is asked.
+// Whether a finer run would follow where the stated error of a fluid exceeds the tolerance.
 bool can_be_repeated(const Case& c, const Start& start) {
     return motion_law(c.model).inertia != 0 && c.accuracy.estimate && c.accuracy.energy < asked_of_rough &&
            start.resizable() && !settings_given(c);

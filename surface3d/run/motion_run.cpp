@@ -65,14 +65,13 @@ public:
     }
 
 private:
-    // What is left of the last run.
+    // The results of the last run that the next one needs.
     struct Ended {
         RunSummary summary;
         MotionErrors errors;
     };
 
-    // The stated error. Where the coarser run ended earlier, it is all of the energy, but not if the same happened to
-    // both.
+    // The stated error: unknown where the coarser run ended earlier, unless physics ended both for the same reason.
     void judge(const std::optional<StopReport>& coarser) {
         RunSummary& s = ended_.summary;
         const bool paused = coarser && can_go_on(coarser->reason);

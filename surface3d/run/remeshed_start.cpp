@@ -228,7 +228,7 @@ CurvedMesh with_volume(CurvedMesh mesh, double volume) {
     return mesh;
 }
 
-// Why a run that begins with this surface would stop at once, with four fifths of what it allows.
+// Why a run from this surface would stop at once, if its limits were four fifths of what they are.
 std::optional<std::string> why_unusable(const CurvedMesh& surface) {
     const SurfaceSpace space(surface);
     const MotionFields fields = motion_fields(space, surface, Projection(space, surface));

@@ -21,7 +21,7 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr int fewest_triangles = 80, most_refined_triangles = 100000;
-// From a mesh to one of half the width, errors fall by a factor between these: what the estimate takes for possible.
+// The estimate assumes that halving the width reduces errors by a factor between these.
 constexpr double slowest_fall = 1.0 / 2, second_order_fall = 1.0 / 4, fastest_fall = 1.0 / 8;
 
 // Second derivatives of the elements are of order 2, however fast the first meshes seem to get better.
@@ -94,7 +94,7 @@ public:
             if (!measured_) throw;
             summary_.stop = pause_report(pause, 0);
             summary_.stop.message += ", before a finer mesh was measured";
-            summary_.stop.advice = paused_at_start(pause).stop.advice;  // nothing of it is continued
+            summary_.stop.advice = paused_at_start(pause).stop.advice;  // it cannot be resumed
             return summary_;
         }
         const Observables& o = measured_->o;
@@ -162,8 +162,8 @@ private:
     }
 };
 
-// So many triangles, compared with a quarter and a sixteenth of them. No other mesh is compared, so that cancellation
-// may understate the error.
+// A given number of triangles, compared with a quarter and a sixteenth of them. No other mesh is compared, so that
+// cancellation may understate the error.
 class GivenElements : public MeshSequence {
 public:
     GivenElements(const Case& c, const Start& start, int elements) : MeshSequence(c, start), elements_(elements) {
@@ -186,8 +186,8 @@ private:
     std::vector<double> energies_;
 };
 
-// Twice as many triangles again and again, until the energy is as accurate as asked. Every other mesh has half the
-// width; those in between are compared separately, so that two energies which agree by chance do not end it.
+// Doubles the triangles until the energy is as accurate as asked. Every other mesh has half the width; those in between
+// are compared separately, so that two energies which agree by chance do not end it.
 class MoreAndMore : public MeshSequence {
 public:
     using MeshSequence::MeshSequence;

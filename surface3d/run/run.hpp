@@ -18,7 +18,7 @@ std::vector<std::string> series_names(const Case& c);
 // geometry does (elements that fold, curvatures of no surface) is reported in the summary.
 RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart = nullptr);
 
-// The same from Start(c); throws as that.
+// As above, with Start(c). Throws as Start.
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::surface3d

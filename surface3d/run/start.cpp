@@ -67,9 +67,9 @@ TriangleMesh divided(const Cylinder& tube, int triangles, double wider = 1) {
                       std::clamp(static_cast<int>(std::lround(around / (stretch * side))), 3, std::max(triangles, 3)));
 }
 
-// By how much triangles of elements of this order are best wider than high, so that interpolation is as accurate along
-// a tube as around it: by its differences of degree order + 1 in both directions. 1 if it has waves around its axis,
-// which add to those along it. Measured: docs/decisions/surface_motion.md.
+// The best ratio of width to height of triangles of this order, with which interpolation is as accurate along a tube as
+// around it: by its differences of degree order + 1 in both directions. 1 for non-axisymmetric tubes, whose azimuthal
+// waves add to the axial ones. Measured: docs/decisions/surface_motion.md.
 template <class Map>
 double best_width(const Cylinder& tube, const Map& map, int order) {
     const auto at = [&](double theta, double z) {
@@ -180,7 +180,7 @@ Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
     };
 }
 
-// What `make` makes of a mesh of the case, which may turn out to be unusable: the complaint then begins with `blame`.
+// Calls `make` with a mesh of the case; if that turns out to be unusable, the complaint begins with `blame`.
 template <class MakeOne>
 auto usable(const std::string& blame, const MakeOne& make) {
     try {
@@ -194,7 +194,7 @@ const std::string* given_bytes(const Case& c) {
     return c.input && !c.input->bytes.empty() ? &c.input->bytes : nullptr;
 }
 
-// The meshes of a start; what else there is to say of them.
+// The meshes of an initial shape, and notes about them for the user.
 struct Prepared {
     Start::Make make;
     bool resizable = true;

@@ -15,7 +15,7 @@ namespace tubule::surface3d {
 struct StartMesh {
     CurvedMesh mesh;
     std::optional<CurvatureField> exact;  // where the case asks for Recovery::exact
-    VectorField velocity = {};            // of the nodes, where the start has one
+    VectorField velocity = {};            // of the nodes, where there is one
     Eigen::VectorXd H0 = {};              // of the nodes, where the file of a profile has it
 };
 
@@ -32,7 +32,7 @@ public:
     bool resizable() const { return resizable_; }                     // whether it can; a file brings its own triangles
     const std::vector<std::string>& notes() const { return notes_; }  // what was changed on the way, whole sentences
 
-    // Where time.end is far from the times in which a mesh of this size moves: that it is; else empty.
+    // The note that time.end is far from the times in which a surface of this size moves, if so; else empty.
     const std::string& time_scale() const { return time_scale_; }
 
     using Make = std::function<StartMesh(int triangles, int order)>;
