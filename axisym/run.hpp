@@ -18,7 +18,7 @@ void check_restart(const Record& record);
 
 // Tubes in gradient flow are computed as graphs r(z), from the beginning as curves if one overhangs; all else as
 // curves. Runs the case, from `restart` (a frame or checkpoint of the same case) if given. What the physics or the
-// numerics do is reported in the summary, never thrown; a start that cannot be set up throws std::runtime_error.
+// numerics do is reported in the summary, never thrown; an unusable initial shape throws std::runtime_error.
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::axisym

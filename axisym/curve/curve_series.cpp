@@ -6,7 +6,7 @@
 namespace tubule::axisym {
 namespace {
 
-// Numbers n > 0 of the modes of the start, each once.
+// Numbers n > 0 of the initial modes, each once.
 std::vector<int> tracked_modes(const Case& c) {
     std::set<int> waves;
     if (const Tube* tube = std::get_if<Tube>(&c.shape))

@@ -22,8 +22,8 @@ struct CurveSettings {
 CurveSettings first_settings(const Case& c, int images);
 bool settings_given(const Case& c);
 
-// The first step of the integrator relative to what the start asks for, and how much longer than the last one a step
-// may be. A run of short duration takes all its steps as fast as they may grow, whatever its tolerance: only if they
+// The first step of the integrator relative to what the initial state requires, and the largest ratio of a step to the
+// last. A run of short duration takes all its steps as fast as they may grow, whatever its tolerance: only if they
 // grow differently do the runs of a pair have different errors.
 double first_step_of(const CurveSettings& s);
 double step_growth_of(const CurveSettings& s);

@@ -238,7 +238,7 @@ CurveBegin begin_state(const CurveSetup& setup) {
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
     std::optional<CurveMotion::Start> consistent;
-    // Short, since a start that is not smooth changes fast, and over before the first output; yet long enough that
+    // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
     const double first_output = OutputTimes(setup.c).next();
     double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);

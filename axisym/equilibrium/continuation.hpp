@@ -38,7 +38,7 @@ struct Branch {
 };
 
 // `problem` and `start` belong to the parameter `from`. A change of the number of negative directions that goes with a
-// turn of the parameter is a fold, one without is a bifurcation. Throws std::invalid_argument unless the start is an
+// turn of the parameter is a fold, one without is a bifurcation. Throws std::invalid_argument unless `start` is an
 // equilibrium and from != to.
 Branch follow_branch(const StationaryProblem& problem, const Equilibrium& start, const SetParameter& set,
                      const BranchSettings& settings);

@@ -18,7 +18,7 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr double rounding = 1e-9;  // of the reduced volume of a start that is a sphere
+constexpr double rounding = 1e-9;  // of the reduced volume of a sphere to begin with
 
 const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
 
@@ -349,7 +349,7 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
 
 namespace {
 
-// Descends on one mesh; area and volume go from those of the start to the required ones in steps.
+// Descends on one mesh; area and volume change from the initial to the required ones in steps.
 bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
     const StationaryProblem goal = system.problem();
     const CurveObservation o = system.forms().observe(u.head(system.space().size()));
@@ -385,7 +385,7 @@ bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const 
     bool found = !from_afar && Newton(system, u, out.iterations).converge(0.1);
     for (double tolerance = 1e-3; !found && tolerance > 1e-6; tolerance *= 0.03)
         found = descend(system, u, tolerance, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
-    // Newton's last steps, or a symmetry of the start, may lead to a saddle: leave it downhill.
+    // Newton's last steps, or a symmetry of the initial shape, may lead to a saddle: leave it downhill.
     for (int k = 0; k < 3 && found; ++k) {
         const Variation variation = system.variation(u, true);
         if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;

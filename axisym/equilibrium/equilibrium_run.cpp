@@ -32,7 +32,7 @@ struct Task {
     EquilibriumSettings settings;
 };
 
-constexpr double largest_of_family = 0.99;  // reduced volume of a start
+constexpr double largest_of_family = 0.99;  // reduced volume where the search begins
 
 double sphere_volume(double area, double reduced) {
     return reduced * area * std::sqrt(area) / (6 * std::sqrt(pi));

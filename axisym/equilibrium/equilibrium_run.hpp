@@ -13,7 +13,7 @@ namespace tubule::axisym {
 // What a row of an equilibrium or a branch holds, "time" first.
 std::vector<std::string> equilibrium_series_names(const Case& c);
 
-// Throws CaseError for a start that cannot be set up, and for constraints that cannot be met.
+// Throws CaseError for an initial shape that cannot be set up, and for constraints that cannot be met.
 void check_equilibrium(const Case& c);
 
 // One row and one frame for each shape, numbered from 0 instead of by time: a single shape, or those of the

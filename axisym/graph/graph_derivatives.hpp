@@ -19,7 +19,7 @@ struct TermCheck {
 // Taylor slopes of value, gradient and Hessian of each term in use, alone, at the state x.
 std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x);
 
-// The same at the start of a case, on a mesh of moderate size.
+// The same at the initial shape of a case, on a mesh of moderate size.
 std::vector<TermCheck> check_terms(const Case& c);
 
 }  // namespace tubule::axisym

@@ -11,7 +11,7 @@ namespace tubule::axisym {
 namespace {
 
 constexpr double overhang_steepness = 30;  // see Observation::steepness
-constexpr double symbol_lost = 1e-3;       // of that at the start; on the way to 0 the solution loses its smoothness
+constexpr double symbol_lost = 1e-3;       // of the initial one; on the way to 0 the solution loses its smoothness
 
 }  // namespace
 

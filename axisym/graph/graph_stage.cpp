@@ -15,7 +15,7 @@ namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
-constexpr double start_margin = 1.0 / 4;  // defect of the start / defect at which to remesh
+constexpr double start_margin = 1.0 / 4;  // initial defect / defect at which to remesh
 constexpr int fewest_elements = 3;
 
 ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Case& c) {

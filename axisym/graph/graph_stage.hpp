@@ -15,7 +15,7 @@ constexpr int most_graph_elements = 4000;  // of one cell
 // Tension and pressure, the same at all times: what changes is computed as a curve.
 Loads graph_loads(const Case& c);
 
-// Numbers n > 0 of the modes of the start, each once.
+// Numbers n > 0 of the initial modes, each once.
 std::vector<int> tracked_graph_modes(const Case& c);
 
 struct GraphStage {
@@ -35,7 +35,7 @@ struct FirstMesh {
     std::vector<double> breaks;
     double reference_energy = 0;
 };
-// Breaks suitable for the start and, as far as can be foreseen, for how the flow changes it.
+// Breaks suitable for the initial shape and, as far as can be foreseen, for how the flow changes it.
 FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
                      const std::function<double(double)>& start);
 

@@ -79,7 +79,7 @@ public:
 
     Topology topology() const { return topology_; }
     bool closed() const { return topology_ == Topology::cell || topology_ == Topology::half_cell; }
-    // The period, and by how much the curve rises from s = 0 to s = 1: at the start, and of a curve x.
+    // The period, and the rise of the curve from s = 0 to s = 1: initially, and of a curve x.
     double length() const { return length_; }
     double rise() const { return topology_ == Topology::half_tube ? length_ / 2 : length_; }
     double rise(const double* x) const { return free_period_ ? x[shape_size()] : rise(); }

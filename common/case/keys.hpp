@@ -374,7 +374,7 @@ void check_expected_terms(Keys& k, const Case& c) {
         });
 }
 
-// Why tier "axisym" cannot use a start.
+// Why tier "axisym" cannot use an initial shape.
 inline Asymmetry not_axisymmetric(const Shape& shape) {
     return std::visit(
         [](const auto& which) -> Asymmetry {
@@ -384,7 +384,7 @@ inline Asymmetry not_axisymmetric(const Shape& shape) {
         shape);
 }
 
-// If the smallest radius of the start is known.
+// If the smallest initial radius is known.
 template <class Keys>
 void check_neck(Keys& k, const Case& c) {
     std::visit(

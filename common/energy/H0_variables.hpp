@@ -1,4 +1,4 @@
-// What a formula of a spontaneous curvature that varies may depend on: the place in the start.
+// What a formula of a spontaneous curvature that varies may depend on: the place on the initial shape.
 #pragma once
 
 #include <array>

@@ -109,7 +109,7 @@ struct Bending {
     std::array<double, n_bending_terms> k{};
     double H0 = 0;
     std::vector<EnergyTerm> terms = {};
-    std::shared_ptr<const Formula> H0_formula = {};  // of the place in the start: see H0_variables.hpp
+    std::shared_ptr<const Formula> H0_formula = {};  // of the place on the initial shape: see H0_variables.hpp
 
     bool H0_varies() const { return H0_formula != nullptr; }
     // From points of a profile instead of the case: a formula of the area alone, in both tiers.

@@ -36,7 +36,7 @@ struct ModelEntry {
     ModelKind kind;
     const char* name;   // as in case files
     bool inextensible;  // locally, div u = 0; such models keep the volume unless the case frees it
-    bool inertia;       // the velocity has a start of its own
+    bool inertia;       // the velocity has an initial value
     bool viscous;       // takes Re; other models have no viscosity
 };
 inline constexpr std::array models{

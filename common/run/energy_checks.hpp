@@ -9,7 +9,7 @@
 
 namespace tubule {
 
-// Throws CaseError where the formula of the energy is not defined on the start; `where` is the place of the margin.
+// Throws CaseError where the formula of the energy is not defined initially; `where` is the place of the margin.
 void require_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
 CaseError not_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
 // The key of the formula; "energy" if there is none.

@@ -25,7 +25,7 @@ public:
     // too near to them.
     double operator()(double t) const;
     // How far another run's energy is from this one's, absolute; nothing after the end, and nothing within the first
-    // step, as the energy of a start that is not smooth falls like a root of the time.
+    // step, as the energy of a shape that is not smooth falls like a root of the time.
     std::optional<double> difference(double t, double energy) const;
 
     // The fields of a record (common/result/record.hpp), with names that begin with `name`.

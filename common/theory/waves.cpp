@@ -96,7 +96,7 @@ double tension(const Motion& motion, const double* y) {
     return -above / below;
 }
 
-// The unknowns: the radius and log of each amplitude over that at the start; or amplitudes; or of each wave (a, a', y).
+// The unknowns: the radius and log of each amplitude over the initial one; or amplitudes; or of each wave (a, a', y).
 int slope(double, const double* y, double* dy, void* parameters) {
     Motion& motion = *static_cast<Motion*>(parameters);
     if (motion.pause && motion.pause->look()) return GSL_EBADFUNC;

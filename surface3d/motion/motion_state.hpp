@@ -24,7 +24,7 @@ public:
 // Nodal values at a time.
 struct MotionState {
     double time = 0;
-    double step = 0;                 // that led here; 0 at the start
+    double step = 0;                 // that led here; 0 initially
     VectorField X, w;                // positions, their velocity without stretch z e_z
     Eigen::VectorXd u;               // velocity as in MotionUnknowns, component by component, without the same
     Eigen::VectorXd p;               // pressure, at the nodes of its own order

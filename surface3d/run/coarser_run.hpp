@@ -31,7 +31,7 @@ public:
 
     bool has_begun() const { return run_.has_state(); }
     bool is_at(double time) const { return has_begun() && !is_before(run_.time(), time); }
-    bool is_on_grid() const { return run_.memory().grid > 0; }  // its mesh is that of the start, or a coarser one of it
+    bool is_on_grid() const { return run_.memory().grid > 0; }  // its mesh is an initial one, or became coarser
     const std::optional<StopReport>& stop() const { return loop_ ? loop_->stop() : no_stop_; }
     const SurfaceSimulation& run() const { return run_; }
     double energy() const { return run_.energy(); }

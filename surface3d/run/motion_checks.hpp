@@ -33,7 +33,7 @@ std::optional<StopReport> find_slow_rise(double rise, double asked, double time)
 std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
                                                  double time);
 
-// Where area and volume are one condition, the area alone is kept: the relative change of the volume since the start,
+// Where area and volume are one condition, the area alone is kept: the relative change of the volume since t = 0,
 // which may be a hundredth of the accuracy asked. Where they are two, steps that miss the volume are refused.
 constexpr double most_drift = 0.01;
 std::optional<StopReport> find_drift(double change, double asked, double time);

@@ -117,7 +117,7 @@ Forecast by_pilot_runs(const Case& c, const Start& start) {
             out.finer_runs = pilot.rough && can_be_repeated(c, start);
             if (own == triangles || !out.ill_posed.empty()) break;
         }
-    } catch (const Paused&) {  // the start alone takes long
+    } catch (const Paused&) {  // the initial mesh alone takes long
     }
     return out;
 }

@@ -18,7 +18,7 @@ constexpr double least_growth = 1.5, most_growth = 4;  // of the number of trian
 constexpr double growth_of_start = 1.22;               // of that number, until the initial energy is accurate
 constexpr double spare = 1.5;                          // tolerance over the error that the next pair aims at
 constexpr double part_of_asked = 0.4;                  // of space and of time, where they are known separately
-constexpr double later = 2;                            // errors grow from the start on
+constexpr double later = 2;                            // errors grow from the initial ones
 constexpr double tolerance_per_accuracy = 0.8;         // tolerance = this * asked accuracy^1.5, of order 2
 constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * asked accuracy^1.25
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
@@ -49,7 +49,7 @@ double order_in_space(const Case& c, double smoothness) {
     return element_order(c) < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
 }
 
-// The number of triangles from which on the energy of the start is as accurate as asked, by a coarser mesh and by a
+// The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
 // finer one: two of them may agree by chance.
 int triangles_for_start(const Case& c, const Start& start) {
     const int order = element_order(c);

@@ -25,7 +25,7 @@ double reference_energy(const Case& c, const Observables& start, double period);
 // or not the same at both ends of a period.
 Eigen::VectorXd start_H0(const Case& c, const StartMesh& start);
 
-// Throws CaseError where the formula of the energy is not defined for H, K and H0 at the nodes of the start.
+// Throws CaseError where the formula of the energy is not defined for H, K and H0 at the initial nodes.
 void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K,
                      const Eigen::VectorXd& H0 = {});
 

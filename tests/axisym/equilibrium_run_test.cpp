@@ -188,9 +188,9 @@ TEST(EquilibriumCase, whatIsHeld) {
     const std::string single = good.substr(0, good.find("[equilibrium.branch]"));
     const Outcome given = outcome(single, {"equilibrium.reduced_volume=0.8"});
     EXPECT_NEAR(given.at("reduced_volume", 0), 0.8, 1e-11);
-    EXPECT_NEAR(given.at("area", 0), 9.42477796076938, 1e-10);  // that of the start: 2 pi r l + 4 pi r^2
+    EXPECT_NEAR(given.at("area", 0), 9.42477796076938, 1e-10);  // the initial one: 2 pi r l + 4 pi r^2
     const Outcome size = outcome(single, {"equilibrium.held=reduced-volume"});
-    EXPECT_NEAR(size.at("reduced_volume", 0), 0.7698003589195009, 1e-10);  // of the start
+    EXPECT_NEAR(size.at("reduced_volume", 0), 0.7698003589195009, 1e-10);  // initial
     EXPECT_NEAR(2 * size.at("tension", 0) * size.at("area", 0) - 3 * size.at("pressure", 0) * size.at("volume", 0), 0,
                 1e-7);
     EXPECT_EQ(outcome(single, {"equilibrium.held=nothing"}).at("pressure", 0), 0);

@@ -290,7 +290,7 @@ TEST(Equilibrium, failuresAreSaid) {
     const auto e = find_equilibrium(vesicle(0.7), spheroid(0.7, false), coarse);
     EXPECT_EQ(e.stop, Stop::resolution_lost);
     EXPECT_EQ(e.message.substr(0, 45), "with 20 elements, the error of the energy is ");
-    // Without descent, a start far from any stationary shape.
+    // Without descent, from a shape far from any stationary one.
     EquilibriumSettings direct = accurate(1e-8);
     direct.descend = false;
     const auto lost = find_equilibrium(vesicle(0.3), meridian(Capsule{0.5, 0.5}), direct);

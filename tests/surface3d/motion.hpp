@@ -22,7 +22,7 @@ inline CurvedMesh tube_mesh(const Tube& tube, int n_z, int n_theta, int order) {
     return mesh_of(tube, tube_rings(tube.radius, tube.length, n_z, n_theta), order);
 }
 
-// From rest, in steps of one size. Area and volume are held at those of the start, as in a run.
+// From rest, in steps of one size. Area and volume are held at their initial values, as in a run.
 struct Motion {
     Motion(const CurvedMesh& mesh, const Model& model, const Bending& bending, MotionControl control = {},
            Scheme name = scheme_named("bdf2"))

@@ -18,7 +18,7 @@ inline double longest_edge(const CurvedMesh& mesh) {
     return h;
 }
 
-// Area and volume of the start.
+// Initial area and volume.
 inline MotionControl kept(const CurvedMesh& mesh) {
     const Extent e = extent(SurfaceSpace(mesh), mesh);
     return {.area = e.area, .volume = e.volume};

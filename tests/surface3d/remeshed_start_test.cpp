@@ -1,4 +1,4 @@
-// From rough meshes to smooth starts: number of triangles, volume, distances from exactly known surfaces, notes,
+// From rough meshes to smooth surfaces: number of triangles, volume, distances from exactly known surfaces, notes,
 // refusals; and the single steps that CGAL takes. Built with CGAL alone.
 #include "surface3d/run/remeshed_start.hpp"
 
