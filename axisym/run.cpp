@@ -20,11 +20,12 @@ void check_restart(const Record& record) {
 
 RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
     const Record* from = restart ? &restart->record : nullptr;
-    if (!begins_as_graph(c) || (from && kind_of(*from) == RecordKind::curve)) return run_curve(c, observer, from);
-    RunSummary summary = run_graph(c, observer, from);
+    const Problem problem(c);
+    if (!begins_as_graph(c) || (from && kind_of(*from) == RecordKind::curve)) return run_curve(problem, observer, from);
+    RunSummary summary = run_graph(problem, observer, from);
     if (summary.stop.reason != Stop::overhang || c.discretisation.parametrisation) return summary;
     observer.discard();
-    return run_curve(c, observer);
+    return run_curve(problem, observer);
 }
 
 }  // namespace tubule::axisym

@@ -34,21 +34,22 @@ RunObserver nobody;  // who sees its rows; pauses come from the clock
 
 }  // namespace
 
-Loop loop_of(CurveSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock) {
+Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
     Loop out(run, c, watch, clock, run.is_reported());
     out.add(std::make_unique<Stall>(most_stalled, tiny_step * c.time.end, c.accuracy.energy,
                                     "try another accuracy, discretisation.elements or parametrisation"));
     return out;
 }
 
-CoarserCurve::CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings)
+CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock,
+                           const CurveSettings& settings)
     : case_(c), run_(std::make_unique<CurveSimulation>(c, start, settings, nullptr)) {
     run_->begin();
     loop_.emplace(loop_of(*run_, c, nobody, clock));
     loop_->begin();
 }
 
-CoarserCurve::CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const Record& record)
+CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const Record& record)
     : case_(c) {
     const Record own = nested(record, prefix, RecordKind::curve);
     Saved saved;
@@ -60,7 +61,8 @@ CoarserCurve::CoarserCurve(const Case& c, const Beginning& start, const RunClock
     if (!continues(saved, c.time)) loop_->end({static_cast<Stop>(saved.stop), saved.stop_time, "", ""});
 }
 
-CoarserCurve::CoarserCurve(const Case& c, std::unique_ptr<CurveSimulation> ended) : case_(c), run_(std::move(ended)) {
+CoarserCurve::CoarserCurve(const Problem& c, std::unique_ptr<CurveSimulation> ended)
+    : case_(c), run_(std::move(ended)) {
     run_->compare_no_more();
 }
 

@@ -12,14 +12,14 @@ namespace tubule::axisym {
 
 // The loop of a run of a curve, once that has begun: with the callbacks that curves have. All references must outlive
 // it.
-Loop loop_of(CurveSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock);
+Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock);
 
 class CoarserCurve {
 public:
     // References must outlive it. A new run; one that was saved (throws as RecordReader); one that has ended.
-    CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings);
-    CoarserCurve(const Case& c, const Beginning& start, const RunClock& clock, const Record& record);
-    CoarserCurve(const Case& c, std::unique_ptr<CurveSimulation> ended);
+    CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings);
+    CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const Record& record);
+    CoarserCurve(const Problem& c, std::unique_ptr<CurveSimulation> ended);
     static void check_restart(const Record& record);
     void save(Record& record) const;
 
@@ -31,7 +31,7 @@ public:
     std::optional<StopReport> stop() const { return loop_ ? loop_->stop() : run_->summary.stop; }
 
 private:
-    const Case& case_;
+    const Problem& case_;
     std::unique_ptr<CurveSimulation> run_;
     std::optional<Loop> loop_;  // none: the run has ended before this pair
 };

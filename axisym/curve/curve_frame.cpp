@@ -76,7 +76,7 @@ Meridian sampled(const WavedProfile& surface, const ResultFrame& from) {
 }
 
 struct MakeMeridian {
-    const Case& c;
+    const Problem& c;
     template <class Exact>
     Meridian operator()(const Exact& shape) const {
         return meridian(shape);
@@ -146,7 +146,7 @@ Meridian frame_meridian(const Record& frame) {
     return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
 }
 
-std::optional<StartVelocity> start_velocity(const Case& c) {
+std::optional<StartVelocity> start_velocity(const Problem& c) {
     if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
     const Record frame = start_frame(c).record;
     const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
@@ -161,7 +161,7 @@ std::optional<StartVelocity> start_velocity(const Case& c) {
     return out;
 }
 
-Meridian start_meridian(const Case& c) {
+Meridian start_meridian(const Problem& c) {
     return std::visit(MakeMeridian{c}, c.shape);
 }
 

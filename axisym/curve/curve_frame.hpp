@@ -4,7 +4,7 @@
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/curve_start.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/energy_trace.hpp"
 
@@ -38,7 +38,7 @@ CurveRestart curve_restart(const Record& record);
 Meridian frame_meridian(const Record& frame);
 
 // Where a case begins. Throws CaseError for a result without a frame of this tier.
-Meridian start_meridian(const Case& c);
+Meridian start_meridian(const Problem& c);
 
 // The velocity of the frame that a case begins with, by the fraction of the arc length, where the case asks for it.
 // Throws CaseError where the frame has none.
@@ -47,6 +47,6 @@ struct StartVelocity {
     ProfileVelocity velocity;
     bool swirls = false;
 };
-std::optional<StartVelocity> start_velocity(const Case& c);
+std::optional<StartVelocity> start_velocity(const Problem& c);
 
 }  // namespace tubule::axisym

@@ -38,7 +38,7 @@ bool may_be_ill_posed(const Bending& energy, double coarse, double fine) {
 // Where it exceeds the tolerance, the finer run becomes the coarser one of the next pair.
 class CurveRuns : public EstimatedRuns {
 public:
-    CurveRuns(const Case& c, RunObserver& watch, const RunClock& clock, const Record* restart)
+    CurveRuns(const Problem& c, RunObserver& watch, const RunClock& clock, const Record* restart)
         : case_(c),
           watch_(watch),
           clock_(clock),
@@ -70,7 +70,7 @@ public:
 
     bool refine(const RunSummary& last) override {
         const bool good = last.as_accurate_as_asked && !failed(last.stop);
-        if (good || settings_given(case_) || !can_be_finer(settings_)) return false;
+        if (good || case_.profile_resolution_given() || !can_be_finer(settings_)) return false;
         const bool cheap = last.stop.time == 0;  // a failure at the beginning, where finer meshes may do
         if (failed(last.stop) && !cheap && ++failures_ > most_failures) return false;
         const double excess = last.error_is_known() ? last.estimated_error / case_.accuracy.energy : 1;
@@ -87,7 +87,7 @@ public:
     }
 
     std::string fixed_by() const override {
-        return settings_given(case_) ? "discretisation.elements or time_tolerance are given" : "";
+        return case_.profile_resolution_given() ? "discretisation.elements or time_tolerance are given" : "";
     }
 
 private:
@@ -118,10 +118,10 @@ private:
 
     // Not where breaks are at jumps of curvature or of H0, nor where small elements make the waves of a fluid shorter.
     bool may_be_graded() const {
-        return start_.meridian.seams.empty() && !case_.energy.H0_varies() && motion_law(case_.model).inertia == 0;
+        return start_.meridian.seams.empty() && !case_.energy.H0_varies() && case_.law.inertia == 0;
     }
 
-    const Case& case_;
+    const Problem& case_;
     RunObserver& watch_;
     const RunClock& clock_;
     const Record* restart_;  // until the run resumes from it
@@ -134,7 +134,7 @@ private:
 
 }  // namespace
 
-RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart) {
+RunSummary run_curve(const Problem& c, RunObserver& observer, const Record* restart) {
     const RunClock clock(c, observer);
     return clock.pausing([&] {
         CurveRuns runs(c, observer, clock, restart);

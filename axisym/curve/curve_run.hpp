@@ -6,8 +6,8 @@
 
 namespace tubule::axisym {
 
-// As run(). Each run is compared with a coarser one (coarser_curve.hpp), which has fewer elements and a wider tolerance.
-// The stated error is how far the two energies are apart at the times of the steps.
-RunSummary run_curve(const Case& c, RunObserver& observer, const Record* restart = nullptr);
+// As run(). Each run is compared with a coarser one (coarser_curve.hpp), which has fewer elements and a wider
+// tolerance. The stated error is how far the two energies are apart at the times of the steps.
+RunSummary run_curve(const Problem& c, RunObserver& observer, const Record* restart = nullptr);
 
 }  // namespace tubule::axisym

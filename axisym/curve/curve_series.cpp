@@ -7,7 +7,7 @@ namespace tubule::axisym {
 namespace {
 
 // Numbers n > 0 of the initial modes, each once.
-std::vector<int> tracked_modes(const Case& c) {
+std::vector<int> tracked_modes(const Problem& c) {
     std::set<int> waves;
     if (const Tube* tube = std::get_if<Tube>(&c.shape))
         for (const TubeMode& mode : tube->modes)
@@ -22,7 +22,7 @@ double lambda(const CurveRow& r) {
 
 }  // namespace
 
-SeriesTable<CurveRow> curve_series(const Case& c) {
+SeriesTable<CurveRow> curve_series(const Problem& c) {
     const std::vector<int> modes = tracked_modes(c);
     std::vector<std::string> waves;
     for (const int n : modes) waves.push_back(std::to_string(n));
@@ -35,7 +35,7 @@ SeriesTable<CurveRow> curve_series(const Case& c) {
                {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw law = c.law;
     table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
     if (law.loads_change()) table.add({{"work", [](const CurveRow& r) { return r.work; }}});
     table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},

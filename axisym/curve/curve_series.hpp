@@ -3,7 +3,7 @@
 
 #include "axisym/curve/curve_snapshot.hpp"
 #include "axisym/integration/flow.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/series/table.hpp"
 
 namespace tubule::axisym {
@@ -20,6 +20,6 @@ struct CurveRow {
     double wall_seconds;
 };
 
-SeriesTable<CurveRow> curve_series(const Case& c);
+SeriesTable<CurveRow> curve_series(const Problem& c);
 
 }  // namespace tubule::axisym

@@ -20,17 +20,13 @@ constexpr double coarser_start = 4, coarser_growth = 8;
 
 }  // namespace
 
-CurveSettings first_settings(const Case& c, int images) {
-    const bool waves = motion_law(c.model).inertia != 0;
+CurveSettings first_settings(const Problem& c, int images) {
+    const bool waves = c.law.inertia != 0;
     const double tolerance = (waves ? tolerance_of_waves : tolerance_per_accuracy) * c.accuracy.energy;
     CurveSettings s = finer({first_curve_elements, tolerance, 0}, finer_mesh);
     if (c.discretisation.elements) s.elements = (*c.discretisation.elements + images - 1) / images;
     if (c.discretisation.time_tolerance) s.tolerance = *c.discretisation.time_tolerance;
     return s;
-}
-
-bool settings_given(const Case& c) {
-    return c.discretisation.elements || c.discretisation.time_tolerance;
 }
 
 double first_step_of(const CurveSettings& s) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "axisym/curve/element_density.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule::axisym {
 
@@ -19,8 +19,7 @@ struct CurveSettings {
 
 // The finer run of the first pair: what the case gives, or what its accuracy asks for. The case's elements are those of
 // all `images` of the cell.
-CurveSettings first_settings(const Case& c, int images);
-bool settings_given(const Case& c);
+CurveSettings first_settings(const Problem& c, int images);
 
 // The first step of the integrator relative to what the initial state requires, and the largest ratio of a step to the
 // last. A run of short duration takes all its steps as fast as they may grow, whatever its tolerance: only if they

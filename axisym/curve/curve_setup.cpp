@@ -40,8 +40,8 @@ double variation_of_H(const CurveSpace& space, const Eigen::VectorXd& x) {
 }
 
 // Weight of the gauge, in the scale of the rows that it is added to (curve_motion.hpp).
-double gauge_of(const Case& c, double energy, double area) {
-    const MotionLaw law = motion_law(c.model);
+double gauge_of(const Problem& c, double energy, double area) {
+    const MotionLaw law = c.law;
     if (law.inertia != 0) return std::sqrt(energy * area);
     return law.viscosity != 0 ? energy * c.model.Re : energy;
 }
@@ -49,10 +49,10 @@ double gauge_of(const Case& c, double energy, double area) {
 // Elements of the asked size, small ones at seams. These shrink faster than the rest, since the error is of first order
 // there and the difference of a pair must exceed it; but not in a fluid, where they allow shorter waves, which take ten
 // times the steps.
-std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Case& c, double least) {
+std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& settings, const Problem& c, double least) {
     const double size = 1.0 / settings.elements;
     const std::vector<double> seams = arc.seams();
-    const bool inertia = motion_law(c.model).inertia != 0;
+    const bool inertia = c.law.inertia != 0;
     const double shrunk = std::pow(first_curve_elements * size, 2),
                  largest = seam_size * (inertia ? size : shrunk / first_curve_elements);
     const double at_seam = std::max(std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk), least);
@@ -60,15 +60,15 @@ std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& sett
     return settings.density.empty() ? equal_breaks(settings.elements) : breaks_of(settings.density, settings.elements);
 }
 
-std::unique_ptr<CurveSpace> space_of(const Case& c, const Meridian& meridian, const std::vector<double>& breaks) {
+std::unique_ptr<CurveSpace> space_of(const Problem& c, const Meridian& meridian, const std::vector<double>& breaks) {
     const int degree = c.discretisation.order;
     return std::make_unique<CurveSpace>(meridian.topology, breaks, degree,
                                         c.discretisation.smoothness.value_or(degree - 1), meridian.length,
-                                        motion_law(c.model).free_period);
+                                        c.law.free_period);
 }
 
 // H0 goes with the points of this start.
-void fix_H0(const Case& c, CurveForms& forms, const Eigen::VectorXd& x) {
+void fix_H0(const Problem& c, CurveForms& forms, const Eigen::VectorXd& x) {
     if (!c.energy.H0_varies()) return;
     try {
         forms.fix_H0(x);
@@ -79,15 +79,15 @@ void fix_H0(const Case& c, CurveForms& forms, const Eigen::VectorXd& x) {
 
 }  // namespace
 
-CurveLaw law_of(const Case& c) {
-    CurveLaw law = motion_law(c.model);
+CurveLaw law_of(const Problem& c) {
+    CurveLaw law = c.law;
     law.lagrangian =
         c.energy.H0_varies() || (law.inextensible && c.discretisation.parametrisation != Parametrisation::even);
     law.swirls = c.velocity.initial == InitialVelocity::rotation;
     return law;
 }
 
-Beginning beginning_of(const Case& c) {
+Beginning beginning_of(const Problem& c) {
     Meridian whole = start_meridian(c);
     std::optional<StartVelocity> velocity = start_velocity(c);
     if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() &&
@@ -116,7 +116,7 @@ int Beginning::images() const {
     return meridian.topology == Topology::half_cell || meridian.topology == Topology::half_tube ? 2 : 1;
 }
 
-CurveSetup::CurveSetup(const Case& of, const Beginning& from, const CurveSettings& with)
+CurveSetup::CurveSetup(const Problem& of, const Beginning& from, const CurveSettings& with)
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
     space = space_of(c, start.meridian, first_breaks(arc, settings, c, least_seam));
@@ -192,9 +192,9 @@ CurveBegin given_state(const CurveSetup& setup) {
     return out;
 }
 
-CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings s) {
+CurveSettings settings_for(const Problem& c, const Beginning& start, CurveSettings s) {
     constexpr double most_lost = 0.1;  // of the energy; what less than that costs, a pair of runs shows
-    if (settings_given(c) || !start.meridian.seams.empty()) return s;
+    if (c.profile_resolution_given() || !start.meridian.seams.empty()) return s;
     const double allowed = most_lost * start.bending.magnitude;
     const ArcLength arc(start.meridian);
     while (can_be_finer(s)) {

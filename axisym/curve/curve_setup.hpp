@@ -10,11 +10,11 @@
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/integration/flow.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule::axisym {
 
-CurveLaw law_of(const Case& c);
+CurveLaw law_of(const Problem& c);
 
 // The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct Beginning {
@@ -27,13 +27,13 @@ struct Beginning {
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
     int images() const;                              // of the meridian in the whole shape
 };
-Beginning beginning_of(const Case& c);
+Beginning beginning_of(const Problem& c);
 
 // The system of one run. Case and beginning must outlive it.
 struct CurveSetup {
-    CurveSetup(const Case& c, const Beginning& start, const CurveSettings& settings);
+    CurveSetup(const Problem& c, const Beginning& start, const CurveSettings& settings);
 
-    const Case& c;
+    const Problem& c;
     const Beginning& start;
     CurveSettings settings;
     std::unique_ptr<CurveSpace> space;
@@ -63,6 +63,6 @@ CurveBegin begin_state(const CurveSetup& setup);
 CurveBegin given_state(const CurveSetup& setup);
 
 // These settings, with as many more elements as a spline needs that has nearly the energy of the initial shape.
-CurveSettings settings_for(const Case& c, const Beginning& start, CurveSettings settings);
+CurveSettings settings_for(const Problem& c, const Beginning& start, CurveSettings settings);
 
 }  // namespace tubule::axisym

@@ -75,7 +75,7 @@ struct CurveSimulation::View : StateView {
 
 CurveSimulation::~CurveSimulation() = default;
 
-CurveSimulation::CurveSimulation(const Case& c, const Beginning& start, const CurveSettings& settings,
+CurveSimulation::CurveSimulation(const Problem& c, const Beginning& start, const CurveSettings& settings,
                                  CoarserCurve* coarser)
     : setup_(c, start, settings), coarser_(coarser) {
     summary.reference_energy = setup_.reference_energy;
@@ -284,7 +284,7 @@ double CurveSimulation::share(double t) const {
 // finer run.
 void CurveSimulation::compare(double t, const Snapshot& s) {
     if (!coarser_) return;
-    const bool given = settings_given(setup_.c);
+    const bool given = setup_.c.profile_resolution_given();
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
                  unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0;
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
@@ -297,7 +297,7 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
 // exceeds the tolerance and the known error, or the shape is not that of a membrane, the run returns to the last good
 // step.
 std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
-    const bool asked = !setup_.settings.is_coarser && !settings_given(setup_.c);
+    const bool asked = !setup_.settings.is_coarser && !setup_.c.profile_resolution_given();
     const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
                  hopeless = hopeless_rise * summary.reference_energy,
                  wanted = setup_.c.accuracy.energy * summary.reference_energy,

@@ -25,7 +25,7 @@ std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x)
     return checks;
 }
 
-std::vector<TermCheck> check_terms(const Case& c) {
+std::vector<TermCheck> check_terms(const Problem& c) {
     const Tube& tube = std::get<Tube>(c.shape);
     const Cell cell = cell_of(tube, c.discretisation.symmetry);
     const int order = c.discretisation.order;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/solve/derivative_check.hpp"
 
 namespace tubule::axisym {
@@ -20,6 +20,6 @@ struct TermCheck {
 std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x);
 
 // The same at the initial shape of a case, on a mesh of moderate size.
-std::vector<TermCheck> check_terms(const Case& c);
+std::vector<TermCheck> check_terms(const Problem& c);
 
 }  // namespace tubule::axisym

@@ -16,7 +16,7 @@ constexpr int most_attempts = 6;
 
 class GraphRuns : public EstimatedRuns {
 public:
-    GraphRuns(const Case& c, RunObserver& watch, const RunClock& clock, const Record* restart)
+    GraphRuns(const Problem& c, RunObserver& watch, const RunClock& clock, const Record* restart)
         : case_(c),
           watch_(watch),
           clock_(clock),
@@ -66,7 +66,7 @@ private:
         return true;
     }
 
-    const Case& case_;
+    const Problem& case_;
     RunObserver& watch_;
     const RunClock& clock_;
     const Record* restart_;  // until a run has resumed from it
@@ -78,7 +78,7 @@ private:
 
 }  // namespace
 
-RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart) {
+RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart) {
     const RunClock clock(c, observer);
     return clock.pausing([&] {
         GraphRuns runs(c, observer, clock, restart);

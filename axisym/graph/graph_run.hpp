@@ -8,6 +8,6 @@ namespace tubule::axisym {
 
 // As run(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
 // (graph_error_transport.hpp); where that exceeds the accuracy asked, it starts again with finer settings.
-RunSummary run_graph(const Case& c, RunObserver& observer, const Record* restart = nullptr);
+RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart = nullptr);
 
 }  // namespace tubule::axisym

@@ -4,7 +4,7 @@
 
 namespace tubule::axisym {
 
-SeriesTable<GraphRow> graph_series(const Case& c) {
+SeriesTable<GraphRow> graph_series(const Problem& c) {
     std::vector<std::string> waves;
     for (const int n : tracked_graph_modes(c)) waves.push_back(std::to_string(n));
     SeriesTable<GraphRow> table;

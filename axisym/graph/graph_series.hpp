@@ -20,6 +20,6 @@ struct GraphRow {
     double wall_seconds;
 };
 
-SeriesTable<GraphRow> graph_series(const Case& c);
+SeriesTable<GraphRow> graph_series(const Problem& c);
 
 }  // namespace tubule::axisym

@@ -15,7 +15,7 @@ constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh /
 
 }  // namespace
 
-GraphSettings first_graph_settings(const Case& c, bool one_step) {
+GraphSettings first_graph_settings(const Problem& c, bool one_step) {
     const double asked = c.accuracy.energy;
     return {c.discretisation.time_tolerance.value_or(time_tolerance_for(asked, one_step)),
             defect_per_accuracy * asked,

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "axisym/graph/graph_error_transport.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule::axisym {
 
@@ -17,7 +17,7 @@ struct GraphSettings {
     bool one_step = false;    // Rosenbrock's method, else IDA
 };
 
-GraphSettings first_graph_settings(const Case& c, bool one_step);
+GraphSettings first_graph_settings(const Problem& c, bool one_step);
 
 // After attempt number `attempt`, whose error (absolute) was beyond what is allowed.
 GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt);

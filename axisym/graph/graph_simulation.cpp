@@ -95,7 +95,7 @@ void GraphSimulation::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd&
     good_.balance = now_.o.free_energy + dissipated(t);
 }
 
-GraphSimulation::GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings)
+GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings)
     : case_(c), clock_(clock), series_(graph_series(c)), settings_(settings), remesh_margin_(first_remesh_margin) {
     const Tube& tube = std::get<Tube>(case_.shape);
     const Cell cell = cell_of(tube, case_.discretisation.symmetry);
@@ -112,7 +112,7 @@ GraphSimulation::GraphSimulation(const Case& c, const RunClock& clock, const Gra
     past_.energy_start = now_.o.free_energy;
 }
 
-GraphSimulation::GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings,
+GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings,
                                  const Record& restart)
     : case_(c), clock_(clock), series_(graph_series(c)), settings_(settings), remesh_margin_(first_remesh_margin) {
     const GraphRestart state = graph_restart(restart);

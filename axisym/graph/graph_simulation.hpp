@@ -22,8 +22,8 @@ namespace tubule::axisym {
 class GraphSimulation : public Simulation {
 public:
     // All references must outlive it. From the initial shape, or resumed from a frame or checkpoint.
-    GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings);
-    GraphSimulation(const Case& c, const RunClock& clock, const GraphSettings& settings, const Record& restart);
+    GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings);
+    GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings, const Record& restart);
 
     double time() const override { return flow_->time(); }
     double step_size() const override { return flow_->step_size(); }
@@ -90,7 +90,7 @@ private:
         return past_.dissipated + (is_one_step() ? flow_->dissipated(t) : dissipated_.at(t));
     }
 
-    const Case& case_;
+    const Problem& case_;
     const RunClock& clock_;
     const SeriesTable<GraphRow> series_;
     GraphSettings settings_;

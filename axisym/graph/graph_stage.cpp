@@ -18,25 +18,25 @@ namespace {
 constexpr double start_margin = 1.0 / 4;  // initial defect / defect at which to remesh
 constexpr int fewest_elements = 3;
 
-ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Case& c) {
+ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Problem& c) {
     const int order = c.discretisation.order;
     return ProfileSpace(cell, std::move(breaks), order, c.discretisation.smoothness.value_or(order - 1));
 }
 
 }  // namespace
 
-Loads graph_loads(const Case& c) {
-    return loads_at(motion_law(c.model), 0);
+Loads graph_loads(const Problem& c) {
+    return loads_at(c.law, 0);
 }
 
-std::vector<int> tracked_graph_modes(const Case& c) {
+std::vector<int> tracked_graph_modes(const Problem& c) {
     std::set<int> waves;
     for (const TubeMode& mode : std::get<Tube>(c.shape).modes)
         if (mode.n > 0) waves.insert(mode.n);
     return {waves.begin(), waves.end()};
 }
 
-GraphStage::GraphStage(const Cell& cell, std::vector<double> breaks, const Case& c)
+GraphStage::GraphStage(const Cell& cell, std::vector<double> breaks, const Problem& c)
     : space(space_of(cell, std::move(breaks), c)), forms(space, c.energy, graph_loads(c)), transport(forms) {
     for (int n : tracked_graph_modes(c)) modes.push_back(forms.mode(n));
 }
@@ -55,7 +55,7 @@ Observation GraphStage::look(const double* x, const double* v, std::vector<doubl
     return o;
 }
 
-FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
+FirstMesh first_mesh(const Problem& c, const GraphSettings& settings, const Cell& cell,
                      const std::function<double(double)>& start) {
     const Discretisation& d = c.discretisation;
     int most_waves = 0;

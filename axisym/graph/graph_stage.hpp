@@ -13,13 +13,13 @@ namespace tubule::axisym {
 constexpr int most_graph_elements = 4000;  // of one cell
 
 // Tension and pressure, the same at all times: what changes is computed as a curve.
-Loads graph_loads(const Case& c);
+Loads graph_loads(const Problem& c);
 
 // Numbers n > 0 of the initial modes, each once.
-std::vector<int> tracked_graph_modes(const Case& c);
+std::vector<int> tracked_graph_modes(const Problem& c);
 
 struct GraphStage {
-    GraphStage(const Cell& cell, std::vector<double> breaks, const Case& c);
+    GraphStage(const Cell& cell, std::vector<double> breaks, const Problem& c);
 
     ProfileSpace space;
     Forms forms;
@@ -36,7 +36,7 @@ struct FirstMesh {
     double reference_energy = 0;
 };
 // Breaks suitable for the initial shape and, as far as can be foreseen, for how the flow changes it.
-FirstMesh first_mesh(const Case& c, const GraphSettings& settings, const Cell& cell,
+FirstMesh first_mesh(const Problem& c, const GraphSettings& settings, const Cell& cell,
                      const std::function<double(double)>& start);
 
 }  // namespace tubule::axisym

@@ -5,7 +5,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/splines/profile_space.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule::axisym {
 

@@ -7,7 +7,7 @@
 
 namespace tubule {
 
-Loop::Loop(Simulation& run, const Case& c, RunObserver& watch, const RunClock& clock, bool reported)
+Loop::Loop(Simulation& run, const Problem& c, RunObserver& watch, const RunClock& clock, bool reported)
     : run_(run), case_(c), clock_(clock), out_(watch, clock, reported), outputs_(c) {
     if (c.time.stationary) add(std::make_unique<Stationarity>(c));
 }

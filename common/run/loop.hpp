@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/case/problem.hpp"
 #include "common/run/output_times.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/run/run_output.hpp"
@@ -17,7 +18,7 @@ class Loop {
 public:
     // All references must outlive the loop. A run that is not `reported`, but compared with another, writes restart
     // records alone.
-    Loop(Simulation& run, const Case& c, RunObserver& watch, const RunClock& clock, bool reported = true);
+    Loop(Simulation& run, const Problem& c, RunObserver& watch, const RunClock& clock, bool reported = true);
 
     void add(std::unique_ptr<Callback> callback) { callbacks_.push_back(std::move(callback)); }
 
@@ -40,7 +41,7 @@ private:
     void finish();
 
     Simulation& run_;
-    const Case& case_;
+    const Problem& case_;
     const RunClock& clock_;
     RunOutput out_;
     OutputTimes outputs_;

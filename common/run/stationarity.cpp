@@ -26,7 +26,8 @@ void fields(Fields&& f, Numbers& numbers) {
 std::optional<StopReport> Stationarity::after_step(const Simulation& run) {
     const double t = run.time();
     const Energetics e = run.energetics();
-    if (std::isfinite(next_kink(law_, t * (1 + 1e-12))) || !is_settled(t, e.dissipation, e.area)) return std::nullopt;
+    if (std::isfinite(next_kink(case_.law, t * (1 + 1e-12))) || !is_settled(t, e.dissipation, e.area))
+        return std::nullopt;
     if (change_until(case_.time.end, t, e) >= *case_.time.stationary * run.summary.reference_energy)
         return std::nullopt;
     return StopReport{Stop::stationary, t, "the energy no longer changes by more than time.stationary allows", ""};
@@ -45,7 +46,7 @@ void Stationarity::restore(const Record& record) {
 }
 
 bool Stationarity::is_settled(double time, double dissipation, double area) {
-    const double size = std::sqrt(area / (4 * pi)), drag = law_.friction + law_.viscosity / (size * size);
+    const double size = std::sqrt(area / (4 * pi)), drag = case_.law.friction + case_.law.viscosity / (size * size);
     const double speed = std::sqrt(std::max(dissipation, 0.0) / (drag * area));
     if (!(speed > 0)) return true;
     const double left = case_.time.end - time, passed = time - since_;

@@ -1,7 +1,7 @@
 // Ends a run that has come to rest (time.stationary): its energy may be flat while the membrane still moves.
 #pragma once
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/simulation.hpp"
 
 namespace tubule {
@@ -10,8 +10,9 @@ namespace tubule {
 // distances of sqrt(e) times the size of the membrane, and changes of the energy of e E_ref.
 class Stationarity : public Callback {
 public:
-    // The case must outlive it.
-    explicit Stationarity(const Case& c) : case_(c), law_(motion_law(c.model)) {}
+    // The problem must outlive it.
+    explicit Stationarity(const Problem& c) : case_(c) {}
+    explicit Stationarity(Problem&&) = delete;
 
     std::optional<StopReport> after_step(const Simulation& run) override;
     void save(Record& record) const override;
@@ -22,8 +23,7 @@ public:
     bool is_settled(double time, double dissipation, double area);
 
 private:
-    const Case& case_;
-    MotionLaw law_;
+    const Problem& case_;
     double since_ = 0, speed_since_ = -1;  // where the measurement of the rate began; -1: not yet
     double rate_ = 0, rate_is_known_ = 0;  // measured last; 1 once it was measured
 };

@@ -65,9 +65,9 @@ double first_of_steps(double interval, double last, double most_growth) {
     return high * last;
 }
 
-Case case_of_coarser(const Case& c, Role role) {
+Problem problem_of_coarser(const Problem& c, Role role) {
     Case out = c;
-    const int order = element_order(c);
+    const int order = c.element_order;
     if (role == Role::other_order) out.surface.order = order > 2 ? order - 1 : 3;
     out.surface.step.reset();
     out.time.output.clear();
@@ -77,8 +77,8 @@ Case case_of_coarser(const Case& c, Role role) {
 
 }  // namespace
 
-CoarserRun::CoarserRun(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& settings)
-    : case_(std::make_unique<const Case>(case_of_coarser(c, settings.role))),
+CoarserRun::CoarserRun(const Problem& c, const Start& start, const RunClock& clock, const MotionSettings& settings)
+    : case_(std::make_unique<const Problem>(problem_of_coarser(c, settings.role))),
       start_(start),
       clock_(clock),
       run_(*case_, nobody, settings, nullptr) {}
@@ -89,11 +89,11 @@ void CoarserRun::begin() {
     loop_->begin();
 }
 
-std::unique_ptr<CoarserRun> CoarserRun::resumed(const Case& c, const Start& start, const RunClock& clock,
+std::unique_ptr<CoarserRun> CoarserRun::resumed(const Problem& c, const Start& start, const RunClock& clock,
                                                 const Record& record, const std::string& prefix) {
     Record own = nested(record, prefix, RecordKind::surface);
     const Saved saved = saved_of(own);
-    auto out = std::make_unique<CoarserRun>(c, start, clock, motion_restart(own, time_scheme(c)).memory.settings);
+    auto out = std::make_unique<CoarserRun>(c, start, clock, motion_restart(own, c.scheme).memory.settings);
     const Restart restart{std::move(own), saved.cells};
     out->run_.resume(restart, start);
     out->loop_.emplace(loop_of(out->run_, *out->case_, nobody, clock));
@@ -110,11 +110,11 @@ bool CoarserRun::is_saved(const Record& record, const std::string& prefix) {
     return exists != 0;
 }
 
-void CoarserRun::check_restart(const Case& c, const Record& record, const std::string& prefix) {
+void CoarserRun::check_restart(const Problem& c, const Record& record, const std::string& prefix) {
     if (!is_saved(record, prefix)) return;
     const Record own = nested(record, prefix, RecordKind::surface);
     saved_of(own);
-    motion_restart(own, time_scheme(c));
+    motion_restart(own, c.scheme);
 }
 
 void CoarserRun::save(const std::string& prefix, Record& record) const {

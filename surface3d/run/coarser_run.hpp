@@ -14,13 +14,13 @@ class CoarserRun {
 public:
     // Start and clock must outlive it; then one of the next two. Elements of another order take the order below the
     // case's, or 3 for 2.
-    CoarserRun(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& settings);
+    CoarserRun(const Problem& c, const Start& start, const RunClock& clock, const MotionSettings& settings);
     void begin();
     // What save() has written under the same prefix. Throws as RecordReader. is_saved(): whether it has.
-    static std::unique_ptr<CoarserRun> resumed(const Case& c, const Start& start, const RunClock& clock,
+    static std::unique_ptr<CoarserRun> resumed(const Problem& c, const Start& start, const RunClock& clock,
                                                const Record& record, const std::string& prefix);
     static bool is_saved(const Record& record, const std::string& prefix);
-    static void check_restart(const Case& c, const Record& record, const std::string& prefix);
+    static void check_restart(const Problem& c, const Record& record, const std::string& prefix);
     void save(const std::string& prefix, Record& record) const;
 
     // In one step, or in several where that is refused or more than `growth` times as long as the last. Without inertia
@@ -38,7 +38,7 @@ public:
     int steps() const { return run_.memory().count.steps; }
 
 private:
-    std::unique_ptr<const Case> case_;
+    std::unique_ptr<const Problem> case_;
     const Start& start_;
     const RunClock& clock_;
     SurfaceSimulation run_;

@@ -39,7 +39,7 @@ StopReport undefined_energy(const MotionMeasures& m, double time) {
     return tubule::undefined_energy(m.domain, time, where(m.least_defined));
 }
 
-double least_neck(const Case& c, double area) {
+double least_neck(const Problem& c, double area) {
     const bool by_size = std::holds_alternative<MeshFile>(c.shape) && !c.places.contains("accuracy.r_min");
     return c.accuracy.r_min * (by_size ? std::sqrt(area / (4 * pi)) : 1);
 }

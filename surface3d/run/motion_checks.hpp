@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/solve/stop.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 
@@ -16,7 +16,7 @@ StopReport undefined_energy(const MotionMeasures& m, double time);
 
 // The neck radius that ends a run: accuracy.r_min. Meshes from files come in any units, so there, unless the case gives
 // it, the default counts in radii of the sphere of this area.
-double least_neck(const Case& c, double area);
+double least_neck(const Problem& c, double area);
 
 // Faults of the shape and its triangles, which no shorter step would remedy: an energy that does not resist short
 // waves or is hardly defined, a neck thinner than r_min, normals that turn too far from node to node, a degenerate

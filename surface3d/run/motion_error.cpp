@@ -40,7 +40,7 @@ const std::string of_coarser = "restart_coarser_run_", of_same_steps = "restart_
 
 }  // namespace
 
-MotionError::MotionError(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& of)
+MotionError::MotionError(const Problem& c, const Start& start, const RunClock& clock, const MotionSettings& of)
     : case_(c), start_(start), clock_(clock), of_(of) {}
 
 bool MotionError::separates_time_error() const {
@@ -61,7 +61,7 @@ void MotionError::attempt(const Work& work, double time) {
 double MotionError::begin(int triangles, const MotionMeasures& start) {
     of_run_.growth = growth_of_coarser(case_, start.smoothness);
     of_run_.spare = spare_for_waves(case_, start.smoothness);
-    attempt([&] { begin(triangles); }, begin_time(case_));
+    attempt([&] { begin(triangles); }, case_.begin_time);
     return error_of_start(case_, start_, of_.elements, start.free_energy);
 }
 
@@ -69,7 +69,7 @@ void MotionError::begin(int triangles) {
     const int fewer = fewer_triangles(of_.elements);
     if (start_.resizable() && fewer >= least_triangles) {
         try {
-            const double coarser_by = 1.0 * triangles / start_.mesh(fewer, element_order(case_)).mesh.triangles();
+            const double coarser_by = 1.0 * triangles / start_.mesh(fewer, case_.element_order).mesh.triangles();
             if (coarser_by >= least_coarser) return begin(Role::fewer_triangles, coarser_by);
         } catch (const std::exception&) {  // another order may do
         }
@@ -231,7 +231,7 @@ void MotionError::resume(const Record& record, int triangles) {
         same_steps_ = CoarserRun::resumed(case_, start_, clock_, record, of_same_steps);
 }
 
-void check_error_restart(const Case& c, const Record& record) {
+void check_error_restart(const Problem& c, const Record& record) {
     FollowedRun run;
     Comparison compared;
     compared_fields(RecordReader(record), run, compared);

@@ -39,7 +39,7 @@ struct Comparison {
 class MotionError {
 public:
     // All references must outlive it. `of`: the run whose error it is.
-    MotionError(const Case& c, const Start& start, const RunClock& clock, const MotionSettings& of);
+    MotionError(const Problem& c, const Start& start, const RunClock& clock, const MotionSettings& of);
 
     // Begins, or resumes, with the run, which has this number of triangles. resume() throws as RecordReader. begin()
     // returns the error of the initial state, which has these measures.
@@ -77,7 +77,7 @@ private:
     bool is_compared(std::size_t i) const;
     bool separates_time_error() const;
 
-    const Case& case_;
+    const Problem& case_;
     const Start& start_;
     const RunClock& clock_;
     MotionSettings of_;
@@ -88,6 +88,6 @@ private:
 };
 
 // Throws as RecordReader if a run with an estimated error could not resume from this.
-void check_error_restart(const Case& c, const Record& record);
+void check_error_restart(const Problem& c, const Record& record);
 
 }  // namespace tubule::surface3d

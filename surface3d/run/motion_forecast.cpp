@@ -34,18 +34,18 @@ double quiet_seconds() {
 }
 
 // Memory of both runs: their matrices and factors.
-double bytes_of(const Case& c, const CurvedMesh& mesh, int triangles) {
-    const double width = MotionUnknowns(mesh, motion_law(c.model), c.energy).width();
+double bytes_of(const Problem& c, const CurvedMesh& mesh, int triangles) {
+    const double width = MotionUnknowns(mesh, c.law, c.energy).width();
     return bytes_at_rest + bytes_per_entry * triangles * width * width;
 }
 
-double runs_at_once(const Case& c) {
+double runs_at_once(const Problem& c) {
     if (!c.accuracy.estimate) return 1;
     return is_of_high_order(c) ? with_coarser_runs : with_coarser_run;
 }
 
-double steps_by_tolerance(const Case& c, double from, double to) {
-    return std::pow(from / to, 1.0 / (entry(time_scheme(c)).most_order + 1));
+double steps_by_tolerance(const Problem& c, double from, double to) {
+    return std::pow(from / to, 1.0 / (entry(c.scheme).most_order + 1));
 }
 
 struct PilotRun {
@@ -55,13 +55,14 @@ struct PilotRun {
 };
 
 // A pilot run on `triangles`. What stops its mesh concerns few triangles only; another one may do.
-PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double tolerance) {
-    Case c = asked;
-    c.time.limit = pilot_limit;
-    c.time.output.clear();
-    c.surface.coarsen = false;
-    c.surface.scheme = time_scheme(asked);
-    c.accuracy.energy = std::max(c.accuracy.energy, 0.05);
+PilotRun pilot_run(const Problem& asked, const Start& start, int triangles, double tolerance) {
+    Case rough = asked;
+    rough.time.limit = pilot_limit;
+    rough.time.output.clear();
+    rough.surface.coarsen = false;
+    rough.surface.scheme = asked.scheme;
+    rough.accuracy.energy = std::max(asked.accuracy.energy, 0.05);
+    const Problem c(rough);
     Pilot pilot;
     const RunClock clock(c, pilot);
     SurfaceSimulation run(c, pilot, {.elements = triangles, .tolerance = tolerance}, nullptr);
@@ -85,9 +86,9 @@ PilotRun pilot_run(const Case& asked, const Start& start, int triangles, double 
 }
 
 // Whether a finer run would follow where the stated error of a fluid exceeds the tolerance.
-bool can_be_repeated(const Case& c, const Start& start) {
-    return motion_law(c.model).inertia != 0 && c.accuracy.estimate && c.accuracy.energy < asked_of_rough &&
-           start.resizable() && !settings_given(c);
+bool can_be_repeated(const Problem& c, const Start& start) {
+    return c.law.inertia != 0 && c.accuracy.estimate && c.accuracy.energy < asked_of_rough && start.resizable() &&
+           !c.surface_resolution_given();
 }
 
 bool is_rough(const StartMesh& start) {
@@ -95,14 +96,14 @@ bool is_rough(const StartMesh& start) {
     return is_rough(smoothness_of(start.mesh, motion_fields(space, start.mesh, Projection(space, start.mesh)).H));
 }
 
-Forecast by_pilot_runs(const Case& c, const Start& start) {
+Forecast by_pilot_runs(const Problem& c, const Start& start) {
     const PauseWatch watch(limit, [] { return false; });
     Forecast out;
     try {
         const MotionSettings wanted = first_settings(c, start);
-        const CurvedMesh some = start.mesh(least_triangles, element_order(c)).mesh;
+        const CurvedMesh some = start.mesh(least_triangles, c.element_order).mesh;
         const int triangles = start.resizable() ? wanted.elements : some.triangles();
-        out.resolution = fmt::format("about {} triangles of order {}", triangles, element_order(c));
+        out.resolution = fmt::format("about {} triangles of order {}", triangles, c.element_order);
         out.bytes = bytes_of(c, some, triangles);
         const double tolerance = std::max(wanted.tolerance, pilot_tolerance);
         for (int few = std::min(least_triangles, triangles); !out.steps && few <= 4 * least_triangles; few *= 2) {
@@ -124,15 +125,15 @@ Forecast by_pilot_runs(const Case& c, const Start& start) {
 
 }  // namespace
 
-bool may_be_long(const Case& c, const Start& start) {
+bool may_be_long(const Problem& c, const Start& start) {
     const MotionSettings s = first_settings(c, start);
-    if (can_be_repeated(c, start) && is_rough(start.mesh(s.elements, element_order(c)))) return true;
+    if (can_be_repeated(c, start) && is_rough(start.mesh(s.elements, c.element_order))) return true;
     const double steps = c.surface.step ? c.time.end / *c.surface.step
                                         : usual_steps * std::max(1.0, steps_by_tolerance(c, 1e-4, s.tolerance));
     return steps * s.elements * usual_step > 20;
 }
 
-Forecast forecast_motion(const Case& c, const Start& start) {
+Forecast forecast_motion(const Problem& c, const Start& start) {
     Forecast out = by_pilot_runs(c, start);
     pause_if_due();
     return out;

@@ -11,9 +11,9 @@ namespace tubule::surface3d {
 // then misses what is asked, and a finer run follows, it takes longer than that: so it may be where many steps of a
 // fluid lead to surfaces that are rough for the mesh of the pilot run. Throws Paused where a PauseWatch of this thread
 // ends a pilot run.
-Forecast forecast_motion(const Case& c, const Start& start);
+Forecast forecast_motion(const Problem& c, const Start& start);
 
 // Whether the run might take more than a minute, by its settings and its initial shape alone.
-bool may_be_long(const Case& c, const Start& start);
+bool may_be_long(const Problem& c, const Start& start);
 
 }  // namespace tubule::surface3d

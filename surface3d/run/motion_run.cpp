@@ -22,14 +22,13 @@ bool ended_by_physics(const StopReport& stop) {
 
 class MotionRuns : public EstimatedRuns {
 public:
-    MotionRuns(const Case& c, const Start& start, RunObserver& watch, const RunClock& clock, const Restart* restart)
+    MotionRuns(const Problem& c, const Start& start, RunObserver& watch, const RunClock& clock, const Restart* restart)
         : case_(c),
           start_(start),
           watch_(watch),
           clock_(clock),
           restart_(restart),
-          settings_(restart ? motion_restart(restart->record, time_scheme(c)).memory.settings
-                            : first_settings(c, start)) {}
+          settings_(restart ? motion_restart(restart->record, c.scheme).memory.settings : first_settings(c, start)) {}
 
     RunSummary& next() override {
         MotionError error(case_, start_, clock_, settings_);
@@ -61,7 +60,7 @@ public:
 
     std::string fixed_by() const override {
         if (!start_.resizable()) return "the triangles are given";
-        return settings_given(case_) ? "discretisation.elements, time_tolerance or step are given" : "";
+        return case_.surface_resolution_given() ? "discretisation.elements, time_tolerance or step are given" : "";
     }
 
 private:
@@ -86,7 +85,7 @@ private:
         s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
     }
 
-    const Case& case_;
+    const Problem& case_;
     const Start& start_;
     RunObserver& watch_;
     const RunClock& clock_;
@@ -97,12 +96,12 @@ private:
 
 }  // namespace
 
-void check_restart(const Case& c, const Record& record) {
-    motion_restart(record, time_scheme(c));
+void check_restart(const Problem& c, const Record& record) {
+    motion_restart(record, c.scheme);
     if (c.accuracy.estimate) check_error_restart(c, record);
 }
 
-RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
     const RunClock clock(c, observer);
     return clock.pausing([&] {
         MotionRuns runs(c, start, observer, clock, restart);

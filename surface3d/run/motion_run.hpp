@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/record.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/start.hpp"
@@ -12,10 +12,10 @@
 namespace tubule::surface3d {
 
 // Throws std::runtime_error if a run cannot resume from the record.
-void check_restart(const Case& c, const Record& record);
+void check_restart(const Problem& c, const Record& record);
 
 // A coarser run follows each run, to estimate its error (MotionError). Runs become finer until the energy is as
 // accurate as asked at all times.
-RunSummary run_motion(const Case& c, const Start& start, RunObserver& observer, const Restart* restart);
+RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart);
 
 }  // namespace tubule::surface3d

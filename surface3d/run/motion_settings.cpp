@@ -27,16 +27,15 @@ constexpr double least_fewer = 1.1;
 constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of H, linear between nodes, at kinks
 constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
 constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
-constexpr double high_accuracy = 1e-4;                    // from here on, without inertia, steps of higher order pay
 constexpr double unresolved_waves = 1.6;                  // of rough fluids: at most 1.37 was seen to be missing
 constexpr double sped_up = 2;             // times the least dissipation: the motion has left what it rested at
 constexpr double least_more_steps = 1.5;  // of the run, than of the coarser one: fewer would tell nothing
 constexpr double surest_growth = 4.5;     // of errors: they have maxima between the steps that are compared
 
-double tolerance_for(const Case& c) {
+double tolerance_for(const Problem& c) {
     const double accuracy = c.accuracy.energy;
-    const double tolerance = entry(time_scheme(c)).most_order > 2 ? tolerance_of_order_4 * std::pow(accuracy, 1.25)
-                                                                  : tolerance_per_accuracy * std::pow(accuracy, 1.5);
+    const double tolerance = entry(c.scheme).most_order > 2 ? tolerance_of_order_4 * std::pow(accuracy, 1.25)
+                                                            : tolerance_per_accuracy * std::pow(accuracy, 1.5);
     return std::clamp(tolerance, 1e-13, loosest_tolerance);
 }
 
@@ -45,14 +44,14 @@ double growth_in_space(const MotionSettings& coarser, double order) {
     return coarser.role == Role::other_order ? order : std::pow(coarser.coarser_by, order / 2);
 }
 
-double order_in_space(const Case& c, double smoothness) {
-    return element_order(c) < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
+double order_in_space(const Problem& c, double smoothness) {
+    return c.element_order < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
 }
 
 // The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
 // finer one: two of them may agree by chance.
-int triangles_for_start(const Case& c, const Start& start) {
-    const int order = element_order(c);
+int triangles_for_start(const Problem& c, const Start& start) {
+    const int order = c.element_order;
     MotionSettings other{.role = Role::fewer_triangles};
     for (int n = first_triangles;; n = static_cast<int>(growth_of_start * n)) {
         const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
@@ -73,22 +72,11 @@ bool is_rough(const Smoothness& smoothness) {
     return smoothness.order < rough_below && smoothness.missed > rough_missed;
 }
 
-Scheme time_scheme(const Case& c) {
-    if (c.surface.scheme) return *c.surface.scheme;
-    const bool inertia = motion_law(c.model).inertia != 0;
-    if (!inertia && c.accuracy.energy < high_accuracy) return scheme_named("bdf");
-    return default_scheme(inertia);
-}
-
-MotionSettings first_settings(const Case& c, const Start& start) {
+MotionSettings first_settings(const Problem& c, const Start& start) {
     return {c.surface.elements   ? *c.surface.elements
             : !start.resizable() ? first_triangles
                                  : triangles_for_start(c, start),
             c.surface.time_tolerance.value_or(tolerance_for(c))};
-}
-
-bool settings_given(const Case& c) {
-    return c.surface.elements || c.surface.time_tolerance || c.surface.step;
 }
 
 int fewer_triangles(int triangles) {
@@ -103,27 +91,27 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by) {
             .coarser_by = coarser_by};
 }
 
-bool is_of_high_order(const Case& c) {
-    return entry(time_scheme(c)).most_order > 2;
+bool is_of_high_order(const Problem& c) {
+    return entry(c.scheme).most_order > 2;
 }
 
-double growth_of_coarser(const Case& c, const Smoothness& start) {
-    const bool rough = element_order(c) < 4 || is_rough(start);
+double growth_of_coarser(const Problem& c, const Smoothness& start) {
+    const bool rough = c.element_order < 4 || is_rough(start);
     return rough || is_of_high_order(c) ? any_growth : stable_growth;
 }
 
-double spare_for_waves(const Case& c, const Smoothness& start) {
-    const bool waves = motion_law(c.model).inertia != 0 && element_order(c) == 4 && is_rough(start);
+double spare_for_waves(const Problem& c, const Smoothness& start) {
+    const bool waves = c.law.inertia != 0 && c.element_order == 4 && is_rough(start);
     return waves ? unresolved_waves : 1;
 }
 
-double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness) {
-    const double in_time = std::pow(steps_at_once, entry(time_scheme(c)).order);
+double error_by_difference(const Problem& c, const MotionSettings& coarser, double smoothness) {
+    const double in_time = std::pow(steps_at_once, entry(c.scheme).order);
     return 1 / (std::min({growth_in_space(coarser, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
 }
 
-bool has_sped_up(const Case& c, double fastest, double slowest) {
-    const MotionLaw law = motion_law(c.model);
+bool has_sped_up(const Problem& c, double fastest, double slowest) {
+    const MotionLaw law = c.law;
     return law.inertia == 0 && !law.loads_change() && fastest > sped_up * slowest;
 }
 
@@ -131,7 +119,7 @@ double error_by_change(double more_steps) {
     return 1 / (std::max(more_steps, least_more_steps) - 1);
 }
 
-double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness) {
+double error_in_space(const Problem& c, const MotionSettings& coarser, double smoothness) {
     return 1 / (growth_in_space(coarser, order_in_space(c, smoothness)) - 1);
 }
 

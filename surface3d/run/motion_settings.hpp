@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/run/start.hpp"
 
@@ -24,12 +24,8 @@ struct MotionSettings {
     double coarser_by = 1;  // of a coarser run: triangles of the run over its own
 };
 
-// The case's, or the default of its model and accuracy.
-Scheme time_scheme(const Case& c);
-
 // What the case gives, or what its accuracy requires: as many triangles as the initial energy needs.
-MotionSettings first_settings(const Case& c, const Start& start);
-bool settings_given(const Case& c);
+MotionSettings first_settings(const Problem& c, const Start& start);
 
 // About how many triangles the coarser run is to have.
 int fewer_triangles(int triangles);
@@ -39,31 +35,31 @@ MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by);
 
 // How much longer than its last step the next one of the coarser run may be, by the initial H on the mesh of the run.
 // Where H is rough, errors of the first moments are large, and only several steps at once show them.
-double growth_of_coarser(const Case& c, const Smoothness& start);
+double growth_of_coarser(const Problem& c, const Smoothness& start);
 
 // Whether the mesh does not resolve what it has to represent, by H.
 bool is_rough(const Smoothness& smoothness);
 
 // Fluids with rough initial shapes keep waves that no step resolves. The error of their energy is larger at some times
 // than the coarser run and the balance show at others: the factor by which the stated error is larger, else 1.
-double spare_for_waves(const Case& c, const Smoothness& start);
+double spare_for_waves(const Problem& c, const Smoothness& start);
 
 // The error of a run over its difference from the coarser one, by the least orders of errors that can be relied on for
 // this smoothness of H (MotionMeasures).
-double error_by_difference(const Case& c, const MotionSettings& coarser, double smoothness);
+double error_by_difference(const Problem& c, const MotionSettings& coarser, double smoothness);
 
 // Where a surface leaves the vicinity of a saddle point, earlier errors become a delay, and grow with the rate at which
 // the energy falls. Whether it has left the slowest time so far, by the dissipation then and the largest since (models
 // without inertia under constant loads: elsewhere dissipation changes for other reasons); the error over the change
 // since then of the difference from the coarser run, if the run has made `more_steps` times its steps.
-bool has_sped_up(const Case& c, double fastest, double slowest);
+bool has_sped_up(const Problem& c, double fastest, double slowest);
 double error_by_change(double more_steps);
 
 // Whether steps are of so high an order that errors in time grow far more than those in space when several are made at
 // once: both are then separated. Errors in space over the difference from the coarser run with the same steps; errors
 // in time over the difference between steps of this order and several at once.
-bool is_of_high_order(const Case& c);
-double error_in_space(const Case& c, const MotionSettings& coarser, double smoothness);
+bool is_of_high_order(const Problem& c);
+double error_in_space(const Problem& c, const MotionSettings& coarser, double smoothness);
 double error_in_time(int order);
 
 // Known absolute errors of a run: of the energy; the part that is due to time, where it is known separately; of the

@@ -26,8 +26,8 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed, d
 }
 
 // theory.md (11.1)
-double own_scale(const Case& c, const Observables& o, double period) {
-    const MotionLaw law = motion_law(c.model);
+double own_scale(const Problem& c, const Observables& o, double period) {
+    const MotionLaw law = c.law;
     const double loads =
         law.tension.largest() * o.area + law.pressure.largest() * std::abs(o.volume) + law.force.largest() * period;
     return std::max(std::abs(free_energy(c, o, period)), o.magnitude + loads);
@@ -35,11 +35,7 @@ double own_scale(const Case& c, const Observables& o, double period) {
 
 }  // namespace
 
-double begin_time(const Case& c) {
-    return c.handover ? c.handover->time : 0;
-}
-
-VectorField start_velocity(const Case& c, const StartMesh& start) {
+VectorField start_velocity(const Problem& c, const StartMesh& start) {
     if (start.velocity.size() > 0 || c.velocity.initial != InitialVelocity::rotation) return start.velocity;
     VectorField u = VectorField::Zero(3, start.mesh.size());
     for (int i = 0; i < start.mesh.size(); ++i) {
@@ -49,20 +45,20 @@ VectorField start_velocity(const Case& c, const StartMesh& start) {
     return u;
 }
 
-Observables observe_start(const Case& c, const StartMesh& start) {
+Observables observe_start(const Problem& c, const StartMesh& start) {
     const SurfaceSpace space(start.mesh);
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, start_H0(c, start));
 }
 
-double free_energy(const Case& c, const Observables& o, double period) {
-    return o.energy + SurfaceLaw(motion_law(c.model)).potential(begin_time(c), {o.area, o.volume, period});
+double free_energy(const Problem& c, const Observables& o, double period) {
+    return o.energy + SurfaceLaw(c.law).potential(c.begin_time, {o.area, o.volume, period});
 }
 
-double error_of_start(const Case& c, const Start& start, int elements, double energy) {
+double error_of_start(const Problem& c, const Start& start, int elements, double energy) {
     if (!start.resizable()) return 0;
     try {
-        const StartMesh finer = start.mesh(static_cast<int>(much_finer * elements), element_order(c));
+        const StartMesh finer = start.mesh(static_cast<int>(much_finer * elements), c.element_order);
         const double change = free_energy(c, observe_start(c, finer), finer.mesh.period) - energy;
         return std::abs(change) * much_finer / (much_finer - 1);
     } catch (const SolveError&) {
@@ -70,12 +66,12 @@ double error_of_start(const Case& c, const Start& start, int elements, double en
     }
 }
 
-double reference_energy(const Case& c, const Observables& o, double period) {
+double reference_energy(const Problem& c, const Observables& o, double period) {
     if (c.handover) return c.handover->reference_energy;
     return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
 }
 
-Eigen::VectorXd start_H0(const Case& c, const StartMesh& start) {
+Eigen::VectorXd start_H0(const Problem& c, const StartMesh& start) {
     if (!c.energy.H0_varies() || c.energy.H0_from_points()) return start.H0;
     const CurvedMesh& mesh = start.mesh;
     constexpr double rounding = 1e-6;
@@ -102,7 +98,7 @@ Eigen::VectorXd start_H0(const Case& c, const StartMesh& start) {
     return out;
 }
 
-void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K,
+void require_defined(const Problem& c, const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eigen::VectorXd& K,
                      const Eigen::VectorXd& H0) {
     DensityDomain domain(c.energy);
     if (!domain.restricted()) return;
@@ -112,7 +108,7 @@ void require_defined(const Case& c, const CurvedMesh& mesh, const Eigen::VectorX
     tubule::require_defined(c, margin, fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]));
 }
 
-void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
+void remember_start(const Problem& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {
     const MotionFields fields = motion_fields(space, start.mesh, Projection(space, start.mesh));
     memory.H0 = start_H0(c, start);
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, memory.H0);
@@ -120,9 +116,8 @@ void remember_start(const Case& c, const StartMesh& start, const SurfaceSpace& s
     memory.scale.area = o.area, memory.scale.volume = o.volume;
     memory.balance.work = c.handover ? c.handover->work : 0;
     memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);
-    memory.scale.relaxation =
-        c.surface.relaxation.value_or(relaxes_in * time_to_change(motion_law(c.model), o, start.mesh.period == 0,
-                                                                  own_scale(c, o, start.mesh.period)));
+    memory.scale.relaxation = c.surface.relaxation.value_or(
+        relaxes_in * time_to_change(c.law, o, start.mesh.period == 0, own_scale(c, o, start.mesh.period)));
     memory.scale.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
 }
 

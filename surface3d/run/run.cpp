@@ -45,7 +45,7 @@ struct Measured {
     bool has_curvature() const { return curvature.H.size() > 0; }
 };
 
-Measured measure(const Case& c, StartMesh start, Recovery recovery) {
+Measured measure(const Problem& c, StartMesh start, Recovery recovery) {
     Measured out{std::move(start), {}, {}, {}, {}};
     const CurvedMesh& mesh = out.start.mesh;
     out.quality = mesh_quality(mesh);
@@ -84,7 +84,7 @@ double reference_energy(const Observables& o) {
 // A shape on a sequence of meshes, whose energies give the error of the last one, which is kept for the result.
 class MeshSequence : public EstimatedRuns {
 public:
-    MeshSequence(const Case& c, const Start& start) : case_(c), start_(start) {}
+    MeshSequence(const Problem& c, const Start& start) : case_(c), start_(start) {}
 
     RunSummary& next() override {
         double error = 0;
@@ -119,11 +119,11 @@ protected:
     virtual double measure_next() = 0;
 
     double measure_on(int triangles) {
-        measured_ = measure(case_, start_.mesh(triangles, element_order(case_)), case_.surface.recovery);
+        measured_ = measure(case_, start_.mesh(triangles, case_.element_order), case_.surface.recovery);
         return measured_->o.energy;
     }
 
-    const Case& case_;
+    const Problem& case_;
     const Start& start_;
     std::optional<Measured> measured_;
     int meshes_ = 0;
@@ -152,7 +152,7 @@ public:
 
 private:
     double measure_next() override {
-        StartMesh start = start_.mesh(0, element_order(case_));
+        StartMesh start = start_.mesh(0, case_.element_order);
         const int order = start.mesh.order;
         const Measured other = order > 2
                                    ? measure(case_, {with_order(start.mesh, order - 1), {}, {}}, case_.surface.recovery)
@@ -166,7 +166,7 @@ private:
 // cancellation may understate the error.
 class GivenElements : public MeshSequence {
 public:
-    GivenElements(const Case& c, const Start& start, int elements) : MeshSequence(c, start), elements_(elements) {
+    GivenElements(const Problem& c, const Start& start, int elements) : MeshSequence(c, start), elements_(elements) {
         while (part_ > 1 && elements_ / part_ < fewest_triangles) part_ /= 4;
     }
     bool refine(const RunSummary&) override {
@@ -212,7 +212,7 @@ private:
     double before_ = std::numeric_limits<double>::infinity();
 };
 
-std::unique_ptr<MeshSequence> meshes_of(const Case& c, const Start& start) {
+std::unique_ptr<MeshSequence> meshes_of(const Problem& c, const Start& start) {
     if (!start.resizable()) return std::make_unique<GivenMesh>(c, start);
     if (c.surface.elements) return std::make_unique<GivenElements>(c, start, *c.surface.elements);
     return std::make_unique<MoreAndMore>(c, start);
@@ -225,7 +225,7 @@ struct RestRow {
     double energy_error, wall_seconds;
 };
 
-SeriesTable<RestRow> rest_series(const Case& c) {
+SeriesTable<RestRow> rest_series(const Problem& c) {
     SeriesTable<RestRow> table;
     table.add({
         {"time", [](const RestRow&) { return 0.0; }},
@@ -248,7 +248,7 @@ SeriesTable<RestRow> rest_series(const Case& c) {
     return table;
 }
 
-Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
+Record frame(const Problem& c, const Measured& m, std::size_t mesh_number) {
     const CurvatureField& field = m.curvature;
     Record out;
     out.mesh = mesh_number, out.kind = RecordKind::surface;
@@ -266,19 +266,19 @@ Record frame(const Case& c, const Measured& m, std::size_t mesh_number) {
 
 }  // namespace
 
-std::vector<std::string> series_names(const Case& c) {
+std::vector<std::string> series_names(const Problem& c) {
     if (c.moves()) return motion_series(c.energy).names();
     return rest_series(c).names();
 }
 
-RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
+RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart) {
     return run(c, Start(c), observer, restart);
 }
 
 namespace {
 
 // For a surface that brings its own triangles: advice in the keys that it has.
-void advise_given_triangles(const Case& c, std::string& advice) {
+void advise_given_triangles(const Problem& c, std::string& advice) {
     const auto* file = std::get_if<MeshFile>(&c.shape);
     const std::string more = !file          ? "begin with a frame of more triangles"
                              : file->remesh ? "set a larger shape.remesh"
@@ -289,7 +289,7 @@ void advise_given_triangles(const Case& c, std::string& advice) {
         if (const auto at = advice.find(words); at != advice.npos) advice.replace(at, words.size(), instead);
 }
 
-RunSummary run_any(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+RunSummary run_any(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
     if (c.moves()) return run_motion(c, start, observer, restart);
     const RunClock clock(c, observer);
     const auto meshes = meshes_of(c, start);
@@ -305,7 +305,7 @@ RunSummary run_any(const Case& c, const Start& start, RunObserver& observer, con
 
 }  // namespace
 
-RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart) {
+RunSummary run(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
     RunSummary s = run_any(c, start, observer, restart);
     if (!start.resizable()) advise_given_triangles(c, s.stop.advice);
     return s;

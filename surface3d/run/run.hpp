@@ -4,21 +4,21 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/motion_run.hpp"
 
 namespace tubule::surface3d {
 
 // Names of the series a run of this case writes, "time" first.
-std::vector<std::string> series_names(const Case& c);
+std::vector<std::string> series_names(const Problem& c);
 
 // A motion: motion_run.hpp. Else one row and one frame. The triangles are those of the case; where it leaves their
 // number open, they become more until the energy is as accurate as asked. `start` is that of the case. What the
 // geometry does (elements that fold, curvatures of no surface) is reported in the summary.
-RunSummary run(const Case& c, const Start& start, RunObserver& observer, const Restart* restart = nullptr);
+RunSummary run(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart = nullptr);
 
 // As above, with Start(c). Throws as Start.
-RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
+RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::surface3d

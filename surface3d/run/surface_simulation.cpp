@@ -49,7 +49,7 @@ double sum_of_step(double tau, double before, double rate, double now, double pa
 
 }  // namespace
 
-SurfaceSimulation::SurfaceSimulation(const Case& c, RunObserver& watch, const MotionSettings& settings,
+SurfaceSimulation::SurfaceSimulation(const Problem& c, RunObserver& watch, const MotionSettings& settings,
                                      MotionError* error)
     : case_(c), watch_(watch), error_(error) {
     memory_.settings = settings;
@@ -57,7 +57,7 @@ SurfaceSimulation::SurfaceSimulation(const Case& c, RunObserver& watch, const Mo
 }
 
 double SurfaceSimulation::begin_time() const {
-    return surface3d::begin_time(case_);
+    return case_.begin_time;
 }
 
 void SurfaceSimulation::use_mesh(const CurvedMesh& mesh) {
@@ -68,7 +68,7 @@ void SurfaceSimulation::use_mesh(const CurvedMesh& mesh) {
                                 .least_variation = memory_.scale.least_variation,
                                 .most_drift = std::max(most_drift / 2 * case_.accuracy.energy, one_condition),
                                 .smoothing = case_.surface.smoothing};
-    scheme_ = make_scheme(time_scheme(case_), mesh, motion_law(case_.model), case_.energy, control);
+    scheme_ = make_scheme(case_.scheme, mesh, case_.law, case_.energy, control);
     surface().carry_H0(memory_.H0);
     summary.elements = mesh.triangles();
 }
@@ -76,7 +76,7 @@ void SurfaceSimulation::use_mesh(const CurvedMesh& mesh) {
 void SurfaceSimulation::begin(const Start& from) {
     start_ = &from;
     if (from.resizable()) memory_.grid = memory_.settings.elements;
-    const StartMesh start = from.mesh(memory_.settings.elements, element_order(case_));
+    const StartMesh start = from.mesh(memory_.settings.elements, case_.element_order);
     summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
     if ((initial_stop_ = find_fold(mesh_quality(start.mesh)))) return;
@@ -111,7 +111,7 @@ void SurfaceSimulation::set_moving() {
 void SurfaceSimulation::resume(const Restart& restart, const Start& start) {
     start_ = &start;
     summary.warnings = start.notes();
-    auto [state, memory] = motion_restart(restart.record, time_scheme(case_));
+    auto [state, memory] = motion_restart(restart.record, case_.scheme);
     memory_ = memory;
     summary.reference_energy = memory_.scale.reference_energy;
     use_mesh(frame_surface(restart.record, restart.cells.value()));
@@ -269,7 +269,7 @@ bool SurfaceSimulation::may_be_coarser() const {
 // that is not a good mesh, or the energy would jump by more than `most_jump`, absolutely.
 bool SurfaceSimulation::make_coarser(int triangles, double most_jump) {
     if (memory_.grid == 0) return false;
-    const int order = element_order(case_);
+    const int order = case_.element_order;
     try {
         const CurvedMesh from = start_->mesh(memory_.grid, order).mesh, to = start_->mesh(triangles, order).mesh;
         if (to.triangles() >= from.triangles()) return false;
@@ -399,7 +399,7 @@ std::optional<StopReport> SurfaceSimulation::check_state() const {
 // Checks at outputs, and when nodes have moved by `unseen_move` since the last check: parts that cross and separate
 // again in between are no deeper than that.
 std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
-    const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / element_order(case_);
+    const double spacing = memory_.scale.length() / std::sqrt(summary.elements) / case_.element_order;
     memory_.moved += state_.step * (now_.speed + std::abs(state_.stretch) * state_.period);
     if (memory_.moved < unseen_move * spacing && !at_output) return std::nullopt;
     auto crossing = find_self_intersection(surface().mesh(state_));
@@ -471,10 +471,10 @@ void SurfaceSimulation::summarise() {
     warn_of_drift();
     const int nodes = static_cast<int>(state_.X.cols());
     summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", memory_.count.steps,
-                                 memory_.count.rejected, summary.elements, element_order(case_), nodes);
+                                 memory_.count.rejected, summary.elements, case_.element_order, nodes);
     summary.details.insert(summary.details.begin(), {{"elements", std::int64_t{summary.elements}},
                                                      {"nodes", std::int64_t{nodes}},
-                                                     {"order", std::int64_t{element_order(case_)}},
+                                                     {"order", std::int64_t{case_.element_order}},
                                                      {"steps", std::int64_t{memory_.count.steps}},
                                                      {"rejected_steps", std::int64_t{memory_.count.rejected}},
                                                      {"linear_solves", memory_.linear_work.solves},
@@ -489,7 +489,7 @@ void SurfaceSimulation::summarise() {
                                                      {"correction_energy", memory_.balance.corrected}});
 }
 
-Loop loop_of(SurfaceSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock) {
+Loop loop_of(SurfaceSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
     Loop out(run, c, watch, clock, run.settings().role == Role::reported);
     if (run.has_state())
         out.add(std::make_unique<Stall>(most_stalled, run.shortest_usual_step(), c.accuracy.energy,

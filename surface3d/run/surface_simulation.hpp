@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/loop.hpp"
 #include "common/run/simulation.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
@@ -30,7 +30,7 @@ class SurfaceSimulation : public Simulation {
 public:
     // All references must outlive it, and the start of begin() or resume(), of which one comes first. `error` tells
     // that of the run; none where it is not to be known.
-    SurfaceSimulation(const Case& c, RunObserver& watch, const MotionSettings& settings, MotionError* error);
+    SurfaceSimulation(const Problem& c, RunObserver& watch, const MotionSettings& settings, MotionError* error);
     void begin(const Start& start);
     void resume(const Restart& restart, const Start& start);
 
@@ -99,7 +99,7 @@ private:
     double volume_drift() const;
     void warn_of_drift();
 
-    const SchemeEntry& traits() const { return entry(time_scheme(case_)); }
+    const SchemeEntry& traits() const { return entry(case_.scheme); }
     MovingSurface& surface() const { return scheme_->surface(); }
     // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
     double total() const { return comparable() + now_.kinetic; }
@@ -109,7 +109,7 @@ private:
     bool is_reported() const { return memory_.settings.role == Role::reported; }
     double next_kink() const { return surface().law().next_kink(state_.time + moment_of_time()); }
 
-    const Case& case_;
+    const Problem& case_;
     RunObserver& watch_;
     MotionError* error_;
     const Start* start_ = nullptr;
@@ -122,6 +122,6 @@ private:
 };
 
 // The loop of such a run, once it has begun: with the callbacks that surfaces have. All references must outlive it.
-Loop loop_of(SurfaceSimulation& run, const Case& c, RunObserver& watch, const RunClock& clock);
+Loop loop_of(SurfaceSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock);
 
 }  // namespace tubule::surface3d

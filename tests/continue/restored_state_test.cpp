@@ -119,7 +119,7 @@ TEST(RestoredState, ofASurface) {
     Interrupted run(c, surface3d::series_names(c), "surface.hdf");
     ASSERT_EQ(surface3d::run(c, run).stop.reason, Stop::interrupted);
     const Record record = read_back(run);
-    const auto restored = surface3d::motion_restart(record, surface3d::time_scheme(c));
+    const auto restored = surface3d::motion_restart(record, Problem(c).scheme);
     Record state = surface3d::state_record(restored.state, restored.memory);
     std::erase_if(state.arrays, [](const Array& a) { return !a.name.starts_with("restart_"); });
     expect_holds(record, state);

@@ -455,12 +455,12 @@ TEST(MotionRun, QualityIsThatOfTheSameMeshAtRest) {
 TEST(MotionRun, SchemeThatIsNotGivenIsThatOfTheModel) {
     for (const auto& [kind, scheme] : {std::pair{"fluid", scheme_named("alpha")}, {"stokes", scheme_named("bdf2")}}) {
         const std::string model = std::string("model.kind=") + kind;
-        EXPECT_EQ(time_scheme(begin(wavy, {model}).c), scheme);
-        EXPECT_EQ(time_scheme(begin(wavy, {model, "discretisation.scheme=euler"}).c), scheme_named("euler"));
+        EXPECT_EQ(Problem(begin(wavy, {model}).c).scheme, scheme);
+        EXPECT_EQ(Problem(begin(wavy, {model, "discretisation.scheme=euler"}).c).scheme, scheme_named("euler"));
     }
     // Much accuracy takes steps of higher order, which are not for fluids.
-    EXPECT_EQ(time_scheme(begin(wavy, {"model.kind=stokes", "accuracy.energy=1e-5"}).c), scheme_named("bdf"));
-    EXPECT_EQ(time_scheme(begin(wavy, {"model.kind=fluid", "accuracy.energy=1e-5"}).c), scheme_named("alpha"));
+    EXPECT_EQ(Problem(begin(wavy, {"model.kind=stokes", "accuracy.energy=1e-5"}).c).scheme, scheme_named("bdf"));
+    EXPECT_EQ(Problem(begin(wavy, {"model.kind=fluid", "accuracy.energy=1e-5"}).c).scheme, scheme_named("alpha"));
 }
 
 TEST(MotionRun, ACoarserRunMayBeOffByMore) {
@@ -757,7 +757,8 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     } while (true);
     ASSERT_EQ(s.stop.reason, Stop::finished) << s.stop.message;
     EXPECT_GT(in_first_pair, 0);
-    for (const char* name : {"pairs", "steps", "rejected_steps", "elements", "meshes", "linear_solves", "gmres_iterations"})
+    for (const char* name :
+         {"pairs", "steps", "rejected_steps", "elements", "meshes", "linear_solves", "gmres_iterations"})
         EXPECT_EQ(detail(s, name), detail(whole, name)) << name;
     EXPECT_EQ(watch.rows.size(), undisturbed.rows.size());
     EXPECT_EQ(s.energy, whole.energy);  // bit for bit

@@ -94,7 +94,7 @@ Case decay_case(double end, std::vector<double> output = {}) {
 }
 
 struct Ended {
-    Case c;
+    Problem c;
     Decay run;
     Watch watch;
 

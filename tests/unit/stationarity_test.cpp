@@ -32,7 +32,8 @@ double dissipation(double a, double t) {
 TEST(Stationarity, WaitsUntilTheDistanceIsSmall) {
     Case c = case_with(1e-4);  // distances of 0.01
     c.time.end = 100;
-    Stationarity settling(c);
+    const Problem problem(c);
+    Stationarity settling(problem);
     double settled_at = -1;
     for (double t = 0; t < 100 && settled_at < 0; t += 0.5)
         if (settling.is_settled(t, dissipation(0.034, t), area)) settled_at = t;
@@ -42,14 +43,16 @@ TEST(Stationarity, WaitsUntilTheDistanceIsSmall) {
 TEST(Stationarity, NoiseOfTheSpeedIsNoRest) {
     Case c = case_with(1e-4);
     c.time.end = 100;
-    Stationarity settling(c);
+    const Problem problem(c);
+    Stationarity settling(problem);
     for (int i = 0; i < 1000; ++i)  // 1e-3 of it, from step to step
         EXPECT_FALSE(settling.is_settled(0.01 * i, dissipation(0.034, 0.01 * i) * (1 + 0.002 * (i % 2)), area)) << i;
 }
 
 TEST(Stationarity, NothingSettlesThatDoesNotSlowDown) {
     const Case c = case_with(1e-4);
-    Stationarity settling(c);
+    const Problem problem(c);
+    Stationarity settling(problem);
     EXPECT_FALSE(settling.is_settled(0, 1e-8, area));  // how it changes is unknown as yet
     EXPECT_FALSE(settling.is_settled(1, 1e-8, area));
     EXPECT_FALSE(settling.is_settled(30, 1e-8, area));
@@ -61,7 +64,8 @@ TEST(Stationarity, NothingSettlesThatDoesNotSlowDown) {
 TEST(Stationarity, NoFartherThanUntilTheEnd) {
     Case c = case_with(1e-4);
     c.time.end = 0.6;  // at a speed of 0.0034, less than 0.01
-    Stationarity settling(c);
+    const Problem problem(c);
+    Stationarity settling(problem);
     settling.is_settled(0, dissipation(0.034, 0), area);
     settling.is_settled(0.5, dissipation(0.034, 0.5), area);
     EXPECT_TRUE(settling.is_settled(0.55, dissipation(0.034, 0.55), area));

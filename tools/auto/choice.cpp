@@ -17,7 +17,7 @@ constexpr double few_reach = 1e-2, few_start = 5e-4;
 }  // namespace
 
 bool few_triangles_do(const Case& c, const surface3d::Start& start) {
-    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || surface3d::settings_given(c))
+    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || Problem(c).surface_resolution_given())
         return false;
     const surface3d::StartMesh mesh = start.mesh(surface3d::least_triangles, element_order(c));
     const surface3d::Observables o = surface3d::observe_start(c, mesh);

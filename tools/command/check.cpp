@@ -53,8 +53,7 @@ std::vector<std::string> chosen(const Case& c) {
     if (c.tier != Tier::surface3d) return out;
     if (!c.surface.order) out.push_back(fmt::format("discretisation.order = {}", element_order(c)));
     if (!c.moves()) return out;
-    if (!c.surface.scheme)
-        out.push_back(fmt::format("discretisation.scheme = \"{}\"", entry(surface3d::time_scheme(c)).name));
+    if (!c.surface.scheme) out.push_back(fmt::format("discretisation.scheme = \"{}\"", entry(Problem(c).scheme).name));
     if (!c.surface.time_tolerance && !c.surface.step)
         out.emplace_back("discretisation.time_tolerance follows from accuracy.energy");
     return out;
