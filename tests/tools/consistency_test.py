@@ -10,16 +10,13 @@ import io
 import sys
 import tempfile
 import unittest
-from dataclasses import replace
 from pathlib import Path
 
 SUITE = Path(__file__).resolve().parents[2] / "tools/consistency"
 sys.path.insert(0, str(SUITE))
-import cases  # noqa: E402
 import consistency  # noqa: E402
-import page  # noqa: E402
-from rows import Cost, Row, Table  # noqa: E402
-from scenes import SCENES  # noqa: E402
+from measures import Row, case, changed  # noqa: E402
+from scenes import SCENES, Scene  # noqa: E402
 
 PROGRAM = sys.argv[1]
 sys.path.insert(0, str(Path(PROGRAM).resolve().parent / "python"))
@@ -65,21 +62,20 @@ class Rows(unittest.TestCase):
         self.assertIsNone(alone.order)
 
 
-class Cases(unittest.TestCase):
-    def test_changes_leave_the_original(self):
-        case = cases.case("three_modes")
-        cases.changed(case, shape={"mode": [{"amplitude": 1.0}]}, time=None)
-        self.assertEqual(case, cases.case("three_modes"))
-
-
 class Page(unittest.TestCase):
+    def test_changes_leave_the_original(self):
+        original = case("three_modes")
+        changed(original, shape={"mode": [{"amplitude": 1.0}]}, time=None)
+        self.assertEqual(original, case("three_modes"))
+
     def test_files(self):
-        scene = Table("figure", "The figure", "Words.", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
-        rest = Table("sphere-at-rest", "At rest", "", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
-        rates = Table("rates-fluid", "Rates", "", [row({100: 1.6e-3, 400: 1e-4})], Cost(0.5, {100: 1, 400: 20}))
+        scenes = []
+        for name, words in (("figure", "Words."), ("sphere-at-rest", ""), ("rates-fluid", "")):
+            scenes.append(Scene(name, f"The {name}", words, None))
+            scenes[-1].rows, scenes[-1].cost = [row({100: 1.6e-3, 400: 1e-4})], {None: 0.5, 100: 1, 400: 20}
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "page.md"
-            page.write(path, [scene, rest, rates])
+            consistency.write(path, scenes)
             text = path.read_text()
             self.assertIn("energies in motion by 0.0001 of E_ref", text)
             self.assertIn("## The figure\n\nWords.\n", text)
@@ -91,35 +87,33 @@ class Page(unittest.TestCase):
 
 
 class Suite(unittest.TestCase):
-    def called(self, *arguments, program=PROGRAM, scenes=SCENES):
+    SCENE = next(scene for scene in SCENES if scene.name == "spheroid-at-rest")  # the cheapest
+
+    def called(self, measure):
+        scene = Scene(self.SCENE.name, self.SCENE.title, "", measure)
         out, err = io.StringIO(), io.StringIO()
-        with tempfile.TemporaryDirectory() as folder:
-            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-                status = consistency.main([str(program), folder, *arguments], scenes)
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = consistency.main([PROGRAM, folder, "--only", scene.name], [scene])
         return status, out.getvalue(), err.getvalue()
 
     def test_a_scene(self):
-        """The cheapest scene, unchanged, and with bounds that it violates."""
-        (scene,) = [scene for scene in SCENES if scene.name == "spheroid-at-rest"]
-        status, out, err = self.called("--only", scene.name)
+        status, out, err = self.called(self.SCENE.measure)
         self.assertEqual((status, err), (0, ""))
         self.assertIn("| energy_42 |", out)
 
-        def stricter(tools, cost):
-            rows = scene.measure(tools, cost)
-            return [replace(r, bound=1e-12) if r.quantity == "volume" else r for r in rows]
+    def test_bounds_that_it_violates(self):
+        def stricter(program):
+            rows = self.SCENE.measure(program)
+            for row in rows:
+                row.bound = 1e-12 if row.quantity == "volume" else row.bound
+            return rows
 
-        status, _, err = self.called("--only", scene.name, scenes=[replace(scene, measure=stricter)])
+        status, _, err = self.called(stricter)
         self.assertEqual(status, 1)
         self.assertRegex(err, r"^consistency: A spheroid, at rest: volume differs by .*, more than 1e-12\n$")
 
     def test_a_run_that_fails(self):
-        (scene,) = [scene for scene in SCENES if scene.name == "spheroid-at-rest"]
-
-        def wrong(tools, cost):
-            return tools.program.run({"tier": "axisym"}, "a bad case")
-
-        status, _, err = self.called("--only", scene.name, scenes=[replace(scene, measure=wrong)])
+        status, _, err = self.called(lambda program: program.run({"tier": "axisym"}, "a bad case"))
         self.assertEqual(status, 2)
         self.assertRegex(err, "consistency: a bad case: .*energy")
 
