@@ -3,6 +3,7 @@
 
 chart_test.py TUBULE PACKAGE [MPIRUN]: the program, the folder of the Python package.
 """
+import contextlib
 import csv
 import os
 import resource
@@ -18,7 +19,9 @@ from pathlib import Path
 from program import PROGRAM, QUICK, SLOW, ProgramTest
 
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = [sys.argv[2], str(Path(__file__).resolve().parents[1] / "support")]
+os.environ["TUBULE_PROGRAM"] = str(Path(PROGRAM).resolve())
+import scripts  # noqa: E402
 from drawing import chart, chart_file, chart_runs  # noqa: E402
 
 # Stands for the program: what a run does depends on its elements alone, and costs nothing. E_ref is 2, the energy at the
@@ -54,6 +57,11 @@ class Charts(ProgramTest):
     def rows(self, name="case.csv"):
         with open(self.folder / name, newline="") as file:
             return list(csv.DictReader(file))
+
+    def chart(self, *arguments):
+        """As tubule() of the command itself."""
+        with contextlib.chdir(self.folder):
+            return scripts.run_script(Path(sys.argv[2]) / "drawing", "chart", *arguments)
 
 
 class RealRuns(Charts):
@@ -113,6 +121,7 @@ class Refusals(Charts):
         self.write("huge.toml", QUICK + "#" * 2**20)
         self.write("nested.toml", "a = " + "[" * 10000)
         os.mkfifo(self.folder / "pipe")
+        before = self.files()
         for arguments, words in (
             (["case.toml"], "it needs --vary"),
             (["missing.toml", *vary], "cannot be read"),
@@ -145,7 +154,9 @@ class Refusals(Charts):
             (["case.toml", *vary, "--reference", "pipe"], "pipe: is a directory, a pipe or a device, not a file"),
         ):
             with self.subTest(arguments=arguments):
-                self.assertIn(words, self.refused("chart", *arguments))
+                done = self.chart(*arguments)
+                self.assertEqual((done.returncode, done.stdout, self.files()), (2, "", before))
+                self.assertIn(words, done.stderr)
 
 
 class Surroundings(Charts):
@@ -156,7 +167,7 @@ class Surroundings(Charts):
             with self.subTest(name=name):
                 path = os.fsencode(self.folder) + b"/" + name
                 os.rename(self.write("plain.toml", QUICK), path)
-                self.tubule("chart", os.fsdecode(path), *self.VARY, "-o", "x.svg", "--again")
+                self.assertEqual(self.chart(os.fsdecode(path), *self.VARY, "-o", "x.svg", "--again").returncode, 0)
 
     def test_a_limit_of_file_sizes_is_told(self):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))  # noqa: E731
@@ -168,21 +179,18 @@ class Surroundings(Charts):
 
     def test_sigterm_ends_it_and_its_runs(self):
         self.write("case.toml", SLOW)
-        runs = []
 
-        def find_runs(chart):
+        def runs_of(chart):
             """Its children, but for those that only check or show a case."""
-            for child in Path(f"/proc/{chart}/task/{chart}/children").read_text().split():
-                try:
-                    if b"\0run\0" in Path(f"/proc/{child}/cmdline").read_bytes():
-                        runs.append(child)
-                except OSError:  # it has ended
-                    pass
+            for task in Path(f"/proc/{chart}/task").glob("*/children"):
+                for child in task.read_text().split():
+                    with contextlib.suppress(OSError):  # it has ended
+                        if b"\0run\0" in Path(f"/proc/{child}/cmdline").read_bytes():
+                            yield child
 
         with self.start("chart", self.case, "--vary", "discretisation.time_tolerance=1e-13,2e-14") as process:
-            while not runs:
+            while not (runs := list(runs_of(process.pid))):
                 self.assertIsNone(process.poll())
-                find_runs(process.pid)
             process.send_signal(signal.SIGTERM)
             _, err = process.communicate()
         self.assertEqual(process.returncode, 130, err)
@@ -242,18 +250,18 @@ class Outcomes(Charts):
     def ran(self):
         return (self.folder / "ran").read_text().split()
 
-    def runner(self, jobs, limit=15.0, at_once=2):
+    def runner(self, limit=15.0, at_once=2):
         program = chart_runs.Program(self.program, self.folder, limit, "energy")
         table = chart_runs.Table(self.folder / "t.csv", "energy", [0.5, 1.0])
-        return chart_runs.Runner(program, table, jobs, at_once, say=lambda words: None)
+        return chart_runs.Runner(program, table, at_once, say=lambda words: None)
 
     def jobs(self, *elements):
         return chart_file.chart_of_case(self.case, [f"discretisation.elements={','.join(map(str, elements))}"], []).jobs()
 
     def test_crash_hang_and_stop_are_outcomes_and_nothing_is_repeated(self):
         jobs = self.jobs(4, 8, 32, 64)
-        self.runner(jobs).run(jobs)
-        again = self.runner(jobs)  # reads the table
+        self.runner().run(jobs)
+        again = self.runner()  # reads the table
         again.run(jobs)
         self.assertEqual(sorted(self.ran(), key=int), ["4", "8", "32", "64"])  # each once
         runs = [again.table.runs[job.key] for job in jobs]
@@ -264,17 +272,17 @@ class Outcomes(Charts):
 
     def test_a_table_cut_short_goes_on(self):
         jobs = self.jobs(4, 8, 16)
-        self.runner(jobs).run(jobs[:2])
-        self.runner(jobs).run(jobs)
+        self.runner().run(jobs[:2])
+        self.runner().run(jobs)
         self.assertEqual(sorted(self.ran(), key=int), ["4", "8", "16"])
-        self.runner(jobs[:1]).table.write(jobs[:1])  # fewer are requested: the others keep their names
+        self.runner().table.write(jobs[:1])  # fewer are requested: the others keep their names
         self.assertEqual([row["settings"] for row in self.rows("t.csv")], ["elements=4", "elements=8", "elements=16"])
 
     def test_another_case_is_another_run(self):
         jobs = self.jobs(8)
-        self.runner(jobs).run(jobs)
+        self.runner().run(jobs)
         self.case.write_text(QUICK.replace("k42 = 0.1", "k42 = 0.2"))
-        self.runner(jobs).run(jobs)
+        self.runner().run(jobs)
         self.assertEqual(self.ran(), ["8", "8"])
 
     def test_the_largest_stable_step_is_bisected(self):
@@ -282,10 +290,10 @@ class Outcomes(Charts):
         one = chart_file.chart_of_case(self.case, ["discretisation.elements=12,6"], [])
         one.map = chart_file.map_option("discretisation.step=1e-3:1e-1:4")
         program = chart_runs.Program(self.program, self.folder, 20, "energy")
-        options = type("Options", (), {"jobs": 2, "again": False, "draw": False})
+        options = type("Options", (), {"jobs": 2, "again": False, "draw": False, "quiet": True})
         real, chart.checked = chart.checked, lambda program, jobs: {}
         self.addCleanup(setattr, chart, "checked", real)
-        self.assertEqual(chart.stability_map(one, options, [self.folder / "m.svg"], program, lambda words: None), 0)
+        self.assertTrue(chart.stability_map(one, options, [self.folder / "m.svg"], program))
         found = {}
         for row in self.rows("m.csv"):
             step = float(row["settings"].split("step=")[1])
@@ -304,7 +312,7 @@ class Front(unittest.TestCase):
         """Errors relative to E_ref = 2 against 1. c is beaten by b, e failed, and below 1e-5 nothing is known."""
         runs = [self.run_of("a", 1, 1e-2), self.run_of("b", 2, 5e-4), self.run_of("c", 3, 6e-4),
                 self.run_of("d", 4, 1e-9), self.run_of("e", 1, 1e-9, "pinch-off"), self.run_of("f", 9, 0)]  # fmt: skip
-        judged, front, chosen = chart.judge([], runs, chart.Truth({1.0: 1.0}, 2.0, 1e-5, "made up"))
+        judged, front, chosen = chart.judge(runs, chart.Truth({1.0: 1.0}, 2.0, 1e-5, "made up"))
         self.assertEqual([run.key for run in front], ["a", "b", "d"])
         self.assertEqual([judged[key]["front"] for key in "abcdef"], [1, 2, "", 3, "", ""])
         self.assertEqual({target: run and run.key for target, run in chosen.items()}, {1e-3: "b", 1e-4: "d", 1e-6: None})
@@ -312,7 +320,7 @@ class Front(unittest.TestCase):
         self.assertEqual(judged["c"]["error"], "6.0000e-04")
 
     def test_options_make_lines(self):
-        one = chart_file.chart_of_case("c.toml", ["a.order=2,3", "a.elements=8,16"], ["a.scheme=euler,b.x=[1,2]"])
+        one = chart_file.chart_of_case(Path("c.toml"), ["a.order=2,3", "a.elements=8,16"], ["a.scheme=euler,b.x=[1,2]"])
         self.assertEqual([series.name for series in one.series], ["order = 2", "order = 3", "scheme = euler, x = [1,2]"])
         self.assertEqual([series.vary for series in one.series], [{"a.elements": [8, 16]}] * 3)
 

@@ -41,11 +41,8 @@ def prepared(script, lines):
     with EndedByInterrupts():
         options = [lines.COMMANDS[script](sys.argv[1:])] if script in lines.COMMANDS else []
         program = "tubule stability --plot" if script == "stability" else f"tubule {script}"
-        if script == "chart":  # it draws last, and much is refused before that
-            lines.require_libraries(program, importlib.util.find_spec)
-        else:
-            lines.require_libraries(program)
-            importlib.import_module("tubule_drawing.style").apply()
+        lines.require_libraries(program)
+        importlib.import_module("tubule_drawing.style").apply()
         return functools.partial(importlib.import_module(f"tubule_drawing.{script}").main, *options)
 
 

@@ -7,8 +7,8 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .command_line import BadInput
 from .chart_runs import Job, value_text
+from .command_line import BadInput
 from .labels import flatten
 
 MOST_RUNS = 2000
@@ -30,9 +30,9 @@ class Reference:
     nothing: the run of the chart with the smallest stated error."""
 
     result: Path | None = None
-    sets: dict | None = None
+    set: dict | None = None
     values: list | None = None
-    scale: float = 0.0
+    E_ref: float = 0.0
     known_to: float = 0.0
     source: str = ""
 
@@ -63,7 +63,7 @@ class Chart:
     times: list | None = None  # else those of the case
     limit: float = 600.0
     repeats: int = 1
-    sets: dict = field(default_factory=dict)
+    set: dict = field(default_factory=dict)
     series: list = field(default_factory=list)
     reference: Reference = field(default_factory=Reference)
     map: Map | None = None
@@ -73,100 +73,64 @@ class Chart:
         """The key on the horizontal axis of a map."""
         return list(self.series[0].vary)[-1]
 
-    def job(self, series, varied, more=()):
-        """`varied`: (key, value) that tell this run from others of its series."""
-        sets = dict(self.sets)
+    def job(self, series, varied=(), more=()):
+        """`varied`: (key, value) that distinguish this run from others of its series."""
+        sets = dict(self.set)
         if self.times and not self.map:
-            sets["time.end"] = float(self.times[-1])
-            sets["time.output"] = [float(t) for t in self.times[:-1]]
-        sets |= series.sets
-        sets |= dict(varied)
-        sets |= dict(more)
-        told = tuple(f"{key.rpartition('.')[2]}={value_text(value)}" for key, value in varied)
-        return Job(series.name, self.case, tuple(f"{key}={value_text(value)}" for key, value in sets.items()), told)
+            sets |= {"time.end": float(self.times[-1]), "time.output": [float(t) for t in self.times[:-1]]}
+        sets |= series.sets | dict(varied) | dict(more)
+        words = " ".join(f"{key.rpartition('.')[2]}={value_text(value)}" for key, value in varied)
+        return Job(series.name, self.case, tuple(f"{key}={value_text(value)}" for key, value in sets.items()), words)
 
     def jobs(self):
         """Jobs of a chart of error against time; maps choose theirs as they proceed."""
-        return [
-            self.job(series, list(zip(series.vary, values)))
-            for series in self.series
-            for values in itertools.product(*series.vary.values())
-        ]
+        return [self.job(series, list(zip(series.vary, values))) for series in self.series
+                for values in itertools.product(*series.vary.values())]  # fmt: skip
 
     def map_job(self, series, varied, value):
-        more = {}
-        if self.map.steps:
-            more = {"time.end": float(f"{self.map.steps * value:.6g}"), "time.output": []}
+        more = {"time.end": float(f"{self.map.steps * value:.6g}"), "time.output": []} if self.map.steps else {}
         return self.job(series, [*varied, (self.map.key, value)], more.items())
 
 
-# ---- a chart file: what each key may be. A kind is a function from the value, which raises Wrong with what is allowed
+# ---- a chart file: what each key may be, and the words for it
 
 
-class Wrong(Exception):
-    pass
+def is_number(value):
+    return type(value) in (int, float) and math.isfinite(value)
 
 
-def text(value):
-    if not isinstance(value, str):
-        raise Wrong("must be text")
-    return value
-
-
-def number(above=-math.inf, kind=float):
-    def parse(value):
-        if isinstance(value, bool) or not isinstance(value, (int, kind)) or not above < value < math.inf:
-            raise Wrong(f"must be {'an integer' if kind is int else 'a number'} above {above:g}")
-        return kind(value)
-
-    return parse
-
-
-def numbers(value):
-    if not (isinstance(value, list) and value and all(type(one) in (int, float) for one in value)):
-        raise Wrong("must be a list of numbers")
-    return [float(one) for one in value]
-
-
-def sets(value):
-    if not isinstance(value, dict):
-        raise Wrong("must be a table of case keys, such as { discretisation.order = 3 }")
-    return flatten(value)
-
-
-def flag(value):
-    if type(value) is not bool:
-        raise Wrong("must be true or false")
-    return value
-
-
-POSITIVE, COUNT = number(0), number(0, int)
-CHART = {"title": text, "case": text, "quantity": text, "times": numbers, "limit": POSITIVE, "repeats": COUNT, "set": sets,
-         "reference": dict, "map": dict, "series": list}  # fmt: skip
-SERIES = {"name": text, "set": sets, "vary": sets, "study": flag}
-REFERENCE = {"result": text, "set": sets, "values": numbers, "E_ref": POSITIVE, "known_to": POSITIVE, "source": text}
-MAP = {"key": text, "from": POSITIVE, "to": POSITIVE, "per_decade": COUNT, "steps": COUNT}
+TEXT = lambda value: isinstance(value, str), "must be text"
+POSITIVE = lambda value: is_number(value) and value > 0, "must be a number above 0"
+COUNT = lambda value: type(value) is int and value > 0, "must be an integer above 0"
+NUMBERS = lambda value: isinstance(value, list) and value and all(map(is_number, value)), "must be a list of numbers"
+SETS = lambda value: isinstance(value, dict), "must be a table of case keys, such as { discretisation.order = 3 }"
+FLAG = lambda value: type(value) is bool, "must be true or false"
+TABLE = lambda value: isinstance(value, dict), "must be a table"
+TABLES = lambda value: isinstance(value, list) and value, "must be tables [[series]]"
+CHART = {"title": TEXT, "case": TEXT, "quantity": TEXT, "times": NUMBERS, "limit": POSITIVE, "repeats": COUNT, "set": SETS,
+         "reference": TABLE, "map": TABLE, "series": TABLES}  # fmt: skip
+SERIES = {"name": TEXT, "set": SETS, "vary": SETS, "study": FLAG}
+REFERENCE = {"result": TEXT, "set": SETS, "values": NUMBERS, "E_ref": POSITIVE, "known_to": POSITIVE, "source": TEXT}
+MAP = {"key": TEXT, "from": POSITIVE, "to": POSITIVE, "per_decade": COUNT, "steps": COUNT}
 
 
 def checked(path, table, where, kinds, required=()):
-    """The values of a table of the file, converted. Raises BadInput with their place."""
+    """A table of the file, sets and vary with dotted keys. Raises BadInput with the place of what is wrong."""
     place = f"{path}: {where}." if where else f"{path}: "
     if not isinstance(table, dict):
         raise BadInput(f"{path}: {where}: must be a table")
     for key in required:
         if key not in table:
             raise BadInput(f"{place}{key}: is missing")
-    out = {}
     for key, value in table.items():
         if key not in kinds:
             near = difflib.get_close_matches(key, kinds, 1)
             meant = f"; did you mean {near[0]!r}?" if near else ""
             raise BadInput(f"{place}{key}: unknown key; allowed: {', '.join(kinds)}{meant}")
-        try:
-            out[key] = value if kinds[key] in (dict, list) else kinds[key](value)
-        except Wrong as error:
-            raise BadInput(f"{place}{key}: {error}, not {value!r}") from error
-    return out
+        is_one, words = kinds[key]
+        if not is_one(value):
+            raise BadInput(f"{place}{key}: {words}, not {value!r}")
+    return {key: flatten(value) if kinds[key] is SETS else value for key, value in table.items()}
 
 
 def toml_of(path):
@@ -187,31 +151,26 @@ def toml_of(path):
 
 def read_chart(path, study):
     """The chart of a file, without the series marked as a study unless requested. Raises BadInput."""
-    path = Path(path)
-    given = checked(path, toml_of(path), "", CHART)
-    if "case" not in given:
-        raise BadInput(f"{path}: case: is missing: the case file, relative to this file")
-    tables = given.pop("series", [])
-    if not isinstance(tables, list) or not tables:
-        raise BadInput(f"{path}: needs at least one [[series]]")
-    series = [one for i, table in enumerate(tables) if (one := read_series(path, table, i, study))]
-    parts = {"case": path.parent / given.pop("case"), "sets": given.pop("set", {}), "series": series}
+    given = checked(path, toml_of(path), "", CHART, ("case", "series"))
+    given["case"] = path.parent / given["case"]
+    series = [read_series(path, table, i) for i, table in enumerate(given["series"])]
+    given["series"] = [one for one, is_study in series if study or not is_study]
     if "reference" in given:
-        parts["reference"] = read_reference(path, given.pop("reference"))
+        given["reference"] = read_reference(path, given["reference"])
     if "map" in given:
-        read = checked(path, given.pop("map"), "map", MAP, ("key", "from", "to"))
-        parts["map"] = Map(read.pop("key"), read.pop("from"), read.pop("to"), **read)
-    return Chart(path, **parts, **given)
+        read = checked(path, given["map"], "map", MAP, ("key", "from", "to"))
+        given["map"] = Map(read.pop("key"), read.pop("from"), read.pop("to"), **read)
+    return Chart(path, **given)
 
 
-def read_series(path, table, index, study):
+def read_series(path, table, index):
+    """And whether it is a study."""
     given = checked(path, table, f"series.{index}", SERIES)
     sets, vary = given.get("set", {}), given.get("vary", {})
     for name, values in vary.items():
         if not isinstance(values, list) or not values:
             raise BadInput(f"{path}: series.{index}.vary.{name}: must be a list of values, not {values!r}")
-    name = given.get("name") or words(sets) or "settings of the case"
-    return None if given.get("study") and not study else Series(name, sets, vary)
+    return Series(given.get("name") or words(sets), sets, vary), given.get("study", False)
 
 
 def read_reference(path, table):
@@ -221,8 +180,7 @@ def read_reference(path, table):
         raise BadInput(f"{path}: reference: needs one of result, set, values, not {' and '.join(kinds) or 'none'}")
     if "values" in given and "E_ref" not in given:
         raise BadInput(f"{path}: reference.E_ref: is missing: what the errors are relative to")
-    result = {"result": path.parent / given.pop("result")} if "result" in given else {}
-    return Reference(**result, sets=given.pop("set", None), scale=given.pop("E_ref", 0.0), **given)
+    return Reference(**given | ({"result": path.parent / given["result"]} if "result" in given else {}))
 
 
 # ---- options
@@ -256,7 +214,8 @@ def assignment(text, option):
 
 
 def words(sets):
-    return ", ".join(f"{key.rpartition('.')[2]} = {value_text(value)}" for key, value in sets.items())
+    """The name of a series without one."""
+    return ", ".join(f"{key.rpartition('.')[2]} = {value_text(value)}" for key, value in sets.items()) or "settings of the case"
 
 
 def chart_of_case(path, varied, also):
@@ -268,42 +227,38 @@ def chart_of_case(path, varied, also):
         if "" in keys[key]:
             raise BadInput(f"--vary {text}: a value is empty")
     *outer, last = keys
-    vary = {last: keys[last]}
     lines = [dict(zip(outer, values)) for values in itertools.product(*(keys[key] for key in outer))]
     lines += [{k: plain(v) for k, v in (assignment(one, "--also") for one in split(text))} for text in also]
-    series = [Series(words(sets) or "settings of the case", sets, dict(vary)) for sets in lines]
-    return Chart(Path(path), Path(path), series=series)
+    return Chart(path, path, series=[Series(words(sets), sets, {last: keys[last]}) for sets in lines])
 
 
 def map_option(text):
     key, values = assignment(text, "--map")
     numbers = [plain(value) for value in values.split(":")]
-    if len(numbers) not in (2, 3) or not all(type(n) in (int, float) and n > 0 for n in numbers):
+    if len(numbers) not in (2, 3) or not all(is_number(n) and n > 0 for n in numbers):
         raise BadInput(f"--map {text}: must be key=from:to or key=from:to:n, n values per decade, all above 0")
-    return Map(key, float(numbers[0]), float(numbers[1]), int(numbers[2]) if len(numbers) == 3 else 6, 60)
+    return Map(key, numbers[0], numbers[1], int(numbers[2]) if len(numbers) == 3 else 6, 60)
 
 
 def check(chart):
     """Checks that involve several keys. Raises BadInput."""
-    path = chart.path
+    path, times = chart.path, chart.times
     if not chart.case.is_file():
         raise BadInput(f"{path}: case: {chart.case}: no such file")
     if not chart.series:
         raise BadInput(f"{path}: every series is a study; add --study")
-    times = chart.times
     if times and (times[0] <= 0 or any(a >= b for a, b in zip(times, times[1:]))):
         raise BadInput(f"{path}: times: must be growing numbers above 0, not {times}")
     if chart.reference.values and (not times or len(times) != len(chart.reference.values)):
         raise BadInput(f"{path}: reference.values: needs times, one for each of its {len(chart.reference.values)} values")
-    if chart.map:
-        if not chart.map.low < chart.map.high:
-            raise BadInput(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
-        for series in chart.series:
-            if len(series.vary) != 1 or list(series.vary) != [chart.against]:
-                raise BadInput(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
-            if not all(type(value) in (int, float) and value > 0 for value in series.vary[chart.against]):
-                raise BadInput(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")
+    if not chart.map:
+        if (count := len(chart.jobs())) > MOST_RUNS:
+            raise BadInput(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")
         return
-    count = len(chart.jobs())
-    if count > MOST_RUNS:
-        raise BadInput(f"{path}: {count} runs are too many for a chart ({MOST_RUNS} at most): vary less at once")
+    if not chart.map.low < chart.map.high:
+        raise BadInput(f"{path}: map: from = {chart.map.low:g} must be below to = {chart.map.high:g}")
+    for series in chart.series:
+        if len(series.vary) != 1 or list(series.vary) != [chart.against]:
+            raise BadInput(f"{path}: a map needs one key to vary, the same in all series ({series.name})")
+        if not all(is_number(value) and value > 0 for value in series.vary[chart.against]):
+            raise BadInput(f"{path}: {chart.against}: a map needs numbers above 0, not {series.vary[chart.against]}")

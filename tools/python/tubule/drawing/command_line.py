@@ -295,17 +295,15 @@ def status_of(work):
         return EXIT_INTERRUPTED
 
 
-def require_libraries(program, look=__import__):
+def require_libraries(program):
     """Raises Unavailable, naming the package, if a library is missing. To be called before the imports that need them."""
     # A result file never changes in place, so it needs no lock; on some disks locks fail.
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
     for module, package in DEBIAN_PACKAGES.items():
         try:
-            found = look(module)
+            __import__(module)
         except ImportError:
-            found = None
-        if found is None:
-            raise Unavailable(f"{program}: {sys.executable} has no {module}; install the package {package}")
+            raise Unavailable(f"{program}: {sys.executable} has no {module}; install the package {package}") from None
 
 
 def run(draw, outputs, name=None):
