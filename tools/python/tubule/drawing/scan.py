@@ -125,46 +125,48 @@ def is_scan(path):
         return False  # reported where it is read
 
 
-def read(path):
-    with opened(path) as file:
-        axes = [Axis(file["axes"][name]) for name in sorted(file["axes"], key=int)]
-        points = {name: values(data) for name, data in file["points"].items()}
-        names = list(file["points/outcome"].attrs["names"])
-        title = file["scan"].attrs["title"]
-        starts = file["scan"].attrs.get("start_axis")
-        boundary = values(file["boundary"])
-        crossings = values(file["crossing"]).mean(axis=1) if "crossing" in file else []
-        thresholds = [
-            (line.attrs["label"], values(line["first"]), values(line["second"]), values(line["values"]))
-            for line in file["thresholds"].values()
-        ]
-        equal = {name: values(data) for name, data in file["equal_energies"].items()} if starts is not None else None
-    return axes, points, names, title, boundary, crossings, thresholds, starts, equal
+class Scan:
+    """A scan file: axes, arrays of the points by name, and what was found between the points."""
 
+    def __init__(self, path):
+        self.path = path
+        with opened(path) as file:
+            self.axes = [Axis(file["axes"][name]) for name in sorted(file["axes"], key=int)]
+            self.points = {name: values(data) for name, data in file["points"].items()}
+            self.names = list(file["points/outcome"].attrs["names"])
+            self.title = file["scan"].attrs["title"]
+            self.starts = file["scan"].attrs.get("start_axis")  # the axis of initial shapes of an equilibrium, or None
+            self.boundary = values(file["boundary"])
+            self.crossings = values(file["crossing"]).mean(axis=1) if "crossing" in file else []
+            self.thresholds = [(line.attrs["label"], values(line["first"]), values(line["second"]), values(line["values"]))
+                               for line in file["thresholds"].values()]  # fmt: skip
+            self.equal = {name: values(data) for name, data in file["equal_energies"].items()} if self.starts is not None else {}
 
-def positions(path, axes, slices):
-    """Of each axis that is cut, the place of its value: {axis number: place}."""
-    places = {}
-    for text in slices:
-        key, equals, value = text.partition("=")
-        if not equals:
-            raise BadInput(f"--slice {text}: must have the form key=value")
-        numbers = [i for i, axis in enumerate(axes) if axis.key == key]
-        if not numbers:
-            raise BadInput(f"--slice {text}: {path} varies {', '.join(axis.key for axis in axes)}")
-        place = axes[numbers[0]].place(value)
-        if place is None:
-            raise BadInput(f"--slice {text}: {key} has the values {', '.join(axes[numbers[0]].texts)}")
-        places[numbers[0]] = place
-    return places
+    def places(self, slices):
+        """Of each axis that is cut, the place of its value: {axis number: place}."""
+        places = {}
+        for text in slices:
+            key, equals, value = text.partition("=")
+            if not equals:
+                raise BadInput(f"--slice {text}: must have the form key=value")
+            numbers = [i for i, axis in enumerate(self.axes) if axis.key == key]
+            if not numbers:
+                raise BadInput(f"--slice {text}: {self.path} varies {', '.join(axis.key for axis in self.axes)}")
+            place = self.axes[numbers[0]].place(value)
+            if place is None:
+                raise BadInput(f"--slice {text}: {key} has the values {', '.join(self.axes[numbers[0]].texts)}")
+            places[numbers[0]] = place
+        return places
 
+    def at(self, places):
+        """Where these axes are cut: arrays of the other ones."""
+        index = tuple(places.get(i, slice(None)) for i in range(len(self.axes)))
+        return {name: data[index] for name, data in self.points.items()}
 
-def lowest(points, names, starts):
-    """Of several starts the shape of the least energy, the first one where there is none; an axis of length 1 is left."""
-    at_rest = np.isin(points["outcome"], [k for k, name in enumerate(names) if name in AT_REST])
-    energy = np.where(at_rest, points["free_energy"], np.inf)
-    best = np.expand_dims(np.argmin(energy, axis=starts), starts)
-    return {name: np.take_along_axis(data, best, starts) for name, data in points.items()}
+    def best_starts(self):
+        """For each point the initial shape that leads to the least energy, the first one where none leads to a shape."""
+        at_rest = np.isin(self.points["outcome"], [k for k, name in enumerate(self.names) if name in AT_REST])
+        return np.argmin(np.where(at_rest, self.points["free_energy"], np.inf), axis=self.starts, keepdims=True)
 
 
 def differing(outcome):
@@ -172,127 +174,109 @@ def differing(outcome):
     number = np.arange(outcome.size).reshape(outcome.shape)
     pairs = []
     for axis in range(outcome.ndim):
-        a, b = [slice(None)] * outcome.ndim, [slice(None)] * outcome.ndim
-        a[axis], b[axis] = slice(None, -1), slice(1, None)
-        a, b = tuple(a), tuple(b)
-        differ = (outcome[a] != outcome[b]) & (outcome[a] > 0) & (outcome[b] > 0)
-        pairs += zip(number[a][differ], number[b][differ])
+        (a, b), (k, l) = ((np.delete(array, -1, axis), np.delete(array, 0, axis)) for array in (outcome, number))
+        differ = (a != b) & (a > 0) & (b > 0)
+        pairs += zip(k[differ], l[differ])
     return pairs
 
 
-def equal_energies(axes, equal, shape, kept):
-    """Places where the energies of two kinds are equal: (places of the two neighbours, axis, value, kinds, lowest)."""
-    out = []
-    for ends, axis, kinds, value, is_lowest in zip(
-        equal["points"], equal["axis"], equal["kinds"], equal["value"], equal["lowest"]
-    ):
-        if np.isfinite(value):
-            places = [tuple(np.unravel_index(end, shape)[i] for i in kept) for end in ends]
-            out.append((*places, kept.index(axis), value, tuple(kinds), bool(is_lowest)))
-    return out
-
-
 class Slice:
-    """The part of a scan that is drawn: two axes or one, the others at one value each."""
+    """The part of a scan that is drawn: two axes or one, the others at one value each, and of several initial shapes the
+    equilibrium of least energy."""
 
-    def __init__(self, path, scan, slices):
-        axes, points, self.names, self.title, boundary, crossings, thresholds, starts, equal = scan
-        cut = positions(path, axes, slices)
-        self.all_starts, self.equal = None, []
-        best_of_starts = starts is not None and starts not in cut
-        kept = [i for i in range(len(axes)) if i not in cut and not (best_of_starts and i == starts)]
+    def __init__(self, scan, slices):
+        cut, starts = scan.places(slices), scan.starts
+        self.names, self.all_starts, self.equal, self.boundary, self.crossings = scan.names, [], [], [], []
+        best = starts is not None and starts not in cut
+        kept = [i for i in range(len(scan.axes)) if i not in cut and not (best and i == starts)]
+        self.axes = [scan.axes[i] for i in kept]
         if len(kept) > 2:
-            more = " ".join(f"--slice {axes[i].key}={axes[i].texts[0]}" for i in kept[2:])
-            raise BadInput(f"{path}: a picture has one or two axes, this scan {len(kept)} axes: "
-                           f"{', '.join(axes[i].key for i in kept)}: cut it, as by {more}")  # fmt: skip
+            more = " ".join(f"--slice {axis.key}={axis.texts[0]}" for axis in self.axes[2:])
+            raise BadInput(f"{scan.path}: a picture has one or two axes, this scan {len(kept)} axes: "
+                           f"{', '.join(axis.key for axis in self.axes)}: cut it, as by {more}")  # fmt: skip
         if not kept:
-            raise BadInput(f"{path}: a picture has one or two axes: cut fewer")
-        shape = points["outcome"].shape
-        self.axes = [axes[i] for i in kept]
-        if best_of_starts:
+            raise BadInput(f"{scan.path}: a picture has one or two axes: cut fewer")
+        if best:
             if not cut:
-                self.equal = equal_energies(axes, equal, shape, kept)
-            self.all_starts = [{name: data[tuple(cut.get(i, start if i == starts else slice(None)) for i in range(len(axes)))]
-                                for name, data in points.items()} for start in range(shape[starts])]  # fmt: skip
-            points = lowest(points, self.names, starts)
-            cut[starts] = 0
-        self.points = {name: data[tuple(cut.get(i, slice(None)) for i in range(len(axes)))] for name, data in points.items()}
-        self.thresholds = [] if set(cut) - {starts} else thresholds
-        if starts is not None:
-            self.boundary, self.crossings = differing(self.points["outcome"]), []
-            boundary = []
+                self._equal_energies(scan, kept)
+            self.all_starts = [scan.at(cut | {starts: start}) for start in range(scan.points["outcome"].shape[starts])]
+            best_of = scan.best_starts()
+            index = tuple(cut.get(i, 0 if i == starts else slice(None)) for i in range(len(scan.axes)))
+            self.points = {name: np.take_along_axis(data, best_of, starts)[index] for name, data in scan.points.items()}
         else:
-            self.boundary, self.crossings = [], []
-        for number, ends in enumerate(boundary):
-            places = [np.unravel_index(end, shape) for end in ends]
-            if any(place[i] != at for place in places for i, at in cut.items()):
-                continue
-            inside = self.points["outcome"].shape
-            self.boundary.append([np.ravel_multi_index([place[i] for i in kept], inside) for place in places])
-            if len(crossings):
-                self.crossings.append(crossings[number])
-        if best_of_starts:
-            del cut[starts]
-        if cut:
-            where = ", ".join(f"{axes[i].key} = {axes[i].texts[place]}" for i, place in sorted(cut.items()))
-            self.title = f"{self.title}: {where}" if self.title else where
-
-
-def border_lines(axes, boundary, shape):
-    """The sides that the cells of neighbouring points share, for each pair that differs."""
-    x, y = axes[0].borders(), axes[1].borders()
-    lines = []
-    for a, b in boundary:
-        (i, j), (k, _) = np.unravel_index(a, shape), np.unravel_index(b, shape)
-        if k > i:
-            lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])])
+            self.points = scan.at(cut)
+        self.thresholds = [] if set(cut) - {starts} else scan.thresholds
+        if starts is None:
+            self._boundary(scan, cut, kept)
         else:
-            lines.append([(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
-    return lines
+            self.boundary = differing(self.points["outcome"])
+        where = ", ".join(f"{scan.axes[i].key} = {scan.axes[i].texts[place]}" for i, place in sorted(cut.items()))
+        self.title = ": ".join(words for words in (scan.title, where) if words)
+
+    def _boundary(self, scan, cut, kept):
+        """What the scan has found of it, with the places on the sides of cells where it was refined."""
+        for number, ends in enumerate(scan.boundary):
+            places = [np.unravel_index(end, scan.points["outcome"].shape) for end in ends]
+            if all(place[i] == at for place in places for i, at in cut.items()):
+                self.boundary.append([np.ravel_multi_index([place[i] for i in kept], self.shape) for place in places])
+                self.crossings += [scan.crossings[number]] if len(scan.crossings) else []
+
+    def _equal_energies(self, scan, kept):
+        """Places where the energies of two kinds are equal: (places of the two neighbours, axis, value, kinds, lowest)."""
+        shape = scan.points["outcome"].shape
+        for ends, axis, kinds, value, lowest in zip(*(scan.equal[name] for name in ("points", "axis", "kinds", "value", "lowest"))):
+            if np.isfinite(value):
+                places = [tuple(np.unravel_index(end, shape)[i] for i in kept) for end in ends]
+                self.equal.append((*places, kept.index(axis), value, tuple(kinds), bool(lowest)))
+
+    @property
+    def shape(self):
+        return self.points["outcome"].shape
 
 
-def refined(axes, boundary, crossings, shape):
-    """Where on the sides of the grid's cells the outcome changes."""
-    places = []
-    for (a, b), value in zip(boundary, crossings):
-        (i, j), (k, _) = np.unravel_index(a, shape), np.unravel_index(b, shape)
-        places.append((value, axes[1].values[j]) if k > i else (axes[0].values[i], value))
-    return np.transpose(places)
-
-
-def lines_of_equal_energy(part):
-    """Through the places where energies are equal, cell by cell: {lowest: [[(x, y), (x, y)], ...]}."""
-    x, y = part.axes[0].values, part.axes[1].values
-    cells = {}  # (kinds, cell): [(place, lowest)]
-    for (i, j), _, axis, value, kinds, is_lowest in part.equal:
-        place = (value, y[j]) if axis == 0 else (x[i], value)
-        for cell in ((i, j), (i, j - 1) if axis == 0 else (i - 1, j)):
-            cells.setdefault((kinds, cell), []).append((place, is_lowest))
-    lines = {True: [], False: []}
-    for ends in cells.values():
-        if len(ends) == 2:
-            lines[ends[0][1] and ends[1][1]].append([ends[0][0], ends[1][0]])
-    return lines
+def draw_borders(part, panel):
+    """The sides that the cells of neighbouring points share, for each pair that differs and where no line of equal energies
+    passes; and the places on them where the outcome changes."""
+    (x, y), lines, places = (axis.borders() for axis in part.axes), [], []
+    crossed = {tuple(np.ravel_multi_index(end, part.shape) for end in ends) for *ends, _, _, _, lowest in part.equal if lowest}
+    for number, pair in enumerate(part.boundary):
+        (i, j), (k, _) = (np.unravel_index(end, part.shape) for end in pair)
+        if tuple(pair) not in crossed:
+            lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])] if k > i else [(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
+        if len(part.crossings):
+            value = part.crossings[number]
+            places.append((value, part.axes[1].values[j]) if k > i else (part.axes[0].values[i], value))
+    panel.add_collection(LineCollection(lines, colors="black", linewidths=0.8))
+    handles = draw_equal_energies(part, panel)
+    if places:
+        panel.plot(*np.transpose(places), ".", color="black", markersize=3)
+        handles.append(Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="refined"))
+    return handles
 
 
 def draw_equal_energies(part, panel):
-    handles = []
-    for is_lowest, look, label in (
-        (True, {"color": "black", "linewidth": 1.8, "linestyle": "-"}, "equal energies"),
-        (False, {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (2, 2))}, "the same, a third is lower"),
+    """Lines through the places where energies are equal, cell by cell."""
+    x, y = part.axes[0].values, part.axes[1].values
+    cells, handles = {}, []  # (kinds, cell): [(place, lowest)]
+    for (i, j), _, axis, value, kinds, lowest in part.equal:
+        place = (value, y[j]) if axis == 0 else (x[i], value)
+        for cell in ((i, j), (i, j - 1) if axis == 0 else (i - 1, j)):
+            cells.setdefault((kinds, cell), []).append((place, lowest))
+    pairs = [ends for ends in cells.values() if len(ends) == 2]
+    for are_lowest, look, caps, label in (
+        (True, {"color": "black", "linewidth": 1.8, "linestyle": "-"}, "round", "equal energies"),
+        (False, {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (2, 2))}, "butt", "the same, a third is lower"),
     ):
-        if lines := lines_of_equal_energy(part)[is_lowest]:
-            panel.add_collection(LineCollection(lines, capstyle="round" if is_lowest else "butt", **look))
+        if lines := [[a[0], b[0]] for a, b in pairs if (a[1] and b[1]) == are_lowest]:
+            panel.add_collection(LineCollection(lines, capstyle=caps, **look))
             handles.append(Line2D([], [], label=label, **look))
     return handles
 
 
 def draw_lost_starts(part, panel):
-    """Dots where the search from one of the starts found no shape: one of lower energy may be missing there."""
-    lost = np.zeros(part.points["outcome"].shape, bool)
+    """Dots where the search from one of the initial shapes found no equilibrium: one of lower energy may be missing there."""
     at_rest = [k for k, name in enumerate(part.names) if k == 0 or name in AT_REST]
-    for points in part.all_starts or []:
-        lost |= ~np.isin(points["outcome"], at_rest)
+    lost = np.any([~np.isin(points["outcome"], at_rest) for points in part.all_starts] or [np.zeros(part.shape, bool)], axis=0)
     if not lost.any():
         return []
     i, j = np.nonzero(lost)
@@ -301,45 +285,26 @@ def draw_lost_starts(part, panel):
     return [Line2D([], [], label=f"a start leads to no shape ({lost.sum()})", **look)]
 
 
-def without_lines(part):
-    """Borders between outcomes where no line of equal energies passes."""
-    shape = part.points["outcome"].shape
-    crossed = {(np.ravel_multi_index(a, shape), np.ravel_multi_index(b, shape))
-               for a, b, _, _, _, is_lowest in part.equal if is_lowest}  # fmt: skip
-    return [pair for pair in part.boundary if tuple(pair) not in crossed]
-
-
-def draw_outcomes(part, panel):
-    colours = ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names])
-    norm = BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))
-    shown = np.ma.masked_equal(part.points["outcome"].astype(float), 0)
-    panel.pcolormesh(part.axes[0].borders(), part.axes[1].borders(), shown.T, cmap=colours, norm=norm, rasterized=True)
-
-
-def draw_values(part, quantity, panel):
-    shown = np.ma.masked_invalid(part.points[quantity])
-    mesh = panel.pcolormesh(part.axes[0].borders(), part.axes[1].borders(), shown.T, cmap="viridis", rasterized=True)
-    bar = panel.figure.add_axes([0.74, 0.11, 0.02, 0.8])
-    panel.figure.colorbar(mesh, cax=bar, label=QUANTITIES[quantity])
+def draw_cells(part, quantity, panel):
+    """The colour of each point's cell."""
+    if quantity == "outcome":
+        shown = np.ma.masked_equal(part.points["outcome"].astype(float), 0)
+        look = {"cmap": ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names]),
+                "norm": BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))}  # fmt: skip
+    else:
+        shown, look = np.ma.masked_invalid(part.points[quantity]), {"cmap": "viridis"}
+    mesh = panel.pcolormesh(*(axis.borders() for axis in part.axes), shown.T, rasterized=True, **look)
+    if quantity != "outcome":
+        bar = panel.figure.add_axes([0.74, 0.11, 0.02, 0.8])
+        panel.figure.colorbar(mesh, cax=bar, label=QUANTITIES[quantity])
 
 
 def draw_map(part, quantity, panel):
-    axes, shape = part.axes, part.points["outcome"].shape
-    if quantity == "outcome":
-        draw_outcomes(part, panel)
-    else:
-        draw_values(part, quantity, panel)
-    borders = border_lines(axes, without_lines(part), shape)
-    panel.add_collection(LineCollection(borders, colors="black", linewidths=0.8))
-    handles = draw_equal_energies(part, panel)
-    if len(part.crossings):
-        x, y = refined(axes, part.boundary, part.crossings, shape)
-        panel.plot(x, y, ".", color="black", markersize=3)
-        handles.append(Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="refined"))
-    handles += draw_lost_starts(part, panel)
-    for dashes, (label, first, second, values) in zip(THRESHOLD_DASHES, part.thresholds):
-        panel.contour(axes[0].values[first], axes[1].values[second], values.T, [0], colors="#c0392b",
-                      linestyles=[dashes], linewidths=1.2)
+    axes = part.axes
+    draw_cells(part, quantity, panel)
+    handles = draw_borders(part, panel) + draw_lost_starts(part, panel)
+    for dashes, (label, first, second, height) in zip(THRESHOLD_DASHES, part.thresholds):
+        panel.contour(axes[0].values[first], axes[1].values[second], height.T, [0], colors="#c0392b", linestyles=[dashes], linewidths=1.2)
         handles.append(Line2D([], [], color="#c0392b", linestyle=dashes, label=label))
     panel.set(xlabel=axes[0].label, ylabel=axes[1].label)
     if axes[1].logarithmic:
@@ -354,34 +319,26 @@ def draw_line(part, quantity, panel):
             here = points["outcome"] == k
             if k > 0 and here.any():
                 panel.plot(part.axes[0].values[here], points[quantity][here], "o", color=COLOURS.get(name),
-                           markeredgecolor="0.3", markeredgewidth=0.4)
-    for *_, value, _, is_lowest in part.equal:
-        panel.axvline(value, color="black", linewidth=0.8, linestyle="-" if is_lowest else ":")
+                           markeredgecolor="0.3", markeredgewidth=0.4)  # fmt: skip
+    for *_, value, _, lowest in part.equal:
+        panel.axvline(value, color="black", linewidth=0.8, linestyle="-" if lowest else ":")
     panel.set(xlabel=part.axes[0].label, ylabel=QUANTITIES[quantity])
-    return []
 
 
-def read_confirmed(path, scan):
-    """(number of the point, verdict) for each point of the JSON of `tubule confirm`."""
+def draw_confirmed(path, part, panel):
+    """A mark at each point of the JSON of `tubule confirm` that was run in three dimensions, by what came out."""
     try:
         with open(path) as file:
-            points = json.load(file)["points"]
-        found = [(int(point["point"]), point["values"]["verdict"]) for point in points]
+            found = [(int(point["point"]), point["values"]["verdict"]) for point in json.load(file)["points"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(f"{path}: is not what `tubule confirm --json` prints") from error
-    if any(number >= scan or number < 0 for number, _ in found):
+    if any(not 0 <= number < part.points["outcome"].size for number, _ in found):
         raise BadInput(f"{path}: belongs to another scan, with more points")
-    return found
-
-
-def draw_confirmed(axes, confirmed, shape, panel):
-    """A mark at each point that was run in three dimensions, by what came out."""
-    places = [np.unravel_index(number, shape) for number, _ in confirmed]
     handles = []
     for verdict, look in VERDICTS.items():
-        here = [place for place, (_, found) in zip(places, confirmed) if found == verdict]
+        here = [np.unravel_index(number, part.shape) for number, one in found if one == verdict]
         if here:
-            x, y = (axis.values[list(index)] for axis, index in zip(axes, zip(*here)))
+            x, y = (axis.values[list(index)] for axis, index in zip(part.axes, zip(*here)))
             panel.plot(x, y, linestyle="", clip_on=False, zorder=4, **look)
             handles.append(Line2D([], [], linestyle="", label=f"3D: {verdict} ({len(here)})", **look))
     return handles
@@ -389,7 +346,7 @@ def draw_confirmed(axes, confirmed, shape, panel):
 
 def figure_of(path, quantity="", slices=(), confirmed=None):
     """The map of a scan file, or curves over its only axis."""
-    part = Slice(path, read(path), slices)
+    part = Slice(Scan(path), slices)
     if not part.points["outcome"].any():
         raise BadInput(f"{path}: no point is finished yet")
     if quantity and quantity not in QUANTITIES:
@@ -397,16 +354,14 @@ def figure_of(path, quantity="", slices=(), confirmed=None):
     is_map = len(part.axes) == 2
     of_outcomes = not is_map or quantity in ("", "outcome")
     figure = Figure(figsize=(style.WIDTH, HEIGHT))
-    panel = figure.add_axes([0.09, 0.11, 0.62, 0.8])
+    panel, handles = figure.add_axes([0.09, 0.11, 0.62, 0.8]), []
     if confirmed and (not is_map or slices):
         raise BadInput(f"{path}: --confirmed marks points of a scan of two axes, without --slice")
     if is_map:
         handles = draw_map(part, quantity or "outcome", panel)
-        if confirmed:
-            shape = part.points["outcome"].shape
-            handles += draw_confirmed(part.axes, read_confirmed(confirmed, part.points["outcome"].size), shape, panel)
+        handles += draw_confirmed(confirmed, part, panel) if confirmed else []
     else:
-        handles = draw_line(part, quantity if quantity not in ("", "outcome") else "energy", panel)
+        draw_line(part, quantity if quantity not in ("", "outcome") else "energy", panel)
     if part.axes[0].logarithmic:
         panel.set_xscale("log")
     part.axes[0].mark(panel.xaxis)
@@ -416,6 +371,5 @@ def figure_of(path, quantity="", slices=(), confirmed=None):
         for k, name in enumerate(part.names)
         if of_outcomes and k > 0 and (count := int((part.points["outcome"] == k).sum()))
     ]
-    left = 0.72 if of_outcomes else 0.84
-    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(left, 0.92))
+    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(0.72 if of_outcomes else 0.84, 0.92))
     return figure

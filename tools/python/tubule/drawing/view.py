@@ -145,7 +145,8 @@ def run_page(path):
 
 
 def scan_page(path):
-    axes, points, names, title, *_ = scan.read(path)
+    found = scan.Scan(path)
+    axes, points, names, title = found.axes, found.points, found.names, found.title
     if len(axes) > 2:
         raise BadInput(f"{path}: a scan of {len(axes)} axes has no map; view one of two axes")
     with opened(path) as file:
