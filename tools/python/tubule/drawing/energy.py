@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from .labels import formula, number
-from .style import DASHES, MARKERS, WIDTH, line_colours, time_name, time_text
+from .style import DASHES, MARKERS, WIDTH, axes_at, legend_beside, line_colours, time_name, time_text
 
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
 HEIGHT = 2.15  # inches of the axes
@@ -60,15 +60,16 @@ def settling_time(result):
     return time[min(late[-1] + 1, time.size - 1)] if late.size else time[0]
 
 
-def visible_terms(results):
-    """Terms to draw: above VISIBLE of the total in some result."""
-    names = list(dict.fromkeys(name for result in results for name in result.terms))
-    return [name for name in names if any(_matters(result, name) for result in results)]
-
-
 def _matters(result, name):
+    """Whether a term is above VISIBLE of the total."""
     values = result.series.get(f"energy_{name}", np.zeros(1))
     return np.abs(values).max() > VISIBLE * np.abs(result.series["energy"]).max()
+
+
+def visible_terms(results):
+    """Terms to draw: those that matter in some result."""
+    names = list(dict.fromkeys(name for result in results for name in result.terms))
+    return [name for name in names if any(_matters(result, name) for result in results)]
 
 
 def _lines_of(words):
@@ -95,10 +96,11 @@ class EnergyPanel:
     def __init__(self, results, labels, times):
         self.results, self.times = results, times
         self.term_labels = {name: label for result in results for name, label in result.term_labels.items()}
-        lone = len(results) == 1
+        self.lone = len(results) == 1
         self.numbered = all(result.is_equilibrium for result in results)
         self.kinetic = any(result.has_inertia for result in results)
-        self.labels = ["bending E" if self.kinetic else "total"] if lone else [_lines_of(label) for label in labels]
+        self.total = "bending E" if self.kinetic else "total"
+        self.labels = [self.total] if self.lone else [_lines_of(label) for label in labels]
         self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
@@ -117,43 +119,33 @@ class EnergyPanel:
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        width, height = figure.get_size_inches()
-        y, tall = (bottom + 0.38) / height, HEIGHT / height
         handles = self._legend_entries()
         longest = max(len(line) for handle in handles for line in handle.get_label().split("\n"))
-        legend_width = 0.5 + 0.06 * longest
-        left, right = 0.6, width - legend_width - 0.1
+        left, bottom = 0.6, bottom + 0.38
+        wide = figure.get_figwidth() - (0.5 + 0.06 * longest) - 0.1 - left
         initial = min((t for t in self.times if t >= self.settled), default=self.settled) * 1.03
-        early = initial < 0.3 * self.end
         decades = self.settled < 0.01 * self.end
-        if early and not decades:
+        if initial < 0.3 * self.end and not decades:
             gap = 0.3
-            first = (right - left - gap) / 2
-            zoom = figure.add_axes([left / width, y, first / width, tall])
-            whole = figure.add_axes([(left + first + gap) / width, y, first / width, tall], sharey=zoom)
-            whole.tick_params(labelleft=False)
-            self._lines(zoom, 0, initial, False)
-            self._lines(whole, 0, self.end, False)
-            axes = [zoom, whole]
-            zoom.set_xlabel("time t (initial phase)", labelpad=2)
-            whole.set_xlabel("time t (whole run)", labelpad=2)
+            half = (wide - gap) / 2
+            first = axes_at(figure, left, bottom, half, HEIGHT)
+            last = axes_at(figure, left + half + gap, bottom, half, HEIGHT, sharey=first)
+            last.tick_params(labelleft=False)
+            self._lines(first, 0, initial, False)
+            self._lines(last, 0, self.end, False)
+            first.set_xlabel("time t (initial phase)", labelpad=2)
+            last.set_xlabel("time t (whole run)", labelpad=2)
         else:
-            axes = [figure.add_axes([left / width, y, (right - left) / width, tall])]
-            start = self._first_time() if decades else 0.0
-            self._lines(axes[0], start, self.end, decades)
-            axes[0].set_xlabel("number of the shape" if self.numbered else "time t", labelpad=2)
-        axes[0].set_ylabel(relative_ticks(axes[0].yaxis, "energy" if self.kinetic else "bending energy E"), labelpad=3)
-        axes[-1].legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0, labelspacing=0.45
-        )
+            first = last = axes_at(figure, left, bottom, wide, HEIGHT)
+            self._lines(first, self._first_time() if decades else 0.0, self.end, decades)
+            first.set_xlabel("number of the shape" if self.numbered else "time t", labelpad=2)
+        first.set_ylabel(relative_ticks(first.yaxis, "energy" if self.kinetic else "bending energy E"), labelpad=3)
+        legend_beside(last, handles, labelspacing=0.45)
 
     def _first_time(self):
         steps = [result.series["time"][1] for result in self.results if result.series["time"].size > 1]
         positive = [time for time in self.times if time > 0] + steps
         return max(min(positive) / 3, 1e-6 * self.end)
-
-    def _term_names(self):
-        return {name: formula(self.term_labels.get(name, f"E_{{{name}}}")) for name in self.terms}
 
     def _lines(self, axes, start, end, log):
         if log:
@@ -162,28 +154,33 @@ class EnergyPanel:
         if not log:
             axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
             axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-        for row, (result, colour) in enumerate(zip(self.results, self.colours)):
-            time = result.series["time"]
-            grid = (np.geomspace if log else np.linspace)(start, end, 500)
-            grid = np.union1d(grid[(grid >= time[0]) & (grid <= time[-1])], time[(time >= start) & (time <= end)])
-            several = sum(_matters(result, name) for name in self.terms) > 1
-            for name, dashes in zip(self.terms, DASHES * len(self.terms)):
-                if several and _matters(result, name):
-                    values = monotone_cubic(time, result.series[f"energy_{name}"], grid)
-                    axes.plot(grid, values, color=colour, linestyle=dashes, linewidth=0.8)
-            bending = monotone_cubic(time, result.series["energy"], grid)
-            axes.plot(grid, bending, color=colour, zorder=3)
-            if result.has_inertia:
-                total = bending + np.maximum(monotone_cubic(time, result.series["kinetic_energy"], grid), 0)
-                axes.fill_between(grid, bending, total, color=colour, linewidth=0, alpha=BAND_ALPHA, zorder=1)
-                axes.plot(grid, total, color=colour, linewidth=0.6, zorder=2)
-            marks = np.array([t for t in self.times if time[0] <= t <= time[-1] * (1 + 1e-9) and start <= t <= end])
-            values = monotone_cubic(time, result.series["energy"], np.minimum(marks, time[-1]))
-            marker = MARKERS[row % len(MARKERS)]
-            axes.plot(marks, values, marker, color=colour, mec="white", mew=0.4, clip_on=False, zorder=4)
-            if result.stopped_early and start <= time[-1] <= end:
-                axes.plot(time[-1], result.series["energy"][-1], clip_on=False, zorder=5, **STOP_MARK)
+        grid = (np.geomspace if log else np.linspace)(start, end, 500)
+        for result, colour, marker in zip(self.results, self.colours, MARKERS * len(self.results)):
+            self._lines_of_result(axes, result, grid, colour, marker)
         self._mark_times(axes, start, end)
+
+    def _lines_of_result(self, axes, result, grid, colour, marker):
+        time, start, end = result.series["time"], grid[0], grid[-1]
+        grid = np.union1d(grid[(grid >= time[0]) & (grid <= time[-1])], time[(time >= start) & (time <= end)])
+
+        def between(name, points=grid):
+            return monotone_cubic(time, result.series[name], points)
+
+        several = sum(_matters(result, name) for name in self.terms) > 1
+        for name, dashes in zip(self.terms, DASHES * len(self.terms)):
+            if several and _matters(result, name):
+                axes.plot(grid, between(f"energy_{name}"), color=colour, linestyle=dashes, linewidth=0.8)
+        bending = between("energy")
+        axes.plot(grid, bending, color=colour, zorder=3)
+        if result.has_inertia:
+            total = bending + np.maximum(between("kinetic_energy"), 0)
+            axes.fill_between(grid, bending, total, color=colour, linewidth=0, alpha=BAND_ALPHA, zorder=1)
+            axes.plot(grid, total, color=colour, linewidth=0.6, zorder=2)
+        marks = np.array([t for t in self.times if time[0] <= t <= time[-1] * (1 + 1e-9) and start <= t <= end])
+        values = between("energy", np.minimum(marks, time[-1]))
+        axes.plot(marks, values, marker, color=colour, mec="white", mew=0.4, clip_on=False, zorder=4)
+        if result.stopped_early and start <= time[-1] <= end:
+            axes.plot(time[-1], result.series["energy"][-1], clip_on=False, zorder=5, **STOP_MARK)
 
     def _mark_times(self, axes, start, end):
         """t0, t1, ... above the axes; of overlapping labels only the first is kept."""
@@ -196,25 +193,24 @@ class EnergyPanel:
             place = axes.transLimits.transform(axes.transScale.transform((time, 1)))[0] * inches
             if place - before > 0.095 and not self.numbered:
                 axes.annotate(time_name(index), (time, 1), (0, 2), xycoords=("data", "axes fraction"),
-                              textcoords="offset points", ha="center", va="bottom", fontsize=7)
+                              textcoords="offset points", ha="center", va="bottom", fontsize=7)  # fmt: skip
                 before = place
 
     def _legend_entries(self):
         handles = []
-        for row, (result, label, colour) in enumerate(zip(self.results, self.labels, self.colours)):
-            marker = MARKERS[row % len(MARKERS)]
+        for result, label, colour, marker in zip(self.results, self.labels, self.colours, MARKERS * len(self.results)):
             handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
             if result.stopped_early:
                 time = time_text(result.about.get("stop_time", result.end_time))
                 text = result.stopped_early if self.numbered else f"{result.stopped_early} at t = {time}"
                 handles.append(Line2D([], [], label=text, **STOP_MARK))
-        lone = len(self.results) == 1
-        shade = self.colours[0] if lone else "0.3"
+        shade = self.colours[0] if self.lone else "0.3"
         if self.kinetic:
             handles.append(Patch(facecolor=to_rgba(shade, BAND_ALPHA), edgecolor=shade, linewidth=0.6, label=KINETIC))
         if len(self.terms) > 1:
-            if not lone:
-                handles.append(Line2D([], [], color=shade, label="bending E" if self.kinetic else "total"))
-            for dashes, (name, text) in zip(DASHES * len(self.terms), self._term_names().items()):
+            if not self.lone:
+                handles.append(Line2D([], [], color=shade, label=self.total))
+            for dashes, name in zip(DASHES * len(self.terms), self.terms):
+                text = formula(self.term_labels.get(name, f"E_{{{name}}}"))
                 handles.append(Line2D([], [], color=shade, linewidth=0.9, linestyle=dashes, label=text))
         return handles

@@ -7,13 +7,12 @@ from operator import attrgetter
 from matplotlib.figure import Figure
 
 from . import command_line, scan, style
-from .balance import BalancePanel, has_balance
 from .curves import CurvePanel
 from .cuts import CutPanel
 from .energy import EnergyPanel
 from .labels import as_label, row_labels
 from .results import BadInput, read_result
-from .series import Choice, SeriesPanel
+from .series import BalancePanel, Choice, SeriesPanel, has_balance
 from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, choose_columns
 

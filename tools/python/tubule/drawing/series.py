@@ -1,4 +1,5 @@
-"""Panel of any series of results against time, or against another series: `tubule plot --series`."""
+"""Panels of series: any against time or another series (`tubule plot --series`), and dissipation, kinetic energy, the defect
+of the energy identity and the estimated error against the logarithm of time."""
 
 import difflib
 from dataclasses import dataclass
@@ -8,9 +9,15 @@ from matplotlib.lines import Line2D
 
 from .labels import number
 from .results import BadInput
-from .style import DASHES, line_colours
+from .style import DASHES, axes_at, legend_beside, line_colours, result_handles
 
-HEIGHT = 2.6  # inches of the axes
+HEIGHT, BALANCE_HEIGHT = 2.6, 1.7  # inches of the axes
+DECADES = 9  # the most of a balance that are shown below the largest value
+BALANCE = ("dissipation", "kinetic_energy", "identity_defect", "energy_error")
+
+
+def meanings(results):
+    return {name: text for result in results for name, text in result.meanings.items()}
 
 
 @dataclass
@@ -45,9 +52,8 @@ class SeriesPanel:
     """A line for each result and series; results differ by colour, series by dashes."""
 
     def __init__(self, results, labels, choice):
-        self.results, self.labels, self.choice = results, labels, choice
+        self.labels, self.choice, self.meanings = labels, choice, meanings(results)
         self.lines = [[choice.of(result, name) for name in choice.names] for result in results]
-        self.meanings = {name: text for result in results for name, text in result.meanings.items()}
         self.height = HEIGHT + 0.62
 
     def _name(self, name):
@@ -55,29 +61,68 @@ class SeriesPanel:
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        width, height = figure.get_size_inches()
-        handles = self._legend_entries()
+        names = self.choice.names
+        dashes = ("-", *DASHES * len(names))
+        handles = result_handles(self.labels)
+        if len(names) > 1:
+            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in zip(names, dashes)]
         beside = 0.5 + 0.06 * max((len(handle.get_label()) for handle in handles), default=-8)
-        axes = figure.add_axes([0.75 / width, (bottom + 0.4) / height, (width - 0.9 - beside) / width, HEIGHT / height])
-        dashes = ("-", *DASHES * len(self.choice.names))
-        for lines, colour in zip(self.lines, line_colours(len(self.results))):
+        axes = axes_at(figure, 0.75, bottom + 0.4, figure.get_figwidth() - 0.9 - beside, HEIGHT)
+        for lines, colour in zip(self.lines, line_colours(len(self.lines))):
             for (x, y), style in zip(lines, dashes):
                 axes.plot(x, y, color=colour, linestyle=style, marker="o" if x.size == 1 else "")
         if self.choice.logarithmic:
             axes.set_yscale("log")
         axes.margins(x=0)
-        axes.set_xlabel(self._name(self.choice.x))
-        axes.set_ylabel(self._name(self.choice.names[0]) if len(self.choice.names) == 1 else "")
+        axes.set(xlabel=self._name(self.choice.x), ylabel=self._name(names[0]) if len(names) == 1 else "")
         if handles:
-            axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0)
+            legend_beside(axes, handles)
 
-    def _legend_entries(self):
-        """Of the results if there are several, and of the series likewise."""
-        handles = []
-        if len(self.results) > 1:
-            colours = line_colours(len(self.results))
-            handles += [Line2D([], [], color=c, label=", ".join(label)) for c, label in zip(colours, self.labels)]
-        if len(self.choice.names) > 1:
-            dashes = ("-", *DASHES * len(self.choice.names))
-            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in zip(self.choice.names, dashes)]
-        return handles
+
+def has_balance(result):
+    """Whether there is anything to draw: two times after the initial one, and dissipation."""
+    return "dissipation" in result.series and (result.series["time"] > 0).sum() > 1
+
+
+def magnitude(result, name):
+    """Positive times and the magnitude of the series there; NaN, a gap, where it is zero, or an error that is not known (E_ref
+    in the rows). None where nothing is left."""
+    if name not in result.series:
+        return None
+    time, values = result.series["time"], np.abs(result.series[name])
+    values = np.where(values > 0, values, np.nan)
+    if name == "energy_error" and "E_ref" in result.about:
+        values = np.where(values < result.about["E_ref"], values, np.nan)
+    later = time > 0
+    return (time[later], values[later]) if np.isfinite(values[later]).any() else None
+
+
+class BalancePanel:
+    """Lines of `results` (all have a balance); one label per result; `times` marked."""
+
+    def __init__(self, results, labels, times):
+        self.results, self.labels, self.times = results, labels, times
+        present = [name for name in BALANCE if any(magnitude(result, name) for result in results)]
+        self.styles = dict(zip(present, ("-", *DASHES)))
+        self.height = BALANCE_HEIGHT + 0.55
+
+    def draw(self, figure, bottom):
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
+        axes = axes_at(figure, 0.5, bottom + 0.38, figure.get_figwidth() - 2.45, BALANCE_HEIGHT)
+        axes.set(xscale="log", yscale="log", xlabel="time t")
+        largest = 0.0
+        for result, colour in zip(self.results, line_colours(len(self.results))):
+            for name, dashes in self.styles.items():
+                if line := magnitude(result, name):
+                    axes.plot(*line, color=colour, linestyle=dashes, linewidth=1)
+                    largest = max(largest, np.nanmax(line[1]))
+        for time in (time for time in self.times if time > 0):
+            axes.axvline(time, color="0.75", linewidth=0.5, zorder=0)
+        times = [result.series["time"] for result in self.results]
+        axes.set_xlim(min(time[time > 0][0] for time in times), max(time[-1] for time in times))
+        if largest:
+            low, high = axes.get_ylim()
+            axes.set_ylim(max(low, largest * 10.0**-DECADES), high)
+        shade, names = line_colours(1)[0] if len(times) == 1 else "0.3", meanings(self.results)
+        lines = [Line2D([], [], color=shade, linestyle=dashes, label=names[name].split(", ")[0]) for name, dashes in self.styles.items()]
+        legend_beside(axes, result_handles(self.labels) + lines, labelspacing=0.45)

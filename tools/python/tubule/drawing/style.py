@@ -4,6 +4,7 @@ import os
 from contextlib import contextmanager
 
 import matplotlib.pyplot as plt
+from matplotlib.lines import Line2D
 
 from .labels import formula, number
 from .results import BadInput
@@ -62,6 +63,22 @@ def line_colours(n):
     """n colours that differ in lightness, so that they remain distinct in grey and for colour-blind readers."""
     shades = [0.1] if n == 1 else [0.78 * i / (n - 1) for i in range(n)]
     return [plt.get_cmap("viridis")(shade) for shade in shades]
+
+
+def axes_at(figure, left, bottom, width, height, **options):
+    """Axes at a place of the page in inches."""
+    wide, tall = figure.get_size_inches()
+    return figure.add_axes([left / wide, bottom / tall, width / wide, height / tall], **options)
+
+
+def legend_beside(axes, handles, **options):
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0, **options)
+
+
+def result_handles(labels):
+    """Of several results, the legend of their colours; one has none."""
+    several = labels if len(labels) > 1 else []
+    return [Line2D([], [], color=c, label=", ".join(label)) for c, label in zip(line_colours(len(labels)), several)]
 
 
 def time_name(index):
