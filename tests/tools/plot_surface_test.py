@@ -13,14 +13,14 @@ import tempfile
 import unittest
 from pathlib import Path
 
-import h5py
 import matplotlib.image
 import numpy as np
-from plot_test import InFolder, write
+from plot_test import InFolder, replaced, write
 
-from drawing import raster  # found by way of plot_test
+from drawing import raster, results  # found by way of plot_test
 
 SURFACE_RESULTS = None
+BAR = "mean curvature H = \u03ba\u2081 + \u03ba\u2082"
 
 
 def octasphere(order):
@@ -109,21 +109,13 @@ class Raster(unittest.TestCase):
 class Surfaces(InFolder):
     @classmethod
     def setUpClass(cls):
-        cls.scratch = tempfile.TemporaryDirectory()
-        cls.made = Path(cls.scratch.name)
+        cls.made = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         subprocess.run([SURFACE_RESULTS, cls.made], check=True)
-        for name in ("torus", "sphere", "tube"):
-            setattr(cls, name, cls.made / f"shapes_{name}.hdf")
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.scratch.cleanup()
+        cls.torus, cls.sphere, cls.tube = (cls.made / f"shapes_{name}.hdf" for name in ("torus", "sphere", "tube"))
 
     def test_one_surface_twice_side_by_side(self):
         texts = self.drawn(self.torus)
-        for words in ("A torus", "mean curvature H = \u03ba\u2081 + \u03ba\u2082", "Gaussian curvature K"):
-            self.assertIn(words, texts)
-        self.assertNotIn("bending energy E", texts)  # one row
+        self.check_words(texts, "A torus", BAR, "Gaussian curvature K", never=["bending energy E"])  # one row
         picture = matplotlib.image.imread(self.folder / "p.png")[..., :3]
         red, green, blue = np.moveaxis(picture, -1, 0)
         half = picture.shape[1] // 2
@@ -134,49 +126,28 @@ class Surfaces(InFolder):
         self.assertGreater(blues[top, half:].mean(), 0.02)
         self.assertFalse(blues[top, :half].any())
 
-    def test_several_times_and_their_energies(self):
-        texts = self.drawn(self.sphere)
-        for words in ("t\u2080 = 0", "t\u2083 = 3", "H", "K", "bending energy E", "(a)", "(b)"):
-            self.assertIn(words, texts)
-
-    def test_kinds_and_times(self):
-        texts = self.drawn(self.tube, "--kind", "surface", "--times", "0,2")
-        self.assertIn("t\u2081 = 2", texts)
-        self.assertNotIn("t\u2082 = 3", texts)
-        self.assertNotIn("bending energy E", texts)
-        self.assertNotIn("mean curvature H = \u03ba\u2081 + \u03ba\u2082", self.drawn(self.tube, "--kind", "energy"))
-        self.assertIn("bending energy E", self.drawn(self.torus, "--kind", "energy"))
-
-    def test_both_tiers_in_one_picture(self):
-        texts = self.drawn(write(self.folder / "a.hdf", times=[0, 1]), self.torus)
-        for words in ("(a)", "(b)", "(c)", "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves)", "mean curvature H = \u03ba\u2081 + \u03ba\u2082"):
-            self.assertIn(words, texts)
+    def test_pages(self):
+        for arguments, words, never in (
+            ([self.sphere], ("t\u2080 = 0", "t\u2083 = 3", "H", "K", "bending energy E", "(a)", "(b)"), []),
+            ((self.tube, "--kind", "surface", "--times", "0,2"), ["t\u2081 = 2"], ("t\u2082 = 3", "bending energy E")),
+            ((self.tube, "--kind", "energy"), ["bending energy E"], [BAR]),
+            ((self.torus, "--kind", "energy"), ["bending energy E"], []),
+            ((write(self.folder / "a.hdf", times=[0, 1]), self.torus), ("(a)", "(b)", "(c)", f"{BAR} (left halves)", BAR), []),  # both tiers
+        ):
+            with self.subTest(arguments=arguments):
+                self.check_words(self.drawn(*arguments), *words, never=never)
 
     def test_refusals(self):
         self.refused("no profiles to draw", self.torus, "--kind", "profiles")
         self.refused("no surfaces to draw; those of tier axisym are drawn by --kind profiles", write(self.folder / "a.hdf"), "--kind", "surface")
         self.refused("frame 000000 lacks H, K, normal", self.made / "closed_3.hdf")
-
-        def damaged(change, words):
-            path = self.folder / "damaged.hdf"
-            shutil.copy(self.torus, path)
-            with h5py.File(path, "a") as file:
-                change(file)
-            self.refused(words, path)
-
-        def nan(file):
-            file["frames/000000/PointData/K"][7] = np.nan
-
-        def short(file):
-            del file["frames/000000/PointData/H"]
-            file["frames/000000/PointData/H"] = np.ones(5)
-
-        def lost(file):
-            del file["meshes"]
-
-        damaged(nan, "contains numbers that are not finite")
-        damaged(short, "frame 000000: Points, normal, H, K must have one row per point")
-        damaged(lost, "damaged or not a result of tubule")
+        size = len(results.read_result(str(self.torus)).surfaces[0].nodes["K"])
+        for changes, words in (
+            ({"frames__000000__PointData__K": np.full(size, np.nan)}, "contains numbers that are not finite"),
+            ({"frames__000000__PointData__H": np.ones(5)}, "frame 000000: Points, normal, H, K must have one row per point"),
+            ({"meshes": None}, "damaged or not a result of tubule"),
+        ):
+            self.refused(words, replaced(Path(shutil.copy(self.torus, self.folder / "damaged.hdf")), **changes))
 
 
 if __name__ == "__main__":

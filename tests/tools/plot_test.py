@@ -123,11 +123,22 @@ def svg_texts(path):
     return ["".join(node.itertext()).strip() for node in nodes]
 
 
+def replaced(path, **changes):
+    """The result with other data sets (None: without); __ in names stands for /."""
+    with h5py.File(path, "a") as file:
+        for name, values in changes.items():
+            del file[name.replace("__", "/")]
+            if values is not None:
+                file[name.replace("__", "/")] = values
+    return path
+
+
 class InFolder(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+
+    def write(self, name="a.hdf", **options):
+        return write(self.folder / name, **options)
 
     def plot(self, *arguments, program=None):
         if not program:
@@ -138,7 +149,7 @@ class InFolder(unittest.TestCase):
         return subprocess.CompletedProcess(done.args, done.returncode, done.stdout, "".join(said))
 
     def drawn(self, *arguments, dpi=100, **options):
-        """Texts of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
+        """Lines of text of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
         done = self.plot(*arguments, f"--dpi={dpi}", "-o", self.folder / "p.png", "-o", self.folder / "p.svg", **options)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         width, height = png_size(self.folder / "p.png")
@@ -147,63 +158,51 @@ class InFolder(unittest.TestCase):
         self.assertGreater((self.folder / "p.png").stat().st_size, 50 * dpi)
         return svg_texts(self.folder / "p.svg")
 
+    def check_words(self, texts, *words, never=()):
+        """Each of the words is a line of the picture, those that end with ... its beginning; none has a word of `never`."""
+        lines = "\n".join(texts).split("\n")
+        for word in words:
+            begins = word.endswith("...") and any(line.startswith(word[:-3]) for line in lines)
+            self.assertTrue(begins or word in lines, (word, lines))
+        for word in never:
+            self.assertFalse([line for line in lines if word in line], word)
+
     def refused(self, words, *arguments, status=2, **options):
-        done = self.plot(*arguments, **options)
-        self.assertEqual(done.returncode, status, done.stderr)
-        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-        self.assertIn(words, done.stderr)
+        with self.subTest(words):
+            done = self.plot(*arguments, **options)
+            self.assertEqual(done.returncode, status, done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertIn(words, done.stderr)
 
 
 class Labels(unittest.TestCase):
-    def words(self, *cases, sets=None):
-        read = [tomllib.loads(resolved(text, one)) for text, one in zip(cases, sets or [[]] * len(cases))]
-        return labels.row_labels(read, [f"file{i}" for i in range(len(cases))])
+    def test_of_cases(self):
+        def words(*cases):
+            return labels.row_labels([tomllib.loads(text) for text in cases], [f"file{i}" for i in range(len(cases))])
 
-    def test_only_what_differs_is_named_and_equal_numbers_are_equal(self):
-        # The second case says 0.0 where the first says 0: no difference.
-        found = self.words(CASE.format(k42=0), CASE.format(k42="0.0"), sets=[["energy.H0=-1"], []])
-        self.assertEqual(found, [["H\u2080 = \u22121"], ["H\u2080 = \u22122"]])
+        text, k0, k1 = CASE.format(k42=0), "k\u2084\u2082 = 0", "k\u2084\u2082 = 1"
+        for why, cases, expected in (
+            ("only what differs; 0 and 0.0 are equal", (resolved(text, ["energy.H0=-1"]), CASE.format(k42="0.0")),
+             [["H\u2080 = \u22121"], ["H\u2080 = \u22122"]]),
+            ("one mode has no index", (text, text.replace("amplitude = 0.2", "amplitude = 0.3")), [["amplitude = 0.2"], ["amplitude = 0.3"]]),
+            ("modes have their index", (text, text + "[[shape.mode]]\namplitude = 0.1\n"), [["no mode 1"], ["mode 1 amplitude = 0.1"]]),
+            ("absent keys", (text, resolved(text, ["energy.k40=0.1"])), [["k\u2084\u2080 by default"], ["k\u2084\u2080 = 0.1"]]),
+            ("about, expect and time are no difference",
+             (resolved(text, ['about.title="x"', "time.output=[1,2]"]), resolved(text, ['expect.stop="finished"', "time.end=3", "energy.k42=1"])),
+             [[k0], [k1]]),
+            ("equal cases", (text, text), [["file0"], ["file1"]]),
+            ("too many differences", (text, resolved(text, [f"energy.x{i}=1" for i in range(5)])), [["file0"], ["file1"]]),
+            ("some are equal", (text, text, resolved(text, ["energy.k42=1"])), [[k0, "file0"], [k0, "file1"], [k1, "file2"]]),
+            ("equal last words", ("[a]\nx = 1\n[b]\nx = 1\n", "[a]\nx = 2\n[b]\nx = 2\n"), [["a.x = 1", "b.x = 1"], ["a.x = 2", "b.x = 2"]]),
+        ):  # fmt: skip
+            with self.subTest(why):
+                self.assertEqual(words(*cases), expected)
 
-    def test_modes_have_their_index(self):
-        text = CASE.format(k42=0)
-        self.assertEqual(
-            self.words(text, text.replace("amplitude = 0.2", "amplitude = 0.3")),
-            [["amplitude = 0.2"], ["amplitude = 0.3"]],
-        )
-        self.assertEqual(
-            self.words(text, text + "[[shape.mode]]\namplitude = 0.1\n"),
-            [["no mode 1"], ["mode 1 amplitude = 0.1"]],
-        )
-
-    def test_absent_keys(self):
-        text = CASE.format(k42=0)
-        self.assertEqual(
-            self.words(text, text, sets=[[], ["energy.k40=0.1"]]),
-            [["k\u2084\u2080 by default"], ["k\u2084\u2080 = 0.1"]],
-        )
-
-    def test_about_expect_and_time_are_no_difference(self):
-        text = CASE.format(k42=0)
-        sets = [['about.title="x"', "time.output=[1,2]"], ['expect.stop="finished"', "time.end=3", "energy.k42=1"]]
-        self.assertEqual(self.words(text, text, sets=sets), [["k\u2084\u2082 = 0"], ["k\u2084\u2082 = 1"]])
-
-    def test_file_names_where_labels_do_not_tell_apart(self):
-        text = CASE.format(k42=0)
-        self.assertEqual(self.words(text, text), [["file0"], ["file1"]])
-        many = [f"energy.x{i}=1" for i in range(5)]
-        self.assertEqual(self.words(text, text, sets=[[], many]), [["file0"], ["file1"]])
-        self.assertEqual(
-            self.words(text, text, text, sets=[[], [], ["energy.k42=1"]]),
-            [["k\u2084\u2082 = 0", "file0"], ["k\u2084\u2082 = 0", "file1"], ["k\u2084\u2082 = 1", "file2"]],
-        )
-
-    def test_equal_last_words_are_told_apart(self):
-        found = self.words("[a]\nx = 1\n[b]\nx = 1\n", "[a]\nx = 2\n[b]\nx = 2\n")
-        self.assertEqual(found[0], ["a.x = 1", "b.x = 1"])
-
-    def test_formulas(self):
+    def test_formulas_and_numbers(self):
         self.assertEqual(labels.formula("k_{20}(H-H_0)^2"), "k\u2082\u2080(H\u2212H\u2080)\u00b2")
         self.assertEqual(labels.formula("E_{42}"), "E\u2084\u2082")
+        found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
+        self.assertEqual(found, ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"])
 
 
 class Columns(InFolder):
@@ -265,72 +264,56 @@ class Scales(unittest.TestCase):
 
 class Pictures(InFolder):
     def test_three_results_labelled_by_what_differs(self):
-        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06, 0.12))]
+        files = [self.write(f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06, 0.12))]
         texts = self.drawn(*files)
         for words in ("k\u2084\u2082 = 0", "k\u2084\u2082 = 0.06", "k\u2084\u2082 = 0.12"):
             self.assertEqual(texts.count(words), 2, words)  # beside its row and in the legend
-        formulas = "k\u2082\u2080(H\u2212H\u2080)\u00b2", "k\u2084\u2082K\u00b2"
-        for words in ("(a)", "(b)", "t\u2081 = 0.01", "t\u2085 = 1", "total", *formulas, "bending energy E"):
-            self.assertIn(words, texts)
-        self.assertFalse([text for text in texts if "energy_40" in text or "E\u2084\u2080" in text])  # zero: no line
+        # A term that is zero everywhere has no line.
+        self.check_words(texts, "(a)", "(b)", "t\u2081 = 0.01", "t\u2085 = 1", "total", "k\u2082\u2080(H\u2212H\u2080)\u00b2",
+                         "k\u2084\u2082K\u00b2", "bending energy E", never=("energy_40", "E\u2084\u2080"))  # fmt: skip
+        texts = self.drawn(*files[:2], "--label=coarse", "--label=fine")
+        self.assertEqual((texts.count("coarse"), texts.count("fine")), (2, 2))
+        self.check_words(texts, never=["k\u2084\u2082 ="])
+        self.refused("--label: 1 labels, but 2 results", *files[:2], "--label=coarse", "-o", self.folder / "q.svg")
 
-    def test_labels_as_given(self):
-        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06))]
-        texts = self.drawn(*files, "--label=coarse", "--label=fine")
-        for words in ("coarse", "fine"):
-            self.assertEqual(texts.count(words), 2, words)
-        self.assertFalse([text for text in texts if text.startswith("k\u2084\u2082 =")])
-        done = self.plot(*files, "--label=coarse", "-o", self.folder / "q.svg")
-        self.assertEqual(done.returncode, 2)
-        self.assertIn("--label: 1 labels, but 2 results", done.stderr)
-
-    def test_series_against_time_or_another_series(self):
-        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06))]
-        texts = self.drawn(*files, "--series=energy,energy_20", "--logy", "--from=0.1", "--to=0.5", "--label=a", "--label=b")
-        for words in ("a", "b", "energy", "energy_20", "time t"):
-            self.assertIn(words, texts)
-        self.assertNotIn("t\u2081 = 0.01", texts)  # no shapes
-        self.assertIn("energy_20", self.drawn(files[0], "--series=energy", "--x=energy_20"))
+    def test_options(self):
+        file, other = self.write(), self.write("b.hdf", k42=0.06)
+        stopped = self.write("c.hdf", k42=1, times=[0, 0.01, 0.03], stop="pinch-off")
+        varying = self.write("d.hdf", sets=['energy.H0="-2 + 0.1*cos(pi*z)"'], amplitude=0.0)
+        large = self.write("e.hdf")
+        with h5py.File(large, "a") as f:
+            f["series/energy"][:] = 37.69923 + 1e-5 * f["series/time"][:]
+        for arguments, words, never in (
+            ((file, other, "--series=energy,energy_20", "--logy", "--from=0.1", "--to=0.5", "--label=a", "--label=b"),
+             ("a", "b", "energy", "energy_20", "time t"), ["t\u2081 = 0.01"]),
+            ((file, "--series=energy", "--x=energy_20"), ["energy_20"], []),
+            ((file, "--kind", "profiles"), ["mean curvature..."], ["bending energy E"]),
+            ((file, "--kind", "energy"), ["bending energy E"], ["mean curvature"]),
+            ((file, "--times", "0,0.2"), ["t\u2081 = 0.2"], ["t\u2082 = 0.5"]),
+            # In the legend; below its last tube, which stands in the column of t = 0.05, and so has its own time.
+            ((file, stopped), ["pinch-off at t = 0.03", "pinch-off", "t = 0.03"], []),
+            # No value of H0 is white, so the scale is about the mean curvature: -1 on the straight tube of radius 1.
+            ((varying, "--kind", "profiles"), ["mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves), white: mean \u2248 \u22121"], []),
+            # Small changes of a large energy are ticks from a round number: 37.69923 is 3.
+            ((large, "--kind", "energy"), ["(bending energy E \u2212 37.6992) / 10\u207b\u2075", "3"], []),
+        ):  # fmt: skip
+            with self.subTest(arguments=arguments[-2:]):
+                self.check_words(self.drawn(*arguments), *words, never=never)
 
     def test_one_result_has_its_title_and_default_names(self):
-        done = self.plot(write(self.folder / "one.hdf"))
+        done = self.plot(self.write("one.hdf"))
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(png_size(self.folder / "one.png")[0], 2100)
         self.assertIn("A made-up tube", svg_texts(self.folder / "one.svg"))
 
-    def test_a_stop_is_marked_in_both_panels(self):
-        whole = write(self.folder / "a.hdf")
-        texts = self.drawn(whole, write(self.folder / "b.hdf", k42=1, times=[0, 0.01, 0.03], stop="pinch-off"))
-        self.assertIn("pinch-off at t = 0.03", texts)
-        self.assertIn("pinch-off", texts)  # below its last tube, which stands in the column of t = 0.05,
-        self.assertIn("t = 0.03", texts)  # and so has its own time
-
-    def test_kinds_and_pdf(self):
-        file = write(self.folder / "a.hdf")
-        self.assertNotIn("bending energy E", self.drawn(file, "--kind", "profiles"))
-        texts = self.drawn(file, "--kind", "energy")
-        self.assertIn("bending energy E", texts)
-        self.assertFalse([text for text in texts if "mean curvature" in text])
-        self.assertEqual(self.plot(file, "-o", self.folder / "a.pdf").returncode, 0)
-        self.assertEqual((self.folder / "a.pdf").read_bytes()[:5], b"%PDF-")
-
-    def test_spontaneous_curvature_that_varies(self):
-        """No value of H0 is white, so the scale is about the mean curvature: -1 on the straight tube of radius 1."""
-        path = write(self.folder / "a.hdf", sets=['energy.H0="-2 + 0.1*cos(pi*z)"'], amplitude=0.0)
-        texts = self.drawn(path, "--kind", "profiles")
-        self.assertTrue(any("white: mean \u2248 \u22121" in words for words in texts), texts)
-
-    def test_wanted_times(self):
-        texts = self.drawn(write(self.folder / "a.hdf"), "--times", "0,0.2")
-        self.assertIn("t\u2081 = 0.2", texts)
-        self.assertNotIn("t\u2082 = 0.5", texts)
-
-    def test_drawing_again_gives_the_same_files(self):
-        file = write(self.folder / "a.hdf")
+    def test_files(self):
+        file = self.write()
         self.drawn(file)
         before = (self.folder / "p.svg").read_bytes()
         self.drawn(file)
-        self.assertEqual((self.folder / "p.svg").read_bytes(), before)
+        self.assertEqual((self.folder / "p.svg").read_bytes(), before)  # the same again
+        self.assertEqual(self.plot(file, "-o", self.folder / "a.pdf").returncode, 0)
+        self.assertEqual((self.folder / "a.pdf").read_bytes()[:5], b"%PDF-")
 
     def test_degenerate_inputs(self):
         for name, options in {
@@ -341,21 +324,14 @@ class Pictures(InFolder):
             "times going back": {"times": [0, 0.5, 0.2, 0.5, 1]},
             "nearly pinched": {"amplitude": 0.9999},
             "never finished": {"stop": None},
+            "no graph": {"times": [0], "profile": lambda t: tube(t, 0.2) | {"z": np.linspace(0, 2, 65) + 0.5 * np.sin(np.linspace(0, 4 * np.pi, 65))}},
         }.items():
             with self.subTest(name):
-                self.drawn(write(self.folder / "a.hdf", **options))
+                self.drawn(self.write(**options))
 
     def test_eight_rows_one_of_them_without_frames(self):
-        files = [write(self.folder / f"{i}.hdf", k42=i, times=[] if i == 3 else [0, 0.5, 1]) for i in range(8)]
-        texts = self.drawn(*files)
-        self.assertEqual(texts.count("k\u2084\u2082 = 3"), 2)
-
-    def test_a_profile_that_is_no_graph(self):
-        file = write(self.folder / "a.hdf", times=[0])
-        angle = np.linspace(0, np.pi, 65)
-        with h5py.File(file, "a") as f:
-            f["frames/000000/z"][:] = np.linspace(0, 2, 65) + 0.5 * np.sin(4 * angle)
-        self.drawn(file)
+        files = [self.write(f"{i}.hdf", k42=i, times=[] if i == 3 else [0, 0.5, 1]) for i in range(8)]
+        self.assertEqual(self.drawn(*files).count("k\u2084\u2082 = 3"), 2)
 
 
 class Curves(InFolder):
@@ -380,75 +356,43 @@ class Curves(InFolder):
         slow = curves.arrows(section, np.where(section.places < 0.3, 1.0, 0.01), 1)
         self.assertLess(max(places[-1] for places in slow), 0.4)  # too short to see elsewhere
 
-    def test_a_flowing_cell_and_its_kinetic_energy(self):
-        file = write(self.folder / "a.hdf", profile=ball, kinetic=True, sets=['model.kind="fluid"'], times=[0, 0.5, 1])
-        texts = self.drawn(file)
-        self.assertEqual(texts.count("at rest"), 1)  # t = 0
-        for words in ("|u\u2099| \u2264 2", "|u\u209c| \u2264 1", "|u\u209c| \u2264 0.5", energy.KINETIC, "energy"):
-            self.assertIn(words, "\n".join(texts).split("\n"))
-        self.assertTrue([text for text in texts if text.startswith("normal velocity")])
-        self.assertTrue([text for text in texts if text.startswith("velocity u\u209c along the profile")])
-        self.assertFalse([text for text in texts if "mean curvature" in text])
-
-    def test_kinetic_energy_is_no_part_of_flows_without_inertia(self):
-        texts = self.drawn(write(self.folder / "a.hdf", profile=ball, kinetic=True, sets=['model.kind="stokes"']))
-        self.assertIn("bending energy E", texts)
-        self.assertNotIn(energy.KINETIC, texts)
-
-    def test_swirl_is_written_below(self):
+    def test_pictures(self):
         def turning(time):
             return ball(0.0) | {"u_theta": 3 * ball(0.0)["r"]}
 
-        texts = self.drawn(write(self.folder / "a.hdf", profile=turning, times=[0]), "--kind", "profiles")
-        self.assertIn("|u\u03b8| \u2264 3", texts)
-        self.assertNotIn("at rest", texts)
-
-    def test_an_overhanging_tube_without_flow_along_it(self):
         def overhanging(time):
             frame = tube(time, 0.2)
             z = frame["z"] - 0.6 * np.sin(2 * np.pi * frame["z"])  # goes back and forth
             return frame | {"z": z, "u_n": np.cos(np.pi * frame["z"])}
 
-        texts = self.drawn(write(self.folder / "a.hdf", profile=overhanging, times=[0, 1]))
-        self.assertIn("|u\u2099| \u2264 1", texts)
-        self.assertFalse([text for text in texts if "along the profile" in text])
-
-    def test_a_graph_keeps_its_curvatures_though_it_moves(self):
         def moving(time):
             return tube(time, 0.2) | {"u_n": np.ones(65)}
 
-        texts = self.drawn(write(self.folder / "a.hdf", profile=moving))
-        self.assertTrue([text for text in texts if text.startswith("mean curvature")])
+        for options, words, never in (
+            ({"profile": ball, "kinetic": True, "sets": ['model.kind="fluid"'], "times": [0, 0.5, 1]},
+             ("at rest", "|u\u2099| \u2264 2", "|u\u209c| \u2264 1", "|u\u209c| \u2264 0.5", energy.KINETIC, "energy", "normal velocity...",
+              "velocity u\u209c along the profile..."), ["mean curvature"]),
+            ({"profile": ball, "kinetic": True, "sets": ['model.kind="stokes"']}, ["bending energy E"], [energy.KINETIC]),  # no inertia
+            ({"profile": turning, "times": [0], "rows": 0}, ["|u\u03b8| \u2264 3"], ["at rest"]),
+            ({"profile": overhanging, "times": [0, 1]}, ["|u\u2099| \u2264 1"], ["along the profile"]),
+            ({"profile": moving}, ["mean curvature..."], []),  # a graph
+        ):  # fmt: skip
+            with self.subTest(options=options):
+                self.check_words(self.drawn(self.write(**options)), *words, never=never)
 
-    def test_stationary_shapes_have_numbers_and_curvatures(self):
+    def test_equilibria_have_numbers_and_curvatures(self):
         def at_rest(time):
             return {name: values for name, values in ball(0.0).items() if not name.startswith("u_")}
 
         sets = ['equilibrium.branch.vary="equilibrium.reduced_volume"']
-        file = write(self.folder / "a.hdf", profile=at_rest, sets=sets, times=[0, 1, 2], rows=3)
+        file = self.write(profile=at_rest, sets=sets, times=[0, 1, 2], rows=3)
         with h5py.File(file, "a") as f:
             for number, frame in enumerate(f["frames"].values()):
                 frame.attrs["parameter"] = 0.9 - 0.1 * number
-        texts = self.drawn(file)
         bar = "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves), white: H\u2080 = \u22122"
-        for words in (bar, "shape 2", "number of the shape", "= 0.7"):
-            self.assertIn(words, "\n".join(texts).split("\n"))
-        self.assertFalse([text for text in texts if text.startswith("t\u2081")])
-        single = write(self.folder / "b.hdf", profile=at_rest, sets=["equilibrium.area=1"], times=[0], rows=1)
-        self.assertNotIn("bending energy E", self.drawn(single))
-
-    def test_small_changes_of_a_large_energy_are_ticks_from_a_round_number(self):
-        file = write(self.folder / "a.hdf")
-        with h5py.File(file, "a") as f:
-            f["series/energy"][:] = 37.69923 + 1e-5 * f["series/time"][:]
-        texts = self.drawn(file, "--kind", "energy")
-        self.assertIn("(bending energy E \u2212 37.6992) / 10\u207b\u2075", texts)
-        self.assertIn("3", texts)  # 37.69923
-
-    def test_numbers_far_from_one(self):
-        found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
-        expected = ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"]
-        self.assertEqual(found, expected)
+        self.check_words(self.drawn(file), bar, "shape 2", "number of the shape", "= 0.7", never=["t\u2081"])
+        single = self.write("b.hdf", profile=at_rest, sets=["equilibrium.area=1"], times=[0], rows=1)
+        self.check_words(self.drawn(single), never=["bending energy E"])
 
 
 class Films(InFolder):
@@ -462,7 +406,7 @@ class Films(InFolder):
             return [np.asarray(frame.convert("RGB"), int) for frame in ImageSequence.Iterator(film)]
 
     def test_shape_and_point_on_the_energy_move_and_nothing_else(self):
-        path = write(self.folder / "a.hdf", times=(0, 0.5, 1), profile=lambda t: tube(t, 0.3 * (1 - t)))
+        path = self.write(times=(0, 0.5, 1), profile=lambda t: tube(t, 0.3 * (1 - t)))
         first, second, last = self.frames(self.film("a.gif", path))
         self.assertEqual(first.shape, (450, 800, 3))
         changed = (np.abs(first - last).max(axis=2) > 60).any(axis=0).nonzero()[0]
@@ -477,7 +421,7 @@ class Films(InFolder):
         self.assertFalse(list(self.folder.glob("*.part*")))
 
     def test_small_times_do_not_overlap(self):
-        path = write(self.folder / "a.hdf", times=(0, 1e-4))
+        path = self.write(times=(0, 1e-4))
         result = results.read_result(path)
         stage = movie.Stage(result, result.frames, "H", "")
         FigureCanvasAgg(stage.figure).draw()
@@ -489,14 +433,14 @@ class Films(InFolder):
             self.assertLess(one.x1 + 4, next_one.x0)
 
     def test_mp4(self):
-        path = write(self.folder / "a.hdf", times=(0, 1))
+        path = self.write(times=(0, 1))
         with unittest.mock.patch.dict(os.environ, PATH="/nowhere"):
             self.refused("install the package ffmpeg", path, "--movie", self.folder / "a.mp4", status=4)
         if shutil.which("ffmpeg"):
             self.assertEqual(self.film("a.mp4", path).read_bytes()[4:8], b"ftyp")
 
     def test_interrupted_film_leaves_nothing(self):
-        path = write(self.folder / "a.hdf", times=list(np.linspace(0, 1, 200)))
+        path = self.write(times=list(np.linspace(0, 1, 200)))
         command = ["/usr/bin/python3", "-B", PLOT, "plot", path, "--movie", self.folder / "a.gif"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             while process.poll() is None and not process.stderr.readline().startswith("frame"):
@@ -540,38 +484,16 @@ class Refusals(InFolder):
         self.refused("other.hdf: is not a result of tubule (it has no /case)", self.folder / "other.hdf")
 
     def test_damaged_records(self):
-        def damaged(change, words):
-            path = write(self.folder / "damaged.hdf")
-            with h5py.File(path, "a") as file:
-                change(file)
-            self.refused(words, path)
-
-        def short(file):
-            del file["frames/000001/r"]
-            file["frames/000001/r"] = np.ones(3)
-
-        def nan(file):
-            file["frames/000001/H"][3] = np.nan
-
-        def lack(file):
-            del file["frames/000001/K"]
-
-        def ragged(file):
-            del file["series/energy"]
-            file["series/energy"] = np.ones(3)
-
-        def text(file):
-            file["resolved_case"][()] = "[energy"
-
-        def short_velocity(file):
-            file["frames/000001/u_t"] = np.ones(3)
-
-        damaged(short, "frame 000001: z, r, H, K must be lists of one length")
-        damaged(short_velocity, "frame 000001: z, r, H, K, u_t must be lists of one length")
-        damaged(nan, "/frames/000001/H contains numbers that are not finite")
-        damaged(lack, "frame 000001 lacks K")
-        damaged(ragged, "series of different lengths")
-        damaged(text, "its case is not valid TOML")
+        for changes, words in (
+            ({"frames__000001__r": np.ones(3)}, "frame 000001: z, r, H, K must be lists of one length"),
+            ({"frames__000001__H": np.full(65, np.nan)}, "/frames/000001/H contains numbers that are not finite"),
+            ({"frames__000001__K": None}, "frame 000001 lacks K"),
+            ({"series__energy": np.ones(3)}, "series of different lengths"),
+            ({"resolved_case": "[energy"}, "its case is not valid TOML"),
+        ):
+            self.refused(words, replaced(self.write("damaged.hdf"), **changes))
+        short = self.write("short.hdf", profile=lambda t: tube(t, 0.2) | {"u_t": np.ones(3)})
+        self.refused("frame 000000: z, r, H, K, u_t must be lists of one length", short)
 
     def test_values_that_the_file_does_not_hold(self):
         """Links to other files, values in them, and more values than the file has bytes: refused by every reader."""
@@ -615,17 +537,13 @@ class Refusals(InFolder):
                     self.assertNotIn("Traceback", done.stderr)
 
     def test_titles_that_no_picture_holds(self):
-        path = write(self.folder / "a.hdf")
-        with h5py.File(path, "a") as file:
-            file["resolved_case"][()] = CASE.format(k42=0).replace("A made-up tube", "x" * 200000)
-        done = scripts.run_script(PLOT, "plot", path, "-o", self.folder / "a.svg")
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertIn("x" * 197 + "...", svg_texts(self.folder / "a.svg"))
+        path = replaced(self.write(), resolved_case=CASE.format(k42=0).replace("A made-up tube", "x" * 200000))
+        self.check_words(self.drawn(path), "x" * 197 + "...")
 
     @unittest.skipUnless(sys.argv[1:], "needs the program")
     def test_interrupts_while_libraries_are_imported(self):
         """Of Python itself, and of ours: the process ends as the program does, without a word."""
-        path = write(self.folder / "a.hdf")
+        path = self.write()
         for module in ("sitecustomize", "h5py"):
             folder = self.folder / module
             folder.mkdir()
@@ -635,12 +553,12 @@ class Refusals(InFolder):
             self.assertEqual((done.returncode, done.stdout, words), (130, "", []))
 
     def test_nothing_to_draw(self):
-        self.refused("no profiles to draw", write(self.folder / "a.hdf", times=[]), "--kind", "profiles")
-        self.refused("no energy series to draw", write(self.folder / "a.hdf", rows=0), "--kind", "energy")
-        self.refused("neither frames nor an energy series", write(self.folder / "a.hdf", rows=0, times=[]))
+        self.refused("no profiles to draw", self.write(times=[]), "--kind", "profiles")
+        self.refused("no energy series to draw", self.write(rows=0), "--kind", "energy")
+        self.refused("neither frames nor an energy series", self.write(rows=0, times=[]))
 
     def test_arguments(self):
-        file = write(self.folder / "a.hdf")
+        file = self.write()
         self.refused("is not a list of numbers", file, "--times", "0,x")
         self.refused("has no series r_mni; it has energy", file, "--series", "r_mni")
         self.refused("time; did you mean energy_40 or", file, "--series", "enrgy_40")
@@ -664,25 +582,86 @@ class Refusals(InFolder):
         self.assertIn("has no h5py; install the package python3-h5py", done.stderr)
 
 
-class Validation(InFolder):
-    HEAD = "surface,mesh,k,recovery,h,H,K,grad_H,grad_K\n"
-    ROW = "dumbbell,structured,3,{},{},{},2e-3,3e-2,4e-2\n"
+class FiguresOfDocs(InFolder):
+    """docs/figures/*.py, which draw tables."""
 
-    def draw(self, text):
+    CURVATURE = "surface,mesh,k,recovery,h,H,K,grad_H,grad_K\n"
+    CURVATURE_ROW = "dumbbell,structured,3,{},{},{},2e-3,3e-2,4e-2\n"
+    CURVATURE_ROWS = "".join(f"dumbbell,structured,3,{name},{h},{1e-3 * h},2e-3,3e-2,4e-2\n"
+                             for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2))  # fmt: skip
+    WORK = "series,energy_asked,error,estimate,cpu_ms\n"
+    WORK_ROWS = '"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
+    STEPS = "part,order,triangles,measure,clock,threads,whole,analysis,factors,iterations,fill,residual\n"
+    STEP_ROWS = (
+        "solvers,3,320,a step,cpu,1,70,0,0,0,0,0\n"
+        '"solvers",3,320,"its system, with border",cpu,1,30,0,0,5,0,0\n'
+        "solvers,3,320,some factors,cpu,1,28,4,16,5,1e6,1e-12\n"
+        "lagged,3,320,factors kept for 1,cpu,1,28,0,16,5,0,0\n"
+        "lagged,3,320,factors kept for 8,cpu,1,42,0,2,19,0,0\n"
+    )
+    THREAD_ROWS = "threads,3,320,a step,wall,1,70,0,0,0,0,0\nthreads,3,320,a step,wall,2,50,0,0,0,0,0\n"
+    FLUID = "model,series,asked,error,estimate,cpu_s\n"
+    FLUID_ROWS = (
+        "{0},reference,0,1e-5,1e-5,9\n"
+        "{0},accuracy asked for,1e-3,2e-4,4e-4,3\n"
+        '{0},"material, order 5",0,1e-3,2e-3,1\n'
+        '{0},"even, order 5",0,1e-2,2e-3,0.5\n'
+    )
+
+    def draw(self, script, text):
         table = self.folder / "table.csv"
         table.write_text(text)
-        return scripts.run_script(PLOT, FIGURES / "validation.py", table, "-o", self.folder / "v.svg")
+        return scripts.run_script(PLOT, FIGURES / f"{script}.py", table, "-o", self.folder / "v.svg")
 
-    def test_figure(self):
-        rows = [self.ROW.format(name, h, 1e-3 * h) for name in ("elementwise", "patch", "unknown") for h in (0.1, 0.2)]
-        done = self.draw(self.HEAD + "".join(rows))
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        texts = svg_texts(self.folder / "v.svg")
-        for words in ("patch recovery, the default", "longest edge h", "h\u2074", "\u2207K"):
-            self.assertIn(words, texts)
-        table = validation.read_table(self.folder / "table.csv")
-        self.assertEqual(table[3, "patch", "H"], [(0.2, 2e-4), (0.1, 1e-4)])  # coarse first
-        self.assertNotIn((3, "unknown", "H"), table)
+    def test_figures(self):
+        both = self.FLUID_ROWS.format("fluid") + self.FLUID_ROWS.format("stokes")
+        for script, text, words, never in (
+            ("validation", self.CURVATURE + self.CURVATURE_ROWS, ("patch recovery, the default", "longest edge h", "h\u2074", "\u2207K"), []),
+            ("work_precision", self.WORK + self.WORK_ROWS, ("k42 = 0", "prototype, tuned by hand", "asked: 1e-4", "asked: 1e-6"), []),
+            # The factors' own time beside their bar; iterations of the factors that are kept longest.
+            ("step_costs", self.STEPS + self.STEP_ROWS + self.THREAD_ROWS,
+             ("some factors", "28 of 68", "k = 3, 320 triangles", "19", "rest of the step", "two threads"), []),
+            ("step_costs", self.STEPS + self.STEP_ROWS, ["some factors"], ["two threads"]),
+            ("work_precision_fluid", self.FLUID + both,
+             ("fluid, with inertia", "Stokes flow", "material, order 5", "even, order 5", "requested accuracy"), []),
+        ):  # fmt: skip
+            with self.subTest(script):
+                done = self.draw(script, text)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                self.check_words(svg_texts(self.folder / "v.svg"), *words, never=never)
+
+    def test_refusals(self):
+        columns = "must have the columns"
+        for script, text, words in (
+            ("validation", "a,b\n1,2\n", columns),
+            ("validation", self.CURVATURE + self.CURVATURE_ROW.format("patch", 0.1, "small"), columns),
+            ("validation", self.CURVATURE + self.CURVATURE_ROW.format("patch", 0.1, 0), "positive numbers"),
+            ("validation", self.CURVATURE, "has no rows"),
+            ("work_precision", "a,b\n1,2\n", columns),
+            ("work_precision", self.WORK + "x,1,2,3,fast\n", columns),
+            ("work_precision", self.WORK + "x,1,2,3,-1\n", "negative or not finite"),
+            ("work_precision", self.WORK, "has no rows"),
+            ("step_costs", "a,b\n1,2\n", columns),
+            ("step_costs", self.STEPS + self.STEP_ROWS.replace("70", "nan"), "negative or not finite"),
+            ("step_costs", self.STEPS + self.STEP_ROWS.replace("solvers", "other"), "has no rows of solvers"),
+            ("work_precision_fluid", "a,b\n1,2\n", columns),
+            ("work_precision_fluid", self.FLUID + "fluid,reference,0,1e-5,fast,9\n", columns),
+            ("work_precision_fluid", self.FLUID + "gas,reference,0,1e-5,1e-5,9\n", "has no reference, or no other run, of fluid"),
+            ("work_precision_fluid", self.FLUID + self.FLUID_ROWS.format("fluid"), "has no reference, or no other run, of stokes"),
+        ):
+            with self.subTest(script=script, words=words):
+                done = self.draw(script, text)
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(words, done.stderr)
+
+    def test_tables_are_read_coarse_first(self):
+        table = self.folder / "table.csv"
+        table.write_text(self.CURVATURE + self.CURVATURE_ROWS)
+        read = validation.read_table(table)
+        self.assertEqual(read[3, "patch", "H"], [(0.2, 2e-4), (0.1, 1e-4)])
+        self.assertNotIn((3, "unknown", "H"), read)
+        table.write_text(self.WORK + self.WORK_ROWS)
+        self.assertEqual([row[0] for row in work_precision.read_table(table)["k42 = 0"]], [1e-4, 1e-6])
 
     def test_surface_has_the_area_of_the_papers_and_the_curvature_of_a_sphere(self):
         # 5.176926500756, and INT K = 4 pi: rings of the profile by the midpoint rule.
@@ -694,142 +673,26 @@ class Validation(InFolder):
         self.assertTrue(np.all(H < -np.sqrt(np.maximum(4 * K, 0)) + 1e-9))  # outward normal; H^2 >= 4 K
         np.testing.assert_allclose(nr**2 + nz**2, 1, atol=1e-12)
 
-    def test_refusals(self):
-        for text, words in (
-            ("a,b\n1,2\n", "must have the columns"),
-            (self.HEAD + self.ROW.format("patch", 0.1, "small"), "must have the columns"),
-            (self.HEAD + self.ROW.format("patch", 0.1, 0), "positive numbers"),
-            (self.HEAD, "has no rows"),
-        ):
-            done = self.draw(text)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(words, done.stderr)
-
-
-class WorkPrecision(InFolder):
-    def draw(self, text):
-        table = self.folder / "table.csv"
-        table.write_text(text)
-        return scripts.run_script(PLOT, FIGURES / "work_precision.py", table, "-o", self.folder / "w.svg")
-
-    def test_chart(self):
-        rows = 'series,energy_asked,error,estimate,cpu_ms\n"k42 = 0",1e-6,1e-7,4e-7,1.2\n"k42 = 0",1e-4,0,4e-5,0.4\n'
-        done = self.draw(rows)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        texts = svg_texts(self.folder / "w.svg")
-        for words in ("k42 = 0", "prototype, tuned by hand", "asked: 1e-4", "asked: 1e-6"):
-            self.assertIn(words, texts)
-        table = work_precision.read_table(self.folder / "table.csv")
-        self.assertEqual([row[0] for row in table["k42 = 0"]], [1e-4, 1e-6])  # coarse first
-
-    def test_refusals(self):
-        for text, words in (
-            ("a,b\n1,2\n", "must have the columns"),
-            ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,fast\n", "must have the columns"),
-            ("series,energy_asked,error,estimate,cpu_ms\nx,1,2,3,-1\n", "negative or not finite"),
-            ("series,energy_asked,error,estimate,cpu_ms\n", "has no rows"),
-        ):
-            done = self.draw(text)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(words, done.stderr)
-
-
-class StepCosts(InFolder):
-    HEADER = "part,order,triangles,measure,clock,threads,whole,analysis,factors,iterations,fill,residual\n"
-    ROWS = (
-        "solvers,3,320,a step,cpu,1,70,0,0,0,0,0\n"
-        '"solvers",3,320,"its system, with border",cpu,1,30,0,0,5,0,0\n'
-        "solvers,3,320,some factors,cpu,1,28,4,16,5,1e6,1e-12\n"
-        "lagged,3,320,factors kept for 1,cpu,1,28,0,16,5,0,0\n"
-        "lagged,3,320,factors kept for 8,cpu,1,42,0,2,19,0,0\n"
-        "threads,3,320,a step,wall,1,70,0,0,0,0,0\n"
-        "threads,3,320,a step,wall,2,50,0,0,0,0,0\n"
-    )
-
-    def draw(self, text):
-        table = self.folder / "table.csv"
-        table.write_text(text)
-        return scripts.run_script(PLOT, FIGURES / "step_costs.py", table, "-o", self.folder / "s.svg")
-
-    def test_chart(self):
-        done = self.draw(self.HEADER + self.ROWS)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        texts = svg_texts(self.folder / "s.svg")
-        # The factors' own time beside their bar; iterations of the factors that are kept longest.
-        for words in ("some factors", "28 of 68", "k = 3, 320 triangles", "19", "rest of the step", "two threads"):
-            self.assertIn(words, texts)
-
-    def test_without_threads(self):
-        done = self.draw(self.HEADER + "".join(r for r in self.ROWS.splitlines(True) if not r.startswith("threads")))
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertNotIn("two threads", svg_texts(self.folder / "s.svg"))
-
-    def test_refusals(self):
-        for text, words in (
-            ("a,b\n1,2\n", "must have the columns"),
-            (self.HEADER + self.ROWS.replace("70", "nan"), "negative or not finite"),
-            (self.HEADER + self.ROWS.replace("solvers", "other"), "has no rows of solvers"),
-        ):
-            done = self.draw(text)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(words, done.stderr)
-
-
-class WorkPrecisionFluid(InFolder):
-    HEADER = "model,series,asked,error,estimate,cpu_s\n"
-    ROWS = (
-        "{0},reference,0,1e-5,1e-5,9\n"
-        "{0},accuracy asked for,1e-3,2e-4,4e-4,3\n"
-        '{0},"material, order 5",0,1e-3,2e-3,1\n'
-        '{0},"even, order 5",0,1e-2,2e-3,0.5\n'
-    )
-
-    def draw(self, text):
-        table = self.folder / "table.csv"
-        table.write_text(text)
-        return scripts.run_script(PLOT, FIGURES / "work_precision_fluid.py", table, "-o", self.folder / "w.svg")
-
-    def test_chart(self):
-        done = self.draw(self.HEADER + self.ROWS.format("fluid") + self.ROWS.format("stokes"))
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        texts = svg_texts(self.folder / "w.svg")
-        for words in ("fluid, with inertia", "Stokes flow", "material, order 5", "even, order 5", "requested accuracy"):
-            self.assertIn(words, texts)
-
     def test_only_runs_that_none_beats_are_drawn(self):
         runs = [SimpleNamespace(error=error, cpu_s=cpu) for error, cpu in ((1, 1), (2, 2), (0.5, 3), (0.6, 1.5))]
         self.assertEqual([(run.error, run.cpu_s) for run in work_precision_fluid.best(runs)], [(1, 1), (0.6, 1.5), (0.5, 3)])
-
-    def test_refusals(self):
-        for text, words in (
-            ("a,b\n1,2\n", "must have the columns"),
-            (self.HEADER + "fluid,reference,0,1e-5,fast,9\n", "must have the columns"),
-            (self.HEADER + "gas,reference,0,1e-5,1e-5,9\n", "has no reference, or no other run, of fluid"),
-            (self.HEADER + self.ROWS.format("fluid"), "has no reference, or no other run, of stokes"),
-        ):
-            done = self.draw(text)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(words, done.stderr)
 
 
 class Command(InFolder):
     """`tubule plot` itself; in the suite only where the program is given."""
 
-    def test_labels_and_formulas_come_through(self):
-        files = [write(self.folder / f"{i}.hdf", k42=k42) for i, k42 in enumerate((0.06, 0.12))]
+    def test_labels_formulas_and_exit_status_come_through(self):
+        files = [self.write(f"{i}.hdf", k42=k42) for i, k42 in enumerate((0.06, 0.12))]
         texts = self.drawn("--times", "0,0.2", *files, program=TUBULE)
-        for words in ("k\u2084\u2082 = 0.06", "k\u2084\u2082K\u00b2", "t\u2081 = 0.2"):
-            self.assertIn(words, texts)
-
-    def test_exit_status(self):
+        self.check_words(texts, "k\u2084\u2082 = 0.06", "k\u2084\u2082K\u00b2", "t\u2081 = 0.2")
         self.refused("missing.hdf", self.folder / "missing.hdf", program=TUBULE)
-        self.refused("no result has a frame", write(self.folder / "a.hdf"), "--times", "7", program=TUBULE)
+        self.refused("no result has a frame", files[0], "--times", "7", program=TUBULE)
 
 
 def load_tests(loader, suite, pattern):
     if TUBULE:
         return suite
-    cases = (Labels, Columns, Scales, Pictures, Curves, Refusals, WorkPrecision)
+    cases = (Labels, Columns, Scales, Pictures, Curves, Refusals, FiguresOfDocs)
     return unittest.TestSuite(loader.loadTestsFromTestCase(case) for case in cases)
 
 
