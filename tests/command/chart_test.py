@@ -66,7 +66,7 @@ class Charts(ProgramTest):
 
 class RealRuns(Charts):
     def test_a_chart_of_accuracies(self):
-        """Of three accuracies the smallest is the reference; the others meet theirs. A second call runs nothing."""
+        """The smallest of three accuracies is the reference; the others meet theirs. A second call runs nothing."""
         command = ("chart", self.case, "--vary", "accuracy.energy=1e-1,1e-3,1e-7")
         out, err = self.tubule(*command)
         self.assertEqual(err.count("finished"), 3)

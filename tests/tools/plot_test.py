@@ -453,14 +453,14 @@ class Films(InFolder):
     def test_profile_becomes_a_surface(self):
         for profile, area in ((ball(0, 201), 4 * np.pi), (tube(0, 0.0), 4 * np.pi)):
             frame = results.Frame(0.0, *(profile[name] for name in ("z", "r", "H", "K")))
-            points, normal, values, closed = movie.revolved(frame, frame.H)
-            a, b, c = (points[:, i] for i in range(3))
+            surface = movie.as_surface(frame, "H")
+            a, b, c = (surface.points[:, i] for i in range(3))
             twice = np.cross(b - a, c - a)
             self.assertAlmostEqual(np.linalg.norm(twice, axis=1).sum() / 2 / area, 1, delta=3e-3)
             solid = np.linalg.norm(twice, axis=1) > 1e-9
-            self.assertTrue((np.einsum("ij,ij->i", twice, normal.mean(axis=1))[solid] > 0).all())  # seen from outside
-            self.assertEqual(closed, profile["r"][0] < 1e-9)
-            np.testing.assert_allclose(values, frame.H[0], atol=1e-6)
+            self.assertTrue((np.einsum("ij,ij->i", twice, surface.normal.mean(axis=1))[solid] > 0).all())  # seen from outside
+            self.assertEqual(surface.closed, profile["r"][0] < 1e-9)
+            np.testing.assert_allclose(surface.H, frame.H[0], atol=1e-6)
 
     def test_refusals(self):
         one, two = write(self.folder / "one.hdf", times=(0,)), write(self.folder / "two.hdf")
@@ -542,7 +542,7 @@ class Refusals(InFolder):
 
     @unittest.skipUnless(sys.argv[1:], "needs the program")
     def test_interrupts_while_libraries_are_imported(self):
-        """Of Python itself, and of ours: the process ends as the program does, without a word."""
+        """Imports of Python itself, and ours: the process ends as the program does, without a word."""
         path = self.write()
         for module in ("sitecustomize", "h5py"):
             folder = self.folder / module

@@ -112,8 +112,8 @@ class Pages(Folder):
         self.assertEqual([axis["key"] for axis in data["axes"]], ["energy.k42", "shape.mode.0.amplitude"])
 
     def test_error_that_is_unknown_is_no_number(self):
-        self.assertEqual(view.told({"estimated_error": 1.0})["estimated_error"], "unknown")
-        self.assertEqual(view.told({"estimated_error": 2e-5})["estimated_error"], "2e-05 of E_ref")
+        self.assertEqual(view.ending({"estimated_error": 1.0})["estimated_error"], "unknown")
+        self.assertEqual(view.ending({"estimated_error": 2e-5})["estimated_error"], "2e-05 of E_ref")
 
     def test_triangles_between_nodes_cover_each_cell_once(self):
         corners = np.array([(0, 0), (1, 0), (0, 1)], float)

@@ -26,7 +26,7 @@ def run(case, *, output: str | os.PathLike | None = None, overwrite: bool = Fals
     """Runs a case of any tier, or finds its equilibria, in this process.
 
     case      a Case, or what Case takes
-    output    a result file, written as the run goes on: a kill loses nothing. Without it all stays in memory
+    output    a result file, written during the run: a kill loses the last seconds. Without it all stays in memory
     overwrite replace the result of another case in that file, which is refused otherwise
     progress  called with (time, energy, step) at most ten times a second; what it raises ends the run
     threads   for loops over elements of tier surface3d, at most one a processor; 0: one a processor
@@ -149,7 +149,7 @@ class Scan:
 
     keys, values   of each axis
     outcome        "uniform-tube", "pinched" ... (docs/scans.md)
-    others         measures by name, such as energy, time, energy_error; NaN where a run does not tell
+    others         measures by name, such as energy, time, energy_error; NaN where a run has none
     file           the result file, or None
     """
 

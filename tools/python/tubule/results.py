@@ -56,7 +56,7 @@ class Frame:
         return self.arrays[name]
 
     def profile(self, points: int = 401) -> tuple[np.ndarray, np.ndarray]:
-        """(r, z) of an axisymmetric shape; graphs r(z) at so many points of a period, others as they were written."""
+        """(r, z) of an axisymmetric shape; graphs r(z) at this number of points of a period, others as they were written."""
         r, z, _ = self._core.profile(self._number, points)
         return r, z
 
@@ -224,6 +224,6 @@ def _from_image(image: bytes, name: str) -> Result:
 
 
 def read(file: str | os.PathLike) -> Result:
-    """A result file, also of a run that goes on or was killed. Raises RuntimeError if it is none."""
+    """A result file, also of a run that has not ended or was killed. Raises RuntimeError if it is none."""
     name = file_name(file)
     return Result(_core.read_result(name), name)

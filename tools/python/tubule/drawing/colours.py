@@ -8,7 +8,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from .labels import number
+from .labels import number, power
 
 COVERED = 0.98  # part of the membrane area whose curvature is inside the colour scale
 MARGIN = 1.25  # the colour scale extends beyond that by this factor
@@ -52,6 +52,11 @@ def curvature_colours(results, frames, areas):
     H = Colours("PuOr", *colour_scale([frame.H.ravel() for frame in frames], areas, centre), label)
     K = Colours("RdBu_r", *colour_scale([frame.K.ravel() for frame in frames], areas, 0.0), "Gaussian curvature K{}")
     return H, K
+
+
+def pressure_colours(values, areas):
+    mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
+    return Colours("PRGn", *colour_scale(values, areas, mean), f"pressure p, white: its mean {power(mean, 3)}")
 
 
 def draw_bars(figure, bottom, H, K, H_where="", K_where=""):

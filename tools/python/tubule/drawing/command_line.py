@@ -104,7 +104,7 @@ class Parser(argparse.ArgumentParser):
         self.option("-h", "--help", type=None, help="Print this help message and exit")
 
     def option(self, *names, help, type=str, metavar="TEXT", words=(), **more):
-        """Of `type` None: a flag. `words`: the only ones of which its value consists."""
+        """With `type` None it is a flag. `words`: the only ones of which its value consists."""
         more = {"action": "store_true"} if type is None else {"type": type, "metavar": metavar, **more}
         self.add_argument(*names, help=help, **more).words = words
 
@@ -246,7 +246,7 @@ def chart():
 
 
 def plot_options(words):
-    """Of `tubule plot`, and of draw() in Python. Raises BadInput."""
+    """The options of `tubule plot`, and of draw() in Python. Raises BadInput."""
     options = plot().parsed(words)
     for name in options.results if options.times else ():  # "--times 0 0.1 10"
         if re.fullmatch(r"[-+.\deE]+", name) and not os.path.exists(name):
@@ -265,7 +265,7 @@ COMMANDS = {"plot": plot_options, "view": lambda words: view().parsed(words), "c
 
 
 def say(words, out=None):
-    """Prints words, by default to stderr. Nothing depends on them: where they cannot be written, it goes on without."""
+    """Prints words, by default to stderr. Nothing depends on them: where they cannot be written, they are left out."""
     out = out or sys.stderr
     try:
         print(words, file=out, flush=True)

@@ -5,7 +5,7 @@ from matplotlib.patches import FancyArrowPatch
 
 LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
 STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
-ROUNDING = 1e-6  # lengths per unit of time: speeds of a start at rest
+ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape at rest
 NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is only rounding of normals
 VELOCITY = "RdBu_r"
 SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -15,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import flow, raster
-from .colours import Colours, colour_scale, curvature_colours, draw_bar
+from .colours import Colours, curvature_colours, draw_bar, pressure_colours
 from .command_line import Unavailable, say
-from .labels import number, power, symbol
-from .results import BadInput
+from .labels import number, symbol
+from .results import BadInput, Surface
 from .style import draw_scale_bar, line_colours, time_text
 from .surfaces import node_areas
 from .tubes import ring_areas
@@ -30,19 +29,11 @@ FORMATS = (".mp4", ".gif")
 SAY_EVERY = 5.0  # seconds between lines about the progress, off a terminal
 
 
-@dataclass
-class Picture:
-    """What is drawn of a frame: triangles as results.Surface has them, and one number for each node."""
-
-    order: int
-    closed: bool
-    points: np.ndarray
-    normal: np.ndarray
-    values: np.ndarray
-
-
-def revolved(frame, values):
-    """The surface of revolution of a profile, as flat triangles with the normals of the profile."""
+def as_surface(frame, name):
+    """The frame; the surface of revolution of a profile with this field: flat triangles with the normals of the profile."""
+    if isinstance(frame, Surface):
+        return frame
+    values = getattr(frame, name)
     step = np.hypot(np.diff(frame.r), np.diff(frame.z))
     along = np.concatenate([[0], np.cumsum(step)])
     places = np.linspace(0, along[-1], ALONG + 1)
@@ -63,29 +54,15 @@ def revolved(frame, values):
     poles = max(frame.r[0], frame.r[-1]) < 1e-6 * frame.r.max()
     ring = np.hypot(frame.r[0] - frame.r[-1], frame.z[0] - frame.z[-1]) < 1e-6 * frame.r.max()  # a torus
     values_there = np.broadcast_to(v[:, None], (v.size, angle.size))
-    return triangles(grid(r, z)), triangles(grid(*way.T)), triangles(values_there), poles or ring
-
-
-def picture(frame, name):
-    values = getattr(frame, name)
-    if hasattr(frame, "order"):
-        return Picture(frame.order, frame.closed, frame.points, frame.normal, values)
-    points, normal, values, closed = revolved(frame, values)
-    return Picture(1, closed, points, normal, values)
-
-
-def extent(frame, view):
-    """Corners of what the frame covers in the picture."""
-    if hasattr(frame, "order"):
-        return view.extent(frame.points.reshape(-1, 3))
-    return view.extent(revolved(frame, frame.H)[0].reshape(-1, 3))
+    there = triangles(values_there)
+    return Surface(frame.time, 1, bool(poles or ring), triangles(grid(r, z)), triangles(grid(*way.T)), **{"H": there, "K": there, name: there})
 
 
 def colours_of(result, frames, name):
     """One scale for all frames."""
     if any(getattr(frame, name, None) is None for frame in frames):
         raise BadInput(f"--colour: not all frames have {name}")
-    areas = [(node_areas if hasattr(frame, "order") else ring_areas)(frame).ravel() for frame in frames]
+    areas = [(node_areas if isinstance(frame, Surface) else ring_areas)(frame).ravel() for frame in frames]
     if name in "HK":
         colours = curvature_colours([result], frames, areas)["HK".index(name)]
         colours.label = colours.label.format("")
@@ -95,8 +72,7 @@ def colours_of(result, frames, name):
         largest = max(float(np.abs(v).max()) for v in values) or 1.0
         label = f"normal velocity {flow.SYMBOLS['u_n']}, > 0: outward"
         return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
-    mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
-    return Colours("PRGn", *colour_scale(values, areas, mean), f"pressure p, white: its mean {power(mean, 3)}")
+    return pressure_colours(values, areas)
 
 
 class Stage:
@@ -106,7 +82,7 @@ class Stage:
         self.result, self.frames, self.quantity = result, frames, name
         self.colours = colours_of(result, frames, name)
         self.view = raster.View()
-        ends = [extent(frame, self.view) for frame in frames]
+        ends = [self.view.extent(as_surface(frame, "H").points.reshape(-1, 3)) for frame in frames]
         self.low, self.high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
         self.scale = min(np.array(BOX[2:]) / (self.high - self.low))  # inches per unit of length
         self.figure = Figure(figsize=SIZE)
@@ -132,37 +108,36 @@ class Stage:
 
     def _x(self, frame):
         """What the energy is drawn against: time, or the parameter of a branch."""
-        return frame.time if getattr(frame, "parameter", None) is None else frame.parameter
+        return frame.time if frame.parameter is None else frame.parameter
 
     def _draw_energy(self):
-        parameter = getattr(self.frames[0], "parameter", None) is not None
+        parameter = self.frames[0].parameter is not None
         series = self.result.series
         self.dot, key = None, "parameter" if parameter and "parameter" in series else "time"
-        self.name = str(self.result.case.get("equilibrium", {}).get("branch", {}).get("vary", "")).split(".")[-1]
+        vary = self.result.case.get("equilibrium", {}).get("branch", {}).get("vary", "") if parameter else "t"
+        self.name = symbol(vary.split(".")[-1]).replace("_", " ")
         if "energy" not in series or len(series["energy"]) < 2:
             return
         axes = self.figure.add_axes([0.66, 0.17, 0.31, 0.68])
         axes.plot(series[key], series["energy"], color=line_colours(1)[0])
         axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))  # few: numbers of small times are long
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-        axes.set(xlabel=symbol(self.name).replace("_", " ") if parameter else "time t", ylabel="energy E")
+        axes.set(xlabel=self.name if parameter else "time t", ylabel="energy E")
         (self.dot,) = axes.plot([], [], "o", color="C3", markersize=6)
         self.energy = np.asarray(series[key]), np.asarray(series["energy"])
 
     def draw(self, index):
         frame = self.frames[index]
-        shape = picture(frame, self.quantity)
+        shape = as_surface(frame, self.quantity)
         width, height = self.pixels
         per_unit = self.scale * DPI * raster.OVERSAMPLING
         samples = raster.sample(
-            shape.points, shape.normal, shape.values[..., None], shape.order, shape.closed, self.view,
+            shape.points, shape.normal, getattr(shape, self.quantity)[..., None], shape.order, shape.closed, self.view,
             (self.low[0], self.high[1]), per_unit, width * raster.OVERSAMPLING, height * raster.OVERSAMPLING,
         )  # fmt: skip
         there = np.isfinite(samples.depth)
         self.image.set_data(raster.shaded(samples, self.colours.rgb(samples.values[there, 0])))
-        parameter = getattr(frame, "parameter", None)
-        name = "t" if parameter is None else symbol(self.name).replace("_", " ")
-        self.words.set_text(f"{name} = {time_text(self._x(frame))}")
+        self.words.set_text(f"{self.name} = {time_text(self._x(frame))}")
         if self.dot:
             x, energy = self.energy
             nearest = int(np.argmin(np.abs(x - self._x(frame))))

@@ -125,7 +125,7 @@ class Result:
 
     @property
     def last_shape_time(self):
-        """Of the last frame, which may be a profile or a surface."""
+        """The time of the last frame, which may be a profile or a surface."""
         return max((frame.time for frame in [*self.frames[-1:], *self.surfaces[-1:]]), default=0.0)
 
     @property
@@ -186,7 +186,7 @@ def opened(path):
 
 
 def values(data):
-    """Of a dataset. Raises ValueError where they are not in the file, or not all of them."""
+    """The values of a dataset. Raises ValueError where they are not in the file, or not all of them."""
     how = data.id.get_create_plist()
     if how.get_external_count() or how.get_layout() == h5py.h5d.VIRTUAL:
         raise ValueError(f"the values of {data.name} are in another file: not read")
@@ -204,7 +204,7 @@ def finite_values(data):
 
 
 def read_result(path, name=""):
-    """Of a file, or of one in memory with this name. Raises BadInput naming it if it is not a result or a record is
+    """The result in a file, or in one in memory with this name. Raises BadInput naming it if it is none or a record is
     damaged."""
     with opened(path) as file:
         if "case" not in file:
@@ -213,9 +213,9 @@ def read_result(path, name=""):
         group = file.get("series", {})
         names = [_plain(name) for name in group.attrs.get("order", group)] if group else []
         series = {name: finite_values(group[name]) for name in names}
-        told = {key: {name: str(_plain(group[name].attrs[key])) for name in names if key in group[name].attrs} for key in ("meaning", "label")}
-        labels = {name.removeprefix("energy_"): label for name, label in told["label"].items()}
-        return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), told["meaning"], labels)
+        texts = {key: {name: str(_plain(group[name].attrs[key])) for name in names if key in group[name].attrs} for key in ("meaning", "label")}
+        labels = {name.removeprefix("energy_"): label for name, label in texts["label"].items()}
+        return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), texts["meaning"], labels)
 
 
 def _case(path, file):

@@ -90,7 +90,7 @@ class Axis:
         return formula(f"k_{{{modulus[1]}}}") if modulus else NAMES.get(self.key, self.key)
 
     def place(self, value):
-        """Of a value on the axis, given as text; None if it has no such value."""
+        """The place of a value on the axis, given as text; None if it has no such value."""
         if value in self.texts:
             return self.texts.index(value)
         try:
@@ -143,7 +143,7 @@ class Scan:
             self.equal = {name: values(data) for name, data in file["equal_energies"].items()} if self.starts is not None else {}
 
     def places(self, slices):
-        """Of each axis that is cut, the place of its value: {axis number: place}."""
+        """The place of its value for each axis that is cut: {axis number: place}."""
         places = {}
         for text in slices:
             key, equals, value = text.partition("=")

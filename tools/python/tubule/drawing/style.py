@@ -76,7 +76,7 @@ def legend_beside(axes, handles, **options):
 
 
 def result_handles(labels):
-    """Of several results, the legend of their colours; one has none."""
+    """The legend of the colours of several results; one has none."""
     several = labels if len(labels) > 1 else []
     return [Line2D([], [], color=c, label=", ".join(label)) for c, label in zip(line_colours(len(labels)), several)]
 
@@ -90,7 +90,7 @@ def time_text(time):
 
 
 def time_title(index, time):
-    """Of the shapes at this time; None: of the last ones."""
+    """The words above the shapes at this time; None: above the last ones."""
     return "last state" if time is None else f"{time_name(index)} = {time_text(time)}"
 
 

@@ -1,13 +1,14 @@
 """Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K or pressure.
 With one time the quantities are side by side; else there is one column per time, with the quantities above each other."""
 
-import matplotlib.pyplot as plt
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from . import flow, raster, style
-from .colours import Colours, colour_scale, curvature_colours, draw_bar
+from .colours import Colours, curvature_colours, draw_bar, pressure_colours
 from .labels import power, wrapped
 from .results import BadInput
 from .style import WIDTH, draw_scale_bar, time_title
@@ -58,7 +59,7 @@ class Motion:
         return 0.0 if self.still(surface) else float(np.abs(surface.u_n).max())
 
     def u_t(self, surface):
-        """Likewise, 0 also where all velocity is normal."""
+        """The largest tangential speed; 0 where nothing moves, and where all velocity is normal."""
         if self.still(surface):
             return 0.0
         largest = float(np.linalg.norm(flow.tangential(surface.u, surface.normal), axis=-1).max())
@@ -75,11 +76,13 @@ class Motion:
         return "\n".join(lines) or "at rest"
 
 
+@dataclass
 class Quantity:
     """The quantity that colours a surface: its values at the nodes and its colour map."""
 
-    def __init__(self, name, symbol, colours):
-        self.name, self.symbol, self.colours = name, symbol, colours
+    name: str
+    symbol: str
+    colours: Colours
 
     def at_nodes(self, surface, motion):
         values = getattr(surface, self.name)
@@ -98,19 +101,8 @@ def quantities(names, results, surfaces):
         colours.label = colours.label.format("")
         found[name] = Quantity(name, name, colours)
     if "p" in names:
-        values = [surface.p.ravel() for surface in surfaces]
-        mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
-        label = f"pressure p, white: its mean {power(mean, 3)}"
-        found["p"] = Quantity("p", "p", Colours("PRGn", *colour_scale(values, areas, mean), label))
+        found["p"] = Quantity("p", "p", pressure_colours([surface.p.ravel() for surface in surfaces], areas))
     return [found[name] for name in names]
-
-
-class _Size:
-    """Extent of a surface in the plane of the view, in units of length; of none: nothing."""
-
-    def __init__(self, surface, view):
-        self.low, self.high = view.extent(surface.points.reshape(-1, 3)) if surface else (np.zeros(2), np.zeros(2))
-        self.width, self.height = self.high - self.low
 
 
 class SurfacePanel:
@@ -129,10 +121,11 @@ class SurfacePanel:
         self.velocity = "u_n" in names
         motions = [m for column in columns for m, surface in zip(self.motions, column.cells) if surface]
         self.arrows = self.velocity and any(motion.u_t(surface) for motion, surface in zip(motions, shown))
-        self.sizes = [[_Size(surface, self.view) for surface in column.cells] for column in columns]
-
-        widths = [max(size.width for size in column) for column in self.sizes] * (len(names) if self.beside else 1)
-        heights = [max(size.height for size in row) for row in zip(*self.sizes)]
+        # Lower and upper ends of each surface in the plane of the view, [column, row, 2, 2]; of none: nothing.
+        self.ends = np.array([[self.view.extent(s.points.reshape(-1, 3)) if s else np.zeros((2, 2)) for s in column.cells] for column in columns])
+        sizes = np.diff(self.ends, axis=2)[:, :, 0]
+        widths = list(sizes[..., 0].max(axis=1)) * (len(names) if self.beside else 1)
+        heights = list(sizes[..., 1].max(axis=0))
         pictures = 1 if self.beside else len(names)  # above each other, for every result
         self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
@@ -200,29 +193,22 @@ class SurfacePanel:
         low = self.top - self.middles[-1] - self.scale * self.heights[-1] / 2
         draw_scale_bar(axes, self.right + 0.14, low, max(self.heights) / 3, self.scale)
 
-    def _samples(self, surface, row, size):
+    def _samples(self, surface, row, ends):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
         per_pixel = self.scale * style.DPI  # pixels per unit of length
-        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in (size.width, size.height))
-        rim = (np.array([wide, tall]) / per_pixel - (size.width, size.height)) / 2
+        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in ends[1] - ends[0])
+        rim = (np.array([wide, tall]) / per_pixel - (ends[1] - ends[0])) / 2
         fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]
         if self.arrows:
             fields.append(surface.u @ self.view.axes)
         return raster.sample(
-            surface.points,
-            surface.normal,
-            np.concatenate(fields, axis=-1),
-            surface.order,
-            surface.closed,
-            self.view,
-            (size.low[0] - rim[0], size.high[1] + rim[1]),
-            per_pixel * raster.OVERSAMPLING,
-            wide * raster.OVERSAMPLING,
-            tall * raster.OVERSAMPLING,
-        )
+            surface.points, surface.normal, np.concatenate(fields, axis=-1), surface.order, surface.closed, self.view,
+            (ends[0][0] - rim[0], ends[1][1] + rim[1]),
+            per_pixel * raster.OVERSAMPLING, wide * raster.OVERSAMPLING, tall * raster.OVERSAMPLING,
+        )  # fmt: skip
 
     def _draw_surface(self, axes, surface, row, index):
-        samples = self._samples(surface, row, self.sizes[index][row])
+        samples = self._samples(surface, row, self.ends[index, row])
         there = np.isfinite(samples.depth)
         tall, wide = (extent // raster.OVERSAMPLING for extent in samples.shape)
         for picture, quantity in enumerate(self.quantities):
@@ -231,13 +217,8 @@ class SurfacePanel:
             image = raster.shaded(samples, quantity.colours.rgb(samples.values[there, picture]))
             # On whole pixels, so that nothing is drawn in between.
             left, low = round(x * style.DPI - wide / 2) / style.DPI, round(y * style.DPI - tall / 2) / style.DPI
-            axes.imshow(
-                image,
-                extent=(left, left + wide / style.DPI, low, low + tall / style.DPI),
-                interpolation="none",
-                aspect="auto",
-                zorder=2,
-            )
+            extent = (left, left + wide / style.DPI, low, low + tall / style.DPI)
+            axes.imshow(image, extent=extent, interpolation="none", aspect="auto", zorder=2)
             motion = self.motions[row]
             u_t = motion.scale(motion.u_t, surface) if quantity.name == "u_n" else 0
             if u_t:
@@ -256,7 +237,7 @@ class SurfacePanel:
         for (left, width), quantity in zip(room, self.quantities):
             colours = quantity.colours
             label = colours.label if len(room) < 3 or quantity.name == "p" else colours.label.split(" / ")[0]
-            mappable = ScalarMappable(colours.norm, plt.get_cmap(colours.map))
+            mappable = ScalarMappable(colours.norm, colours.map)
             draw_bar(figure, bottom, left, width, mappable, label, colours.extend)
         if self.arrows:
             u_t = flow.SYMBOLS["u_t"]

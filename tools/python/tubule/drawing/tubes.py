@@ -188,7 +188,7 @@ class ProfilePanel:
 
 
 class TubePanel(ProfilePanel):
-    """Of tubes r(z), as shaded bodies."""
+    """Draws tubes r(z) as shaded bodies."""
 
     def _draw_profile(self, axes, frame, x, y):
         points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))

@@ -168,7 +168,7 @@ class Scene {
   }
 }
 
-// Of all frames, so that the size on the screen does not change with time.
+// Covers all frames, so that the size on the screen does not change with time.
 function extent() {
   const profile = data.low.length === 2, reach = profile ? data.high[0] : 0;
   const low = profile ? [-reach, -reach, data.low[1]] : data.low, high = profile ? [reach, reach, data.high[1]] : data.high;
@@ -237,7 +237,7 @@ function tick(home, words, listener) {
   return box;
 }
 
-function tell_run(home) {
+function describe_run(home) {
   for (const [key, value] of Object.entries(data.about))
     element("div", {textContent: `${key.replace(/_/g, " ")}: ${value}`, className: key === "warnings" ? "warning" : ""}, home);
   const details = element("details", {}, home);
@@ -277,7 +277,7 @@ function show_shapes() {
   const value = frame => data.along === "parameter" && frame.parameter !== null ? frame.parameter : frame.time;
   const nearest = x => data.frames.reduce((best, f, i) => Math.abs(value(f) - x) < Math.abs(value(data.frames[best]) - x) ? i : best, 0);
   const plot = new Plot(element("canvas", {id: "plot"}, side), x => { slider.value = nearest(x); draw(); });
-  tell_run(side);
+  describe_run(side);
   let timer = null;
   play.addEventListener("click", () => {
     play.textContent = timer ? "play" : "stop";
@@ -298,12 +298,12 @@ function show_shapes() {
 }
 
 class Chart {
-  constructor(home, tell) {
+  constructor(home, show) {
     this.canvas = element("canvas", {id: "map"}, home);
     this.counts = data.axes.map(axis => axis.texts.length);
     if (this.counts.length === 1) this.counts.push(1);
-    this.canvas.addEventListener("pointermove", e => tell(this.point(e)));
-    this.canvas.addEventListener("click", e => tell(this.point(e), true));
+    this.canvas.addEventListener("pointermove", e => show(this.point(e)));
+    this.canvas.addEventListener("click", e => show(this.point(e), true));
   }
 
   point(e) {
@@ -356,9 +356,9 @@ function show_scan() {
   const chart = new Chart(at("shape"), (k, keep) => {
     if (k === null || (kept && !keep)) return;
     kept = kept || Boolean(keep);
-    words.textContent = told(k);
+    words.textContent = words_of(k);
   });
-  function told(k) {
+  function words_of(k) {
     const m = chart.counts[1], indices = [Math.floor(k / m), k % m], sets = [];
     data.axes.forEach((axis, i) => axis.key.split(", ").forEach((name, j) =>
       sets.push(`${name}=${axis.texts[indices[i]].split(", ")[j]}`)));
@@ -377,7 +377,7 @@ function show_scan() {
     document.body.dataset.drawn = `map of ${chart.counts[0]} x ${chart.counts[1]}, ${which.value}`;
   }
   window.addEventListener("resize", draw);
-  words.textContent = told(0);
+  words.textContent = words_of(0);
   draw();
 }
 

@@ -112,7 +112,7 @@ def finite(values):
     return [float(x) if np.isfinite(x) else None for x in values]
 
 
-def told(about):
+def ending(about):
     """How the run ended, in words."""
     out = {key: str(about[key]) for key in ("stop", "stop_message", "advice", "warnings") if str(about.get(key, ""))}
     if "estimated_error" in about:
@@ -134,7 +134,7 @@ def run_page(path):
         "title": result.title.replace(r"\$", "$"),
         "file": os.path.basename(path),
         "case": [f"{key} = {value}" for key, value in flatten(result.case).items()],
-        "about": told(result.about),
+        "about": ending(result.about),
         "along": along,
         "along_words": vary if along == "parameter" else along,
         "series": {name: finite(values) for name, values in result.series.items() if name != "wall_seconds"},
