@@ -37,24 +37,25 @@ class Rows(unittest.TestCase):
         self.assertAlmostEqual(one.order, 4, delta=1e-6)
         self.assertEqual(one.complaints(), [])
 
+    def test_complaints(self):
+        slow = {100: 1.5e-3, 400: 1e-3}  # order log2(1.5) = .585
+        for differences, more, expected in (
+            ({100: 1e-4, 200: -1e-3, 400: 2e-3}, {}, ["falls with order -2 only"]),
+            ({100: 1e-1, 400: 1.1e-2}, {}, ["differs by 0.011, more than 0.01"]),
+            ({100: 1e-1, 400: 1.1e-2}, {"bound": None}, []),
+            ({100: 1e-1, 400: float("nan")}, {"must_fall": False}, ["differs by nan, more than 0.01"]),
+            (slow, {}, ["falls with order 0.58 only"]),
+            (slow, {"must_fall": False}, []),
+            (slow, {"error": 4e-4}, []),  # the reference is not more accurate
+            (slow, {"error": 3e-4}, ["falls with order 0.58 only"]),
+        ):
+            self.assertEqual(row(differences, **more).complaints(), expected)
+
     def test_a_coarse_mesh_right_by_accident(self):
         """The order is counted from the worst of the coarser meshes: 8 times less on a mesh half as wide is 3."""
         one = row({100: 1e-4, 200: -8e-3, 800: 1e-3})
         self.assertAlmostEqual(one.order, 3, delta=1e-6)
         self.assertEqual(one.complaints(), [])
-        self.assertEqual(row({100: 1e-4, 200: -1e-3, 400: 2e-3}).complaints(), ["falls with order -2 only"])
-
-    def test_too_far_apart(self):
-        self.assertEqual(row({100: 1e-1, 400: 1.1e-2}).complaints(), ["differs by 0.011, more than 0.01"])
-        self.assertEqual(row({100: 1e-1, 400: 1.1e-2}, bound=None).complaints(), [])
-        self.assertIn("differs by nan", row({100: 1e-1, 400: float("nan")}, must_fall=False).complaints()[0])
-
-    def test_does_not_fall(self):
-        slow = {100: 1.5e-3, 400: 1e-3}  # order log2(1.5) = .585
-        self.assertEqual(row(slow).complaints(), ["falls with order 0.58 only"])
-        self.assertEqual(row(slow, must_fall=False).complaints(), [])
-        self.assertEqual(row(slow, error=4e-4).complaints(), [])  # the reference is not more accurate
-        self.assertEqual(row(slow, error=3e-4).complaints(), ["falls with order 0.58 only"])
 
     def test_tier_1_alone(self):
         alone = Row("a rate", [1.0], 1.0, 1e-5, 2e-5)

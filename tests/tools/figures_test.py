@@ -59,13 +59,9 @@ class Stale(unittest.TestCase):
             self.assertIn(stale, found, name)
             self.assertIn("commands" if name == "tools/figures" else name, found[stale])
 
-    def test_not_comments_and_layout(self):
         for name, line in (("tools/python/tubule/drawing/style.py", b"\n\n# A remark.\n"), ("cases/figure_k42_006.toml", b"\n# A remark.\n")):
-            self.assertEqual(self.found_after(name, lambda text: text + line, "axisym"), {}, name)
-
-    def test_pictures_that_no_command_makes(self):
-        found = self.found_after("docs/stray.png", lambda _: b"x")
-        self.assertIn("docs/stray.png", found)
+            self.assertEqual(self.found_after(name, lambda text: text + line, "axisym"), {}, name)  # comments and layout
+        self.assertIn("docs/stray.png", self.found_after("docs/stray.png", lambda _: b"x"))  # no command makes it
 
     def test_a_picture_is_drawn_and_noted(self):
         picture = self.top / "docs/figure_flow.svg"

@@ -206,38 +206,34 @@ class Labels(unittest.TestCase):
 
 
 class Columns(InFolder):
-    def read(self, name, **options):
-        return results.read_result(str(write(self.folder / name, **options)))
+    """Times of the columns, and the shapes in them."""
 
-    def test_six_at_most_first_and_last_kept(self):
-        times = [float(i) for i in range(31)]
-        found = [column.time for column in tubes.choose_columns([self.read("a.hdf", times=times)])]
-        self.assertEqual(found, [0, 6, 12, 18, 24, 30])
+    def columns(self, *options, times=None):
+        files = [self.write(f"{i}.hdf", **each) for i, each in enumerate(options)]
+        columns = tubes.choose_columns([results.read_result(str(file)) for file in files], times)
+        return [column.time for column in columns], columns
+
+    def test_times(self):
+        for options, wanted, expected in (
+            ([{"times": [float(i) for i in range(31)]}], None, [0, 6, 12, 18, 24, 30]),  # six at most, first and last kept
+            ([{"times": [0, 1, 2, 3]}, {"times": [0, 1.5, 2, 3]}], None, [0, 2, 3]),  # shared times go first
+            ([{"times": [0, 1, 2, 3]}], [2, 0], [0, 2]),
+        ):
+            self.assertEqual(self.columns(*options, times=wanted)[0], expected)
+        with self.assertRaisesRegex(results.BadInput, "no result has a frame at t = 1.5; there are .* 0, 1, 2, 3"):
+            self.columns({"times": [0, 1, 2, 3]}, times=[0, 1.5])
 
     def test_a_run_that_stopped_ends_in_the_next_column(self):
-        whole = self.read("whole.hdf", times=[0, 1, 2, 3])
-        pinched = self.read("pinched.hdf", times=[0, 1, 1.5], stop="pinch-off")
-        columns = tubes.choose_columns([whole, pinched])
-        self.assertEqual([column.time for column in columns], [0, 1, 2, 3])
+        times, columns = self.columns({"times": [0, 1, 2, 3]}, {"times": [0, 1, 1.5], "stop": "pinch-off"})
+        self.assertEqual(times, [0, 1, 2, 3])
         self.assertEqual(columns[2].cells[1].time, 1.5)
         self.assertEqual([column.stops[1] for column in columns], [None, None, "pinch-off", None])
         self.assertIsNone(columns[3].cells[1])
 
     def test_all_runs_stopped_early(self):
-        early = [self.read(f"{i}.hdf", times=[0, 1 + i / 10], stop="overhang") for i in range(2)]
-        columns = tubes.choose_columns(early)
-        self.assertEqual([column.time for column in columns], [0, None])
+        times, columns = self.columns(*({"times": [0, 1 + i / 10], "stop": "overhang"} for i in range(2)))
+        self.assertEqual(times, [0, None])
         self.assertEqual([frame.time for frame in columns[1].cells], [1, 1.1])
-
-    def test_shared_times_go_first(self):
-        a, b = self.read("a.hdf", times=[0, 1, 2, 3]), self.read("b.hdf", times=[0, 1.5, 2, 3])
-        self.assertEqual([column.time for column in tubes.choose_columns([a, b])], [0, 2, 3])
-
-    def test_wanted_times(self):
-        result = self.read("a.hdf", times=[0, 1, 2, 3])
-        self.assertEqual([column.time for column in tubes.choose_columns([result], [2, 0])], [0, 2])
-        with self.assertRaisesRegex(results.BadInput, "no result has a frame at t = 1.5; there are .* 0, 1, 2, 3"):
-            tubes.choose_columns([result], [0, 1.5])
 
 
 class Scales(unittest.TestCase):
@@ -497,44 +493,29 @@ class Refusals(InFolder):
 
     def test_values_that_the_file_does_not_hold(self):
         """Links to other files, values in them, and more values than the file has bytes: refused by every reader."""
-        secret = self.folder / "secret"
+        secret, other, name = self.folder / "secret", self.write("other.hdf"), "series/energy"
         secret.write_bytes(np.arange(40.0).tobytes())
-        other = write(self.folder / "other.hdf")
-
-        def linked(file):
-            file["series/energy"] = h5py.ExternalLink(str(other), "/series/energy")
-
-        def outside(file):
-            file.create_dataset("series/energy", (40,), float, external=[(str(secret), 0, 320)])
-
-        def virtual(file):
-            layout = h5py.VirtualLayout((40,), float)
-            layout[:] = h5py.VirtualSource(str(other), "/series/energy", (40,))
-            file.create_virtual_dataset("series/energy", layout)
-
-        def huge(file):
-            file.create_dataset("series/energy", (2**40,), float, chunks=(1024,))
-
-        def huge_packed(file):
-            file.create_dataset("series/energy", (2**40,), float, chunks=(1024,), compression="gzip")
-
-        def nan(file):
-            file["series/energy"] = np.full(40, np.nan)
-
-        for change, words in ((linked, "link to another file: not followed"), (outside, "in another file: not read"), (virtual, "in another file: not read"),
-                              (huge, "not all are in the file"), (huge_packed, "not all are in the file"), (nan, "energy")):  # fmt: skip
-            path = write(self.folder / "foreign.hdf")
+        virtual = h5py.VirtualLayout((40,), float)
+        virtual[:] = h5py.VirtualSource(str(other), "/series/energy", (40,))
+        for change, words in (
+            (lambda file: file.update({name: h5py.ExternalLink(str(other), "/series/energy")}), "link to another file: not followed"),
+            (lambda file: file.create_dataset(name, (40,), float, external=[(str(secret), 0, 320)]), "in another file: not read"),
+            (lambda file: file.create_virtual_dataset(name, virtual), "in another file: not read"),
+            (lambda file: file.create_dataset(name, (2**40,), float, chunks=(1024,)), "not all are in the file"),
+            (lambda file: file.create_dataset(name, (2**40,), float, chunks=(1024,), compression="gzip"), "not all are in the file"),
+            (lambda file: file.create_dataset(name, data=np.full(40, np.nan)), "energy"),
+        ):
+            path = self.write("foreign.hdf")
             with h5py.File(path, "a") as file:
-                del file["series/energy"]
+                del file[name]
                 change(file)
-            with self.subTest(change=change.__name__):
-                self.refused(words, path)
-                self.assertRaisesRegex(results.BadInput, words, results.read_result, path)
-                for command in ("show", "plot", "view") if TUBULE else ():
-                    done = subprocess.run([TUBULE, command, path], capture_output=True, text=True)
-                    self.assertEqual(done.returncode, 2, (command, done))
-                    self.assertIn(words, done.stderr)
-                    self.assertNotIn("Traceback", done.stderr)
+            self.refused(words, path)
+            self.assertRaisesRegex(results.BadInput, words, results.read_result, path)
+            for command in ("show", "plot", "view") if TUBULE else ():
+                done = subprocess.run([TUBULE, command, path], capture_output=True, text=True)
+                self.assertEqual(done.returncode, 2, (command, done))
+                self.assertIn(words, done.stderr)
+                self.assertNotIn("Traceback", done.stderr)
 
     def test_titles_that_no_picture_holds(self):
         path = replaced(self.write(), resolved_case=CASE.format(k42=0).replace("A made-up tube", "x" * 200000))
@@ -552,26 +533,27 @@ class Refusals(InFolder):
             words = [line for line in done.stderr.splitlines() if "has no checksums" not in line]
             self.assertEqual((done.returncode, done.stdout, words), (130, "", []))
 
-    def test_nothing_to_draw(self):
-        self.refused("no profiles to draw", self.write(times=[]), "--kind", "profiles")
-        self.refused("no energy series to draw", self.write(rows=0), "--kind", "energy")
-        self.refused("neither frames nor an energy series", self.write(rows=0, times=[]))
-
     def test_arguments(self):
-        file = self.write()
-        self.refused("is not a list of numbers", file, "--times", "0,x")
-        self.refused("has no series r_mni; it has energy", file, "--series", "r_mni")
-        self.refused("time; did you mean energy_40 or", file, "--series", "enrgy_40")
-        self.refused("no row has a time in the range; it goes from 0 to 1", file, "--series", "energy", "--from", "2")
-        self.refused("energy_40 is nowhere positive in the range, as --logy needs it", file, "--series=energy_40", "--logy")
-        self.refused("--x, --from, --to and --logy belong to --series", file, "--logy")
-        self.refused("is no scan, to which --confirmed belongs", file, "--confirmed", "points.json")
-        self.refused("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3")
-        self.refused("--dpi: 20 is not between 30 and 1200", file, "--dpi=20")
-        self.refused("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg")
-        self.refused("does not exist", file, "-o", self.folder / "none/x.png")
+        file, empty = self.write(), self.write("empty.hdf", rows=0, times=[])
         (self.folder / "taken.png").mkdir()
-        self.refused("taken.png: cannot be written", file, "-o", self.folder / "taken.png")
+        for words, *arguments in (
+            ("no profiles to draw", self.write("b.hdf", times=[]), "--kind", "profiles"),
+            ("no energy series to draw", self.write("c.hdf", rows=0), "--kind", "energy"),
+            ("neither frames nor an energy series", empty),
+            ("is not a list of numbers", file, "--times", "0,x"),
+            ("has no series r_mni; it has energy", file, "--series", "r_mni"),
+            ("time; did you mean energy_40 or", file, "--series", "enrgy_40"),
+            ("no row has a time in the range; it goes from 0 to 1", file, "--series", "energy", "--from", "2"),
+            ("energy_40 is nowhere positive in the range, as --logy needs it", file, "--series=energy_40", "--logy"),
+            ("--x, --from, --to and --logy belong to --series", file, "--logy"),
+            ("is no scan, to which --confirmed belongs", file, "--confirmed", "points.json"),
+            ("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3"),
+            ("--dpi: 20 is not between 30 and 1200", file, "--dpi=20"),
+            ("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg"),
+            ("does not exist", file, "-o", self.folder / "none/x.png"),
+            ("taken.png: cannot be written", file, "-o", self.folder / "taken.png"),
+        ):
+            self.refused(words, *arguments)
 
     def test_missing_library_names_its_package(self):
         # A module of that name that cannot be imported, found before Debian's.
