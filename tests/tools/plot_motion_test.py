@@ -7,7 +7,6 @@
 import subprocess
 import sys
 import unittest
-import unittest.mock
 
 import h5py
 import numpy as np
@@ -149,9 +148,9 @@ class Arrows(unittest.TestCase):
         self.assertGreater(distance.min(), 39)
 
     def test_lengths_are_relative_to_the_largest_of_the_shape(self):
-        motion = surfaces.Motion(unittest.mock.Mock(surfaces=[self.surface]))
-        self.assertAlmostEqual(motion.u_t(self.surface), 3)  # |OMEGA| at the equator, where there are nodes
-        self.assertAlmostEqual(motion.u_n(self.surface), 2)
+        motion = flow.Motion([self.surface])
+        self.assertAlmostEqual(motion.largest("u_t", self.surface), 3)  # |OMEGA| at the equator, where there are nodes
+        self.assertAlmostEqual(motion.largest("u_n", self.surface), 2)
         figure = Figure(figsize=(2, 2))
         axes = figure.add_axes([0, 0, 1, 1])
         flow.draw_surface_arrows(axes, self.samples, self.samples.values[:, :3], 3.0, 0.0, 2.0, 220)
@@ -171,7 +170,7 @@ class Colours(unittest.TestCase):
         shapes = [moving_sphere(t) for t in (0, 1, 2)]
         result = results.Result("a.hdf", {}, {}, {}, [], shapes)
         (quantity,) = surfaces.quantities(["u_n"], [result], shapes)
-        motion = surfaces.Motion(result)
+        motion = flow.Motion(shapes)
         for shape, largest in zip(shapes, (0, 1, 1)):
             self.assertEqual(np.abs(quantity.at_nodes(shape, motion)).max(), largest)
         red, blue, white = quantity.colours.rgb(np.array([1.0, -1.0, 0.0]))
@@ -189,7 +188,7 @@ class Colours(unittest.TestCase):
     def test_a_normal_motion_has_no_arrows(self):
         shape = moving_sphere(1)
         shape.u = shape.u_n[..., None] * shape.normal + 1e-6
-        self.assertEqual(surfaces.Motion(results.Result("", {}, {}, {}, [], [shape])).u_t(shape), 0)
+        self.assertEqual(flow.Motion([shape]).largest("u_t", shape), 0)
 
 
 class Pages(InFolder):
@@ -215,12 +214,12 @@ class Pages(InFolder):
         self.assertGreaterEqual(texts.count("k\u2084\u2082 = 0"), 3)  # of the shapes, the cuts, the lines
 
     def test_velocities_are_relative_to_the_run_or_the_shape(self):
-        motion = surfaces.Motion(results.read_result(write(self.folder / "a.hdf")))
-        slow = min(motion.surfaces[1:], key=motion.u_n)
-        self.assertEqual(motion.scale(motion.u_n, slow), motion.u_n(slow))
+        motion = flow.Motion([moving_sphere(time) for time in (0, 1, 2)])
+        slow, fast = motion.shapes[1:]
+        self.assertEqual(motion.scale("u_n", slow), slow.largest("u_n"))
         motion.by_run = True
-        self.assertEqual(motion.scale(motion.u_n, slow), max(map(motion.u_n, motion.surfaces)))
-        self.assertGreater(motion.scale(motion.u_n, slow), motion.u_n(slow))
+        self.assertEqual(motion.scale("u_n", slow), fast.largest("u_n"))
+        self.assertGreater(fast.largest("u_n"), slow.largest("u_n"))
 
     def test_refusals(self):
         file = write(self.folder / "a.hdf", pressure=False)

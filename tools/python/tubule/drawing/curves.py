@@ -10,7 +10,7 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
 
 from .colours import draw_bar
-from .flow import LONGEST_ARROW, ROUNDING, SHORTEST_ARROW, STILL, SYMBOLS, VELOCITY, arrow_style, draw_arrow_key
+from .flow import LONGEST_ARROW, SHORTEST_ARROW, SYMBOLS, VELOCITY, Motion, arrow_style, draw_arrow_key
 from .labels import power, symbol
 from .tubes import ProfilePanel, caption
 
@@ -58,26 +58,20 @@ class CurvePanel(ProfilePanel):
     MARGIN = 0.14
     COLUMN_GAP = 0.1
     MAX_LENGTH = 3.2
-    by_run = False  # velocities relative to the largest ones of their run, else of each shape
+
+    def __init__(self, results, labels, columns):
+        self.motions = [Motion(result.frames) for result in results]
+        super().__init__(results, labels, columns)
 
     def scale_by_run(self):
-        self.by_run = True
-
-    def _scale(self, name, frame, row):
-        frames = self.results[row].frames if self.by_run else [frame]
-        return max(other.largest(name) for other in frames)
+        """Velocities are relative to the largest ones of their run, else of each shape."""
+        for motion in self.motions:
+            motion.by_run = True
 
     def _choose_colours(self):
         self.velocity = any(frame.u_n is not None for frame in self.frames)
         if not self.velocity:
             super()._choose_colours()
-
-    def _fastest(self, row):
-        """The largest speed over all frames of a run."""
-        return max((frame.speed for frame in self.results[row].frames), default=0.0)
-
-    def _still(self, frame, row):
-        return frame.speed <= max(STILL * self._fastest(row), ROUNDING * np.hypot(frame.length, frame.r.max()))
 
     def _words(self, column, row):
         frame, result = column.cells[row], self.results[row]
@@ -87,28 +81,25 @@ class CurvePanel(ProfilePanel):
             name = symbol(key.split(".")[-1]).replace("_", " ")
             words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {power(frame.parameter, 4)}")
         if frame and frame.u_n is not None:
-            names = [] if self._still(frame, row) else ["u_n", "u_t"]
-            names = [name for name in (*names, "u_theta") if getattr(frame, name) is not None]
-            words += [f"|{SYMBOLS[name]}| \u2264 {power(frame.largest(name), 2)}" for name in names] or ["at rest"]
+            words.append(self.motions[row].words(frame))
         return "\n".join(word for word in words if word)
 
     def _draw_profile(self, axes, frame, x, y):
         section = Section(frame, self.scale)
         row = next(i for i in range(len(self.results)) if any(column.cells[i] is frame for column in self.columns))
-        still = self._still(frame, row)
+        motion = self.motions[row]
+        u_n, u_t = motion.scale("u_n", frame), motion.scale("u_t", frame)
         closing = np.concatenate([section.x, -section.x[::-1]]), np.concatenate([section.y, section.y[::-1]])
         axes.fill(x + closing[0], y + closing[1], color="0.95", linewidth=0, zorder=0)
         for side in (-1, 1):
             points = np.column_stack([x + side * section.x, y + section.y])
             axes.plot(*points.T, color="0.1", linewidth=OUTLINE, solid_capstyle="butt", zorder=3)
-            colour = self._colour(section, frame, side, 0 if still else self._scale("u_n", frame, row))
+            colour = self._colour(section, frame, side, u_n)
             pieces = np.stack([points[:-2], points[1:-1], points[2:]], axis=1)  # overlapping: no gaps between
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
             )
-            if frame.u_t is None or still:
-                continue
-            for places in arrows(section, section.at(frame.u_t), self._scale("u_t", frame, row)):
+            for places in arrows(section, section.at(frame.u_t), u_t) if u_t else ():
                 way_x, way_y = section.beside(places, ARROW_DISTANCE)
                 way = Path(np.column_stack([x + side * way_x, y + way_y]))
                 axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(places[-1] - places[0]))))
@@ -128,7 +119,7 @@ class CurvePanel(ProfilePanel):
             super().draw_colour_bars(figure, bottom)
             return
         flows = any(frame.u_t is not None for frame in self.frames)
-        what = "run" if self.by_run else "shape"
+        what = "run" if self.motions[0].by_run else "shape"
         left, width = (0.06, 0.42) if flows else (0.29, 0.42)
         draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
                  f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {what}, > 0: outward")  # fmt: skip

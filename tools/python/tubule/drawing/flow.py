@@ -3,10 +3,12 @@
 import numpy as np
 from matplotlib.patches import FancyArrowPatch
 
+from .labels import power
+from .results import tangential
+
 LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
 STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
 ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape at rest
-NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is only rounding of normals
 VELOCITY = "RdBu_r"
 SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
 SPACING = 0.15  # inches between arrows on a surface
@@ -29,10 +31,29 @@ def draw_arrow_key(figure, left, bottom, words):
     figure.text((x + LONGEST_ARROW + 0.08) / wide, y / tall, words, va="center", fontsize=8, linespacing=1.3)
 
 
-def tangential(velocity, normal):
-    """The part of a velocity [..., 3] along the surface; `normal` of any length but zero."""
-    along = (velocity * normal).sum(axis=-1, keepdims=True) / (normal * normal).sum(axis=-1, keepdims=True)
-    return velocity - along * normal
+class Motion:
+    """Speeds of the shapes of one result, for quantities relative to the largest value on each shape or, `by_run`, of all."""
+
+    def __init__(self, shapes):
+        self.shapes, self.by_run = shapes, False
+        self.fastest = max((shape.speed for shape in shapes), default=0.0)
+
+    def still(self, shape):
+        return shape.speed <= max(STILL * self.fastest, ROUNDING * shape.size)
+
+    def largest(self, name, shape):
+        """The largest |u_n| or |u_t|; 0 where nothing moves."""
+        return 0.0 if self.still(shape) else shape.largest(name)
+
+    def scale(self, name, shape):
+        """What velocities are drawn relative to; 0 where the shape has none."""
+        largest = self.largest(name, shape)
+        return largest and (max(self.largest(name, other) for other in self.shapes) if self.by_run else largest)
+
+    def words(self, shape):
+        """The caption below the picture."""
+        found = {"u_n": self.largest("u_n", shape), "u_t": self.largest("u_t", shape), "u_theta": shape.largest("u_theta")}
+        return "\n".join(f"|{SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value) or "at rest"
 
 
 def surface_arrows(samples, velocity, spacing):

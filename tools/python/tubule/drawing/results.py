@@ -16,6 +16,15 @@ from .command_line import BadInput
 from .labels import as_label, flatten
 
 
+NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is only rounding of normals
+
+
+def tangential(velocity, normal):
+    """The part of a velocity [..., 3] along the surface; `normal` of any length but zero."""
+    along = (velocity * normal).sum(axis=-1, keepdims=True) / (normal * normal).sum(axis=-1, keepdims=True)
+    return velocity - along * normal
+
+
 @dataclass
 class Frame:
     time: float
@@ -38,6 +47,10 @@ class Frame:
     def is_graph(self):
         """Whether it is a tube r(z): no poles, and z never decreases."""
         return min(self.r[0], self.r[-1]) > 1e-9 * self.r.max() and bool((np.diff(self.z) >= 0).all())
+
+    @property
+    def size(self):
+        return float(np.hypot(self.length, self.r.max()))
 
     def largest(self, name):
         """Largest |u_n|, |u_t| or |u_theta|; 0 if there is none."""
@@ -78,8 +91,17 @@ class Surface:
 
     @property
     def speed(self):
-        """The largest value; 0 at rest."""
+        """The largest |u|; 0 where nothing moves."""
         return 0.0 if self.u is None else float(np.linalg.norm(self.u, axis=-1).max())
+
+    def largest(self, name):
+        """Largest |u_n|, or tangential speed for u_t: 0 where that is only rounding of normals."""
+        if self.u is None or name == "u_theta":
+            return 0.0
+        if name == "u_n":
+            return float(np.abs(self.u_n).max())
+        largest = float(np.linalg.norm(tangential(self.u, self.normal), axis=-1).max())
+        return largest if largest > NORMAL_ONLY * self.speed else 0.0
 
 
 @dataclass

@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 
 from . import flow, raster, style
 from .colours import Colours, curvature_colours, draw_bar, pressure_colours
-from .labels import power, wrapped
+from .labels import wrapped
 from .results import BadInput
 from .style import WIDTH, draw_scale_bar, time_title
 from .tubes import caption
@@ -44,38 +44,6 @@ def choose_colours(results, wanted):
     return list(dict.fromkeys(wanted))
 
 
-class Motion:
-    """Speeds of the surfaces of one result, for quantities relative to the largest value on each shape, or `by_run`."""
-
-    def __init__(self, result):
-        self.fastest = max(surface.speed for surface in result.surfaces)
-        self.surfaces, self.by_run = result.surfaces, False
-
-    def still(self, surface):
-        return surface.speed <= max(flow.STILL * self.fastest, flow.ROUNDING * surface.size)
-
-    def u_n(self, surface):
-        """Its largest value; 0 where nothing moves."""
-        return 0.0 if self.still(surface) else float(np.abs(surface.u_n).max())
-
-    def u_t(self, surface):
-        """The largest tangential speed; 0 where nothing moves, and where all velocity is normal."""
-        if self.still(surface):
-            return 0.0
-        largest = float(np.linalg.norm(flow.tangential(surface.u, surface.normal), axis=-1).max())
-        return largest if largest > flow.NORMAL_ONLY * surface.speed else 0.0
-
-    def scale(self, largest, surface):
-        """What velocities are drawn relative to: u_n or u_t, of the shape or of the run; 0 where the shape has none."""
-        return largest(surface) and (max(map(largest, self.surfaces)) if self.by_run else largest(surface))
-
-    def words(self, surface):
-        """The caption below the picture."""
-        found = {"u_n": self.u_n(surface), "u_t": self.u_t(surface)}
-        lines = [f"|{flow.SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value]
-        return "\n".join(lines) or "at rest"
-
-
 @dataclass
 class Quantity:
     """The quantity that colours a surface: its values at the nodes and its colour map."""
@@ -88,7 +56,7 @@ class Quantity:
         values = getattr(surface, self.name)
         if self.name != "u_n":
             return values
-        return values / (motion.scale(motion.u_n, surface) or np.inf)  # at rest: white
+        return values / (motion.scale("u_n", surface) or np.inf)  # at rest: white
 
 
 def quantities(names, results, surfaces):
@@ -117,10 +85,10 @@ class SurfacePanel:
         self.beside = len(columns) == 1  # H beside K, not above
         shown = [surface for column in columns for surface in column.cells if surface]
         self.quantities = quantities(names, results, shown)
-        self.motions = [Motion(result) for result in results]
+        self.motions = [flow.Motion(result.surfaces) for result in results]
         self.velocity = "u_n" in names
         motions = [m for column in columns for m, surface in zip(self.motions, column.cells) if surface]
-        self.arrows = self.velocity and any(motion.u_t(surface) for motion, surface in zip(motions, shown))
+        self.arrows = self.velocity and any(motion.largest("u_t", surface) for motion, surface in zip(motions, shown))
         # Lower and upper ends of each surface in the plane of the view, [column, row, 2, 2]; of none: nothing.
         self.ends = np.array([[self.view.extent(s.points.reshape(-1, 3)) if s else np.zeros((2, 2)) for s in column.cells] for column in columns])
         sizes = np.diff(self.ends, axis=2)[:, :, 0]
@@ -220,7 +188,7 @@ class SurfacePanel:
             extent = (left, left + wide / style.DPI, low, low + tall / style.DPI)
             axes.imshow(image, extent=extent, interpolation="none", aspect="auto", zorder=2)
             motion = self.motions[row]
-            u_t = motion.scale(motion.u_t, surface) if quantity.name == "u_n" else 0
+            u_t = motion.scale("u_t", surface) if quantity.name == "u_n" else 0
             if u_t:
                 per_inch, velocity = style.DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
                 flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / style.DPI, per_inch)
