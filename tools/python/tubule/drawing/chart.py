@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import chart_draw, style
-from .chart_file import Reference, Series, assignment, chart_of_case, check, is_number, map_option, plain, read_chart, split, toml_of
+from .chart_file import Reference, Series, assignment, chart_of_case, check, map_option, plain, read_chart, toml_of
 from .chart_runs import Program, Ranks, Runner, Table
 from .command_line import BadInput, Unavailable, say
 from .results import read_result
@@ -54,9 +54,7 @@ def chart_of(options):
     if options.reference:
         chart.reference = Reference(result=Path(options.reference))
     if options.times:
-        chart.times = [plain(text) for text in split(options.times)]
-        if not all(map(is_number, chart.times)):
-            raise BadInput(f"--times {options.times}: must be numbers, such as 0.05,0.1")
+        chart.times = options.times
     chart.quantity = options.quantity or chart.quantity
     chart.limit = chart.limit if options.limit is None else options.limit
     if not chart.limit > 0:

@@ -232,7 +232,7 @@ def chart():
     option("--set", **many, help="override a key in all runs")
     option("--reference", help="a result to measure errors against (default: the run with the smallest stated error)")
     option("--quantity", help="series whose error is drawn (default: energy)")
-    option("--times", help="times of the errors, such as 0.05,0.1 (default: outputs and end)")
+    option("--times", type=listed(time), metavar="T1,T2,...", help="times of the errors, such as 0.05,0.1 (default: outputs and end)")
     option("-o", "--output", type=file_name, **many,
            help="picture, .svg, .png or .pdf; may be repeated (default: FILE.svg, in this directory). The data are written "
                 "beside the first, .csv")  # fmt: skip

@@ -21,13 +21,6 @@ def time_is_logarithmic(times):
     return len(times) > 4 and times[len(times) // 2] < 0.1 * times[-1]
 
 
-def relative(series):
-    """Times, relative differences, and the indices of those without interpolation."""
-    pairs = zip(series["a"], series["b"])
-    values = [abs(a - b) / series["scale"] for a, b in pairs]
-    return series["times"], values, [unsure == 0 for unsure in series["unsure"]]
-
-
 class Page:
     def __init__(self, comparison):
         self.comparison = comparison
@@ -39,13 +32,11 @@ class Page:
         self.logarithmic = bool(self.energy) and time_is_logarithmic(energy["times"])
 
     def draw(self, outputs):
-        height = HEIGHT + 0.5
-        figure = Figure(figsize=(style.WIDTH, height))
-        width = (0.36 if self.energy else 0.6, 0.36)
+        figure = Figure(figsize=(style.WIDTH, HEIGHT + 0.5))
         if self.energy:
-            self._energies(figure.add_axes([0.075, 0.4 / height, width[1], HEIGHT / height]))
-        left = 0.52 if self.energy else 0.1
-        self._differences(figure.add_axes([left, 0.4 / height, width[0] * 0.75, HEIGHT / height]))
+            self._energies(style.axes_at(figure, 0.525, 0.4, 2.52, HEIGHT))
+        left, width = (3.64, 1.89) if self.energy else (0.7, 3.15)
+        self._differences(style.axes_at(figure, left, 0.4, width, HEIGHT))
         style.save(figure, outputs)
 
     def _time_axis(self, axes):
@@ -70,11 +61,11 @@ class Page:
         colours = iter(style.line_colours(count))
         markers = iter(style.MARKERS)
         for name, label in lines:
-            times, values, sure = relative(self.series[name])
-            colour = next(colours)
-            axes.plot(times, values, color=colour, linewidth=0.8)
-            at_rows = [i for i, known in enumerate(sure) if known]
-            axes.plot([times[i] for i in at_rows], [values[i] for i in at_rows], next(markers), color=colour, label=label)
+            series, colour = self.series[name], next(colours)
+            points = [(t, abs(a - b) / series["scale"]) for t, a, b in zip(series["times"], series["a"], series["b"])]
+            axes.plot([t for t, _ in points], [value for _, value in points], color=colour, linewidth=0.8)
+            at_rows = [point for point, unsure in zip(points, series["unsure"]) if unsure == 0]  # without interpolation
+            axes.plot([t for t, _ in at_rows], [value for _, value in at_rows], next(markers), color=colour, label=label)
             self._tolerance(axes, name, colour)
         for key, (name, label) in SHAPES.items() if self.frames else ():
             colour = next(colours)
@@ -92,7 +83,7 @@ class Page:
         if self.tolerances:
             handles.append(Line2D([], [], color="0.4", linestyle="-.", linewidth=0.8))
             labels.append("tolerance")
-        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0)
+        style.legend_beside(axes, handles, labels=labels)
 
     def _tolerance(self, axes, name, colour):
         if self.tolerances.get(name, 0) > 0:

@@ -69,7 +69,7 @@ class CurvePanel(ProfilePanel):
             motion.by_run = True
 
     def _choose_colours(self):
-        self.velocity = any(frame.u_n is not None for frame in self.frames)
+        self.velocity = any(frame.u_n is not None for frame in self.shapes)
         if not self.velocity:
             super()._choose_colours()
 
@@ -84,9 +84,9 @@ class CurvePanel(ProfilePanel):
             words.append(self.motions[row].words(frame))
         return "\n".join(word for word in words if word)
 
-    def _draw_profile(self, axes, frame, x, y):
+    def _draw_shape(self, axes, frame, row, places):
+        ((x, y),) = places
         section = Section(frame, self.scale)
-        row = next(i for i in range(len(self.results)) if any(column.cells[i] is frame for column in self.columns))
         motion = self.motions[row]
         u_n, u_t = motion.scale("u_n", frame), motion.scale("u_t", frame)
         closing = np.concatenate([section.x, -section.x[::-1]]), np.concatenate([section.y, section.y[::-1]])
@@ -99,10 +99,10 @@ class CurvePanel(ProfilePanel):
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
             )
-            for places in arrows(section, section.at(frame.u_t), u_t) if u_t else ():
-                way_x, way_y = section.beside(places, ARROW_DISTANCE)
+            for along in arrows(section, section.at(frame.u_t), u_t) if u_t else ():
+                way_x, way_y = section.beside(along, ARROW_DISTANCE)
                 way = Path(np.column_stack([x + side * way_x, y + way_y]))
-                axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(places[-1] - places[0]))))
+                axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(along[-1] - along[0]))))
         self._draw_axis(axes, frame, x, y)
 
     def _colour(self, section, frame, side, largest):
@@ -118,7 +118,7 @@ class CurvePanel(ProfilePanel):
         if not self.velocity:
             super().draw_colour_bars(figure, bottom)
             return
-        flows = any(frame.u_t is not None for frame in self.frames)
+        flows = any(frame.u_t is not None for frame in self.shapes)
         what = "run" if self.motions[0].by_run else "shape"
         left, width = (0.06, 0.42) if flows else (0.29, 0.42)
         draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),

@@ -43,56 +43,33 @@ def flatten(node, prefix=""):
     return flat
 
 
-def differences(cases):
-    """Keys, in order of first appearance, whose values differ between the cases."""
-    flats = [flatten(case) for case in cases]
-    keys = dict.fromkeys(key for flat in flats for key in flat)
-    return [
-        key
-        for key in keys
-        if not key.startswith(IGNORED) and any(flat.get(key, NOT_SET) != flats[0].get(key, NOT_SET) for flat in flats)
-    ]
-
-
 def row_labels(cases, fallbacks):
     """One list of words ("k42 = 0.06", ...) per case: the differences, else its fallback."""
     if len(cases) == 1:
         return [[fallbacks[0]]]
-    keys = differences(cases)
+    flats = [flatten(case) for case in cases]
+    keys = [key for key in dict.fromkeys(key for flat in flats for key in flat) if not key.startswith(IGNORED)
+            and any(flat.get(key, NOT_SET) != flats[0].get(key, NOT_SET) for flat in flats)]  # fmt: skip
     if len(keys) > MAX_DIFFERENCES:
         return [[fallback] for fallback in fallbacks]
-    flats = [flatten(case) for case in cases]
-    names = _names(keys, flats)
-    labels = []
-    for flat in flats:
-        words = []
-        for key in keys:
-            mode = ".".join(key.split(".")[:3]) + "." if key.startswith("shape.mode.") else None
-            if key in flat:
-                words.append(f"{names[key]} = {_value(flat[key])}")
-            elif mode and not any(other.startswith(mode) for other in flat):
-                words.append(f"no mode {key.split('.')[2]}")
-            else:
-                words.append(f"{names[key]} by default")
-        labels.append(list(dict.fromkeys(words)))
+    one_mode = not any(key.startswith("shape.mode.1.") for flat in flats for key in flat)
+    labels = [list(dict.fromkeys(_words(key, keys, flat, one_mode) for key in keys)) for flat in flats]
     if len({tuple(label) for label in labels}) < len(labels):
         labels = [[*label, fallback] for label, fallback in zip(labels, fallbacks)]
     return labels
 
 
-def _names(keys, flats):
-    single_mode = not any(key.startswith("shape.mode.1.") for flat in flats for key in flat)
-    names = {}
-    for key in keys:
-        parts = key.split(".")
-        if key in NAMES:
-            names[key] = NAMES[key]
-        elif key.startswith("shape.mode."):
-            names[key] = parts[3] if single_mode else f"mode {parts[2]} {parts[3]}"
-        else:
-            clash = sum(other.split(".")[-1] == parts[-1] for other in keys) > 1
-            names[key] = key if clash else symbol(parts[-1])
-    return names
+def _words(key, keys, flat, one_mode):
+    """What a case says of one of the keys that differ."""
+    parts = key.split(".")
+    if key.startswith("shape.mode."):
+        if key not in flat and not any(other.startswith(f"shape.mode.{parts[2]}.") for other in flat):
+            return f"no mode {parts[2]}"
+        name = parts[3] if one_mode else f"mode {parts[2]} {parts[3]}"
+    else:
+        clash = sum(other.split(".")[-1] == parts[-1] for other in keys) > 1
+        name = NAMES.get(key) or (key if clash else symbol(parts[-1]))
+    return f"{name} = {_value(flat[key])}" if key in flat else f"{name} by default"
 
 
 def symbol(key):

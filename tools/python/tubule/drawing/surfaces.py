@@ -9,15 +9,11 @@ from matplotlib.colors import Normalize
 
 from . import flow, raster, style
 from .colours import Colours, curvature_colours, draw_bar, pressure_colours
-from .labels import wrapped
 from .results import BadInput
-from .style import WIDTH, draw_scale_bar, time_title
-from .tubes import caption
+from .style import WIDTH
+from .tubes import ShapesPanel
 
-MAX_HEIGHT = 5.4  # inches of all rows together
-MAX_SIZE = 2.7  # inches of one surface
-GAP, HEADER, LABEL_WIDTH, RIM = 0.14, 0.24, 22, 0.02  # RIM: around each surface
-SCALE_BAR = 0.35  # inches right of the last column
+RIM = 0.02  # inches around each surface
 SLOTS = {1: ((0.29, 0.42),), 2: ((0.12, 0.34), (0.56, 0.34))}  # left end and width of colour bars, parts of the page
 
 
@@ -73,58 +69,30 @@ def quantities(names, results, surfaces):
     return [found[name] for name in names]
 
 
-class SurfacePanel:
-    """Sizes everything in inches first, so that the figure can be made to fit; then draws."""
+class SurfacePanel(ShapesPanel):
+    COLUMN_GAP, LABEL_WIDTH, SLACK = 0.14, 22, 0.6
+    MAX_LENGTH = MAX_WIDTH = 2.7
+    BAR = 1 / 3
 
     def __init__(self, results, labels, columns, names):
-        self.columns, self.view = columns, raster.View()
-        lone = len(results) == 1  # its label is the title of the picture
-        self.labels = [""] if lone else [wrapped(label, LABEL_WIDTH) for label in labels]
-        lines = [line for label in self.labels for line in label.split("\n")]
-        left = 0.3 + 0.062 * max(map(len, lines))
-        self.beside = len(columns) == 1  # H beside K, not above
-        shown = [surface for column in columns for surface in column.cells if surface]
-        self.quantities = quantities(names, results, shown)
+        self.view = raster.View()
+        shown = [(row, surface) for column in columns for row, surface in enumerate(column.cells) if surface]
+        self.quantities = quantities(names, results, [surface for _, surface in shown])
         self.motions = [flow.Motion(result.surfaces) for result in results]
         self.velocity = "u_n" in names
-        motions = [m for column in columns for m, surface in zip(self.motions, column.cells) if surface]
-        self.arrows = self.velocity and any(motion.largest("u_t", surface) for motion, surface in zip(motions, shown))
-        # Lower and upper ends of each surface in the plane of the view, [column, row, 2, 2]; of none: nothing.
-        self.ends = np.array([[self.view.extent(s.points.reshape(-1, 3)) if s else np.zeros((2, 2)) for s in column.cells] for column in columns])
-        sizes = np.diff(self.ends, axis=2)[:, :, 0]
-        widths = list(sizes[..., 0].max(axis=1)) * (len(names) if self.beside else 1)
-        heights = list(sizes[..., 1].max(axis=0))
-        pictures = 1 if self.beside else len(names)  # above each other, for every result
-        self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
-        below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
-        room_x = WIDTH - left - SCALE_BAR - GAP * len(widths)
-        room_y = MAX_HEIGHT - sum(below) - pictures * GAP * len(results)
-        biggest = max([*widths, *heights])
-        self.scale = min(room_x / sum(widths), room_y / (pictures * sum(heights)), MAX_SIZE / biggest)
-
-        pitch = [max(self.scale * width, 0.62) + GAP for width in widths]
-        slack = np.clip((room_x + GAP * len(widths) - sum(pitch)) / len(widths), 0, 0.6)
-        self.centres = left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
-        if lone and self.beside:  # above their colour bars
+        self.arrows = self.velocity and any(self.motions[row].largest("u_t", surface) for row, surface in shown)
+        self.beside = len(columns) == 1  # H beside K, not above
+        self.pictures, self.copies = (1, len(names)) if self.beside else (len(names), 1)
+        super().__init__(results, labels, columns)
+        if self.lone and self.beside:  # above their colour bars
             self.centres = WIDTH * np.array([left + width / 2 for left, width in slots(len(names))])
-        elif lone:  # in the middle of the page
-            ends = self.centres[0] - pitch[0] / 2, self.centres[-1] + pitch[-1] / 2
-            self.centres += (WIDTH - SCALE_BAR - sum(ends)) / 2
-        else:  # in the middle of what is right of the labels
-            self.centres += (room_x + GAP * len(widths) - sum(pitch) - slack * len(widths)) / 2
-        self.right = self.centres[-1] + self.scale * widths[-1] / 2
-        self.left = min(left, self.centres[0] - self.scale * widths[0] / 2) - 0.12
 
-        self.titles = [time_title(i, column.time) for i, column in enumerate(columns)]
-        if self.beside and not columns[0].time:
-            self.titles = [""]  # only the time zero: a shape without a time
-        self.height, self.middles = HEADER if any(self.titles) else 0.08, []  # of each row of pictures, from the top
-        for tall, caption_room in zip(heights, below):
-            for picture in range(pictures):
-                self.middles.append(self.height + self.scale * tall / 2)
-                self.height += self.scale * tall + GAP
-            self.height += caption_room
-        self.pictures, self.heights = pictures, heights
+    def _size(self, surface):
+        low, high = self.view.extent(surface.points.reshape(-1, 3))
+        return high - low
+
+    def _title(self, index, column):
+        return "" if self.beside and not column.time else super()._title(index, column)  # only the time zero: a shape without a time
 
     def scale_by_run(self):
         """Velocities are relative to the largest ones of their run, so that shapes can be compared over time."""
@@ -137,66 +105,45 @@ class SurfacePanel:
         """Below the pictures of that row and column."""
         surface = column.cells[row]
         moving = [self.motions[row].words(surface)] if self.velocity and surface else []
-        return "\n".join(words for words in (caption(column, row), *moving) if words)
+        return "\n".join(words for words in (super()._words(column, row), *moving) if words)
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        width, height = figure.get_size_inches()
-        axes = figure.add_axes([0, 0, 1, 1])
-        axes.set(xlim=(0, width), ylim=(0, height))
-        axes.axis("off")
-        self.top = bottom + self.height
-        for index, column in enumerate(self.columns):
-            middle = self.centres.mean() if self.beside else self.centres[index]
-            axes.text(middle, self.top - 0.06, self.titles[index], ha="center", va="top")
-            for row, surface in enumerate(column.cells):
-                if surface:
-                    self._draw_surface(axes, surface, row, index)
-        for row, label in enumerate(self.labels):
-            rows = self.middles[row * self.pictures : (row + 1) * self.pictures]
-            axes.text(0.1, self.top - np.mean(rows), label, ha="left", va="center", linespacing=1.25)
-        if not self.beside and len(self.quantities) > 1:
+        axes = super().draw(figure, bottom)
+        if self.pictures > 1:
+            left = min(self.left + 0.1, self.centres[0] - self.widths[0] / 2) - 0.12
             for middle, quantity in zip(self.middles, self.quantities * len(self.labels)):
-                axes.text(self.left, self.top - middle, quantity.symbol, ha="right", va="center", style="italic")
-        low = self.top - self.middles[-1] - self.scale * self.heights[-1] / 2
-        draw_scale_bar(axes, self.right + 0.14, low, max(self.heights) / 3, self.scale)
+                axes.text(left, bottom + self.height - middle, quantity.symbol, ha="right", va="center", style="italic")
 
-    def _samples(self, surface, row, ends):
+    def _samples(self, surface, row):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
         per_pixel = self.scale * style.DPI  # pixels per unit of length
-        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in ends[1] - ends[0])
-        rim = (np.array([wide, tall]) / per_pixel - (ends[1] - ends[0])) / 2
+        low, high = self.view.extent(surface.points.reshape(-1, 3))
+        wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in high - low)
+        rim = (np.array([wide, tall]) / per_pixel - (high - low)) / 2
         fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]
         if self.arrows:
             fields.append(surface.u @ self.view.axes)
         return raster.sample(
             surface.points, surface.normal, np.concatenate(fields, axis=-1), surface.order, surface.closed, self.view,
-            (ends[0][0] - rim[0], ends[1][1] + rim[1]),
+            (low[0] - rim[0], high[1] + rim[1]),
             per_pixel * raster.OVERSAMPLING, wide * raster.OVERSAMPLING, tall * raster.OVERSAMPLING,
         )  # fmt: skip
 
-    def _draw_surface(self, axes, surface, row, index):
-        samples = self._samples(surface, row, self.ends[index, row])
+    def _draw_shape(self, axes, surface, row, places):
+        samples, motion = self._samples(surface, row), self.motions[row]
         there = np.isfinite(samples.depth)
         tall, wide = (extent // raster.OVERSAMPLING for extent in samples.shape)
-        for picture, quantity in enumerate(self.quantities):
-            x = self.centres[picture if self.beside else index]
-            y = self.top - self.middles[row * self.pictures + (0 if self.beside else picture)]
+        for picture, ((x, y), quantity) in enumerate(zip(places, self.quantities)):
             image = raster.shaded(samples, quantity.colours.rgb(samples.values[there, picture]))
             # On whole pixels, so that nothing is drawn in between.
             left, low = round(x * style.DPI - wide / 2) / style.DPI, round(y * style.DPI - tall / 2) / style.DPI
             extent = (left, left + wide / style.DPI, low, low + tall / style.DPI)
             axes.imshow(image, extent=extent, interpolation="none", aspect="auto", zorder=2)
-            motion = self.motions[row]
             u_t = motion.scale("u_t", surface) if quantity.name == "u_n" else 0
             if u_t:
                 per_inch, velocity = style.DPI * raster.OVERSAMPLING, samples.values[:, len(self.quantities) :]
                 flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / style.DPI, per_inch)
-        words = self.captions[row][index]
-        if words:
-            below = y - self.scale * self.heights[row] / 2 - 0.05
-            middle = self.centres.mean() if self.beside else x
-            axes.text(middle, below, words, ha="center", va="top", fontsize=6.5, linespacing=1.1)
         axes.set(xlim=(0, axes.figure.get_figwidth()), ylim=(0, axes.figure.get_figheight()))  # imshow changes them
 
     def draw_colour_bars(self, figure, bottom):

@@ -1,4 +1,4 @@
-"""Panel (a): one row of profiles per result, one column per time. Tubes r(z): left halves coloured by H, right by K."""
+"""Panels of shapes: which frames they show, and their layout. Panel of tubes r(z): left halves coloured by H, right by K."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -14,7 +14,7 @@ from .style import WIDTH, draw_scale_bar, time_text, time_title
 MAX_COLUMNS = 6
 MAX_HEIGHT = 5.6  # inches of all rows together
 MAX_TUBE_WIDTH = 1.5  # inches
-ROW_GAP, HEADER, LABEL_WIDTH = 0.14, 0.24, 16
+ROW_GAP, HEADER = 0.14, 0.24
 SCALE_BAR = 0.3  # inches right of the last column
 STRIPS = 40  # across half a tube
 MIN_POINTS, POINTS_PER_INCH = 300, 150  # along a tube
@@ -94,89 +94,108 @@ def ring_areas(frame):
     return np.abs(frame.r) * np.hypot(np.gradient(frame.r), np.gradient(frame.z)) + 1e-300
 
 
-class ProfilePanel:
-    """Sizes everything in inches first, so that the figure can be made to fit; then draws. How one profile is drawn
-    and coloured, and what is written below it, is defined by derived classes."""
+class ShapesPanel:
+    """A row of shapes for each result, a column for each time. Sizes everything in inches first, so that the figure can be made
+    to fit; then draws. What a shape covers, how it is drawn and what is written below it is defined by derived classes."""
 
-    MARGIN = 0.0  # inches of margin around a profile
-    COLUMN_GAP = 0.14
-    MAX_LENGTH = MAX_HEIGHT  # inches of the longest profile
+    MARGIN = 0.0  # inches of margin around a shape
+    COLUMN_GAP, LABEL_WIDTH, SLACK = 0.14, 16, 0.5
+    MAX_LENGTH, MAX_WIDTH = MAX_HEIGHT, MAX_TUBE_WIDTH  # inches of the largest shape
+    BAR = 1 / 2  # of the longest shape
+    pictures, copies = 1, 1  # of each shape: above each other, beside each other
 
     def __init__(self, results, labels, columns):
         self.results, self.columns = results, columns
-        lone = len(results) == 1  # its label is the title of the picture
-        self.labels = [""] if lone else [wrapped(label, LABEL_WIDTH) for label in labels]
-        frames = [frame for column in columns for frame in column.cells if frame]
-        self.frames = frames
-        lines = [line for label in self.labels for line in label.split("\n")]
-        self.left = 0.2 + 0.062 * max(map(len, lines))
-
-        widths = [2 * max(frame.r.max() for frame in column.cells if frame) for column in columns]
-        cells_of_rows = zip(*(column.cells for column in columns))
-        self.lengths = lengths = [max((f.length for f in cells if f), default=0.0) for cells in cells_of_rows]
+        self.lone = len(results) == 1  # its label is the title of the picture
+        self.labels = [""] if self.lone else [wrapped(label, self.LABEL_WIDTH) for label in labels]
+        self.shapes = [shape for column in columns for shape in column.cells if shape]
+        self.left = 0.2 + 0.062 * max(len(line) for label in self.labels for line in label.split("\n"))
+        self.titles = [self._title(index, column) for index, column in enumerate(columns)]
         self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
-        captions = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
-        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - (self.COLUMN_GAP + 2 * self.MARGIN) * len(columns)
-        room_y = MAX_HEIGHT - sum(captions) - (ROW_GAP + 2 * self.MARGIN) * len(results)
+        below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
+
+        sizes = np.array([[self._size(shape) if shape else (0, 0) for shape in column.cells] for column in columns])
+        widths, self.lengths = np.repeat(sizes[..., 0].max(axis=1), self.copies), sizes[..., 1].max(axis=0)
+        gap = self.COLUMN_GAP + 2 * self.MARGIN
+        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - gap * len(widths)
+        room_y = MAX_HEIGHT - sum(below) - self.pictures * (ROW_GAP + 2 * self.MARGIN) * len(results)
         self.scale = min(
             room_x / sum(widths),
-            room_y / sum(lengths),
-            MAX_TUBE_WIDTH / max(widths),
-            self.MAX_LENGTH / max(lengths),
+            room_y / (self.pictures * sum(self.lengths)),
+            self.MAX_WIDTH / max(widths),
+            self.MAX_LENGTH / max(self.lengths),
         )
+        self.widths = self.scale * widths
+        self._place_columns(room_x, gap)
+        self._place_rows(below)
 
-        # A label or a column header needs room even where the tube is small.
-        cell_widths = [max(self.scale * width, 0.62) for width in widths]
-        squeeze = room_x / max(room_x, sum(cell_widths))
-        gap = self.COLUMN_GAP + 2 * self.MARGIN
-        pitch = [squeeze * width + gap for width in cell_widths]
-        slack = (room_x + gap * len(columns) - sum(pitch)) / len(columns)
-        slack = min(slack, 0.5)
-        self.centres = self.left + np.cumsum([p + slack for p in pitch]) - np.array(pitch) / 2 - slack / 2
-        label_heights = [0.14 * (label.count("\n") + 1) for label in self.labels]
-        tube_heights = [max(self.scale * length + 2 * self.MARGIN, label) for length, label in zip(lengths, label_heights)]
-        self.height = HEADER + sum(tube_heights) + sum(captions) + ROW_GAP * len(results)
-        tops = self.height - HEADER - np.cumsum([0, *(t + c + ROW_GAP for t, c in zip(tube_heights, captions))][:-1])
-        self.middles = [top - tall / 2 for top, tall in zip(tops, tube_heights)]
-        if lone:
-            occupied = self.centres[0] - self.scale * widths[0] / 2, self.centres[-1] + self.scale * widths[-1] / 2
+    def _place_columns(self, room, gap):
+        least = np.maximum(self.widths, 0.62)  # a column's title needs room even where the shape is small
+        pitch = least * min(1, room / sum(least)) + gap
+        spare = room + gap * len(pitch) - sum(pitch)
+        slack = min(spare / len(pitch), self.SLACK)
+        self.centres = self.left + np.cumsum(pitch + slack) - pitch / 2 - slack / 2
+        if self.lone:
+            occupied = self.centres[0] - self.widths[0] / 2, self.centres[-1] + self.widths[-1] / 2
             self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
         else:  # in the middle of what is right of the labels
-            self.centres += (room_x + gap * len(columns) - sum(pitch) - slack * len(columns)) / 2
-        self.right = self.centres[-1] + self.scale * widths[-1] / 2 + self.MARGIN
-        self._choose_colours()
+            self.centres += (spare - slack * len(pitch)) / 2
 
-    def _choose_colours(self):
-        self.H, self.K = curvature_colours(self.results, self.frames, [ring_areas(frame) for frame in self.frames])
-
-    def _words(self, column, row):
-        """Below the profile of that row and column."""
-        return caption(column, row)
-
-    def draw(self, figure, bottom):
-        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        width, height = figure.get_size_inches()
-        axes = figure.add_axes([0, bottom / height, 1, self.height / height])
-        axes.set(xlim=(0, width), ylim=(0, self.height))
-        axes.axis("off")
-        for index, (column, x) in enumerate(zip(self.columns, self.centres)):
-            axes.text(x, self.height - 0.06, self._title(index, column), ha="center", va="top")
-            captions = [row[index] for row in self.captions]
-            for frame, caption, y, length in zip(column.cells, captions, self.middles, self.lengths):
-                if frame:
-                    self._draw_profile(axes, frame, x, y)
-                if caption:
-                    below = y - self.scale * length / 2 - self.MARGIN - 0.07
-                    axes.text(x, below, caption, ha="center", va="top", fontsize=6.5, linespacing=1.1)
-        for label, y in zip(self.labels, self.middles):
-            axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
-        longest = max(frame.length for frame in self.frames)
-        draw_scale_bar(axes, self.right + 0.14, self.middles[-1] - self.scale * longest / 2, longest / 2, self.scale)
+    def _place_rows(self, below):
+        self.height, self.middles = HEADER if any(self.titles) else 0.08, []  # of each row of pictures, from the top
+        for length, label, caption_room in zip(self.lengths, self.labels, below):
+            tall = max(self.scale * length + 2 * self.MARGIN, 0.14 * (label.count("\n") + 1) / self.pictures)
+            for _ in range(self.pictures):
+                self.middles.append(self.height + tall / 2)
+                self.height += tall + ROW_GAP
+            self.height += caption_room
 
     def _title(self, index, column):
         if column.time is not None and all(result.is_equilibrium for result in self.results):
             return f"shape {number(column.time)}" if len(self.columns) > 1 else ""
         return time_title(index, column.time)
+
+    def _words(self, column, row):
+        """Below the shape of that row and column."""
+        return caption(column, row)
+
+    def draw(self, figure, bottom):
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
+        axes = figure.add_axes([0, 0, 1, 1])
+        axes.set(xlim=(0, figure.get_figwidth()), ylim=(0, figure.get_figheight()))
+        axes.axis("off")
+        top = bottom + self.height
+        for index, column in enumerate(self.columns):
+            xs = self.centres[index * self.copies : (index + 1) * self.copies]
+            axes.text(np.mean(xs), top - 0.06, self.titles[index], ha="center", va="top")
+            for row, shape in enumerate(column.cells):
+                ys = [top - middle for middle in self.middles[row * self.pictures : (row + 1) * self.pictures]]
+                if shape:
+                    self._draw_shape(axes, shape, row, [(x, y) for y in ys for x in xs])
+                if self.captions[row][index]:
+                    below = ys[-1] - self.scale * self.lengths[row] / 2 - self.MARGIN - 0.07
+                    axes.text(np.mean(xs), below, self.captions[row][index], ha="center", va="top", fontsize=6.5, linespacing=1.1)
+        for row, label in enumerate(self.labels):
+            y = top - np.mean(self.middles[row * self.pictures : (row + 1) * self.pictures])
+            axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
+        right = self.centres[-1] + self.widths[-1] / 2 + self.MARGIN
+        low = top - self.middles[-1] - self.scale * self.lengths[-1] / 2
+        draw_scale_bar(axes, right + 0.14, low, self.BAR * max(self.lengths), self.scale)
+        return axes
+
+
+class ProfilePanel(ShapesPanel):
+    """Profiles, coloured by H on the left and K on the right."""
+
+    def __init__(self, results, labels, columns):
+        super().__init__(results, labels, columns)
+        self._choose_colours()
+
+    def _size(self, frame):
+        return 2 * frame.r.max(), frame.length
+
+    def _choose_colours(self):
+        self.H, self.K = curvature_colours(self.results, self.shapes, [ring_areas(frame) for frame in self.shapes])
 
     def _draw_axis(self, axes, frame, x, y):
         reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
@@ -190,7 +209,8 @@ class ProfilePanel:
 class TubePanel(ProfilePanel):
     """Draws tubes r(z) as shaded bodies."""
 
-    def _draw_profile(self, axes, frame, x, y):
+    def _draw_shape(self, axes, frame, row, places):
+        ((x, y),) = places
         points = max(MIN_POINTS, int(POINTS_PER_INCH * self.scale * frame.length))
         place = np.linspace(0, frame.z.size - 1, points)  # as dense as the samples of the frame
 
