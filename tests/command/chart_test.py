@@ -250,7 +250,7 @@ class Outcomes(Charts):
     def ran(self):
         return (self.folder / "ran").read_text().split()
 
-    def runner(self, limit=3.0, at_once=2):
+    def runner(self, limit=5.0, at_once=2):
         program = chart_runs.Program(self.program, self.folder, limit, "energy")
         table = chart_runs.Table(self.folder / "t.csv", "energy", [0.5, 1.0])
         return chart_runs.Runner(program, table, at_once, say=lambda words: None)
