@@ -1,4 +1,4 @@
-"""Draws error against CPU time of a fluid and of Stokes flow, from the table of tests/benchmark/work_precision_fluid.py."""
+"""Draws error against CPU time of a fluid and of Stokes flow, from the table of tests/studies/benchmark/work_precision_fluid.py."""
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D

@@ -28,7 +28,7 @@ class Stale(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.top = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
-        for folder in ("cases", "docs", "tools", "tests/docs", "tests/benchmark"):
+        for folder in ("cases", "docs", "tools", "tests/docs", "tests/studies/benchmark"):
             shutil.copytree(TOP / folder, cls.top / folder)
         for name in ("axisym", "flow"):
             figures(cls.top, "--current", name)

@@ -10,7 +10,7 @@ namespace tubule {
 namespace {
 
 // So few triangles are accurate to `few_reach` where they have the energy of the start to `few_start`: of the scenes of
-// docs/both_tiers and of tests/command/advice_study.py those with 3e-4 and less are, while a neck with 1.3e-3 states no
+// docs/both_tiers and of tests/studies/command/advice_study.py those with 3e-4 and less are, while a neck with 1.3e-3 states no
 // error and a rough fluid with 3e-3 is lost.
 constexpr double few_reach = 1e-2, few_start = 5e-4;
 

@@ -32,7 +32,7 @@ constexpr double least_parts = 20, most_parts = 1000;
 constexpr double rounding = 1e-12;  // of an energy
 constexpr double accuracy = 1e-4;   // of the pilots in tier axisym, or better if the case is
 constexpr double accuracy_of_surface = 1e-2;
-// Measured (docs/decisions/tiers.md, tests/benchmark/model_differences.py): on a length L the viscosity damps like a
+// Measured (docs/decisions/tiers.md, tests/studies/benchmark/model_differences.py): on a length L the viscosity damps like a
 // friction of `viscous`/(Re L^2), and slows what friction alone would drive down by the factor 1 + `slower`/(gamma Re
 // L^2).
 constexpr double viscous = 2, slower = 4.5;
