@@ -40,7 +40,7 @@ energy = 1e-4
 end = 0.7
 stationary = 1e-6
 """
-FEW = ("--elements", "100")
+FEW = ("--elements", "60")
 X = (2 * math.pi / LENGTH) ** 2  # q^2 of the wave
 
 
@@ -128,11 +128,11 @@ class Ranks(ProgramTest):
     def setUp(self):
         super().setUp()
         self.write("case.toml", CASE)
-        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.1", "-o", "scan.hdf")
+        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.05", "-o", "scan.hdf")
 
     def command(self, ranks, folder):
         return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "confirm", "scan.hdf",
-                "--elements", "60", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
+                "--elements", "40", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
 
     def figures(self, text):
         return [{key: value for key, value in row.items() if key != "file"} for row in csv.DictReader(io.StringIO(text))]

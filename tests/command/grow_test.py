@@ -95,7 +95,7 @@ class Extended(GrowTest):
         self.assert_as_made_at_once(f"{AMPLITUDE}=0.3:0.5:9", f"{K42}=1e-5,1e-4,1e-3,1e-2", more=boundary)
 
     def test_killed_it_goes_on_by_its_result(self):
-        slow = ("--set=time.end=0.5", "--set=discretisation.elements=60", "--set=discretisation.time_tolerance=1e-12",
+        slow = ("--set=time.end=0.5", "--set=discretisation.elements=20", "--set=discretisation.time_tolerance=1e-12",
                 "--set=time.max_order=2", "--to-the-end")  # fmt: skip
         self.scan("case.toml", f"--over={AMPLITUDE}=0.1,0.12", *slow, "-o", "scan.hdf")
         known = contents(self.result)["points/energy"]

@@ -171,7 +171,7 @@ class Ends(ProgramTest):
 
     def case_of(self, shape, Re="1.0", gamma="0.0", k20="1.0", end="0.05", tier="axisym"):
         return self.write("case.toml", f'tier = "{tier}"\n[energy]\nk20 = {k20}\n[model]\nkind = "auto"\nRe = {Re}\n'
-                          f"gamma = {gamma}\n[shape]\nkind = {shape}\n[time]\nend = {end}\nlimit = 2\n")  # fmt: skip
+                          f"gamma = {gamma}\n[shape]\nkind = {shape}\n[time]\nend = {end}\nlimit = 0.5\n")  # fmt: skip
 
     def test_the_simplest_model_where_nothing_moves(self):
         for shape in self.RESTS[:2]:
@@ -183,7 +183,7 @@ class Ends(ProgramTest):
     def test_rest_and_extreme_numbers_end_within_their_limit(self):
         """A seeded table; a machine may be slow, but an endless trial run would take much longer."""
         random = Random(36)
-        for _ in range(12):
+        for _ in range(4):  # fuzz.auto has more
             words = {"shape": random.choice(self.RESTS), "tier": random.choice(("axisym", "axisym", "auto", "surface3d")),
                      **{key: random.choice(self.EXTREMES) for key in ("Re", "gamma", "k20", "end")}}  # fmt: skip
             case = self.case_of(**words)
@@ -193,7 +193,7 @@ class Ends(ProgramTest):
                     began = time.monotonic()
                     out, err = process.communicate(timeout=90)
                     self.assertIn(process.returncode, (0, 3, 4, 5) if command[0] == "run" else (0,), out + err)
-                    self.assertLess(time.monotonic() - began, 2 + 20 if command[0] == "run" else 60)
+                    self.assertLess(time.monotonic() - began, 0.5 + 20 if command[0] == "run" else 60)
 
 
 class OtherKind(ProgramTest):

@@ -196,42 +196,18 @@ Step resume(double time) {
 // An earlier result of the same name, unfinished.
 const std::vector<Step> before = {create("# before\n"), frame(0), row(1)};
 
-const std::vector<Step> run = {create(case_text),
-                               frame(0),
-                               row(1),
-                               frame(1, 600),
-                               row(2),
-                               checkpoint(2),
-                               mesh(false),
-                               discard(),
-                               row(0),
-                               frame(0),
-                               row(1),
-                               checkpoint(1),
-                               row(2),
-                               frame(2, 600),
-                               row(3),
-                               abandon(),
-                               resume(3),
-                               checkpoint(3),
-                               frame(3),
-                               mesh(false),
-                               surface_frame(3.5, 0),
-                               mesh(true),
-                               surface_frame(4, 1),
-                               row(4),
-                               abandon(),
-                               resume(4),
-                               finish("time-limit"),
-                               abandon(),
-                               resume(5),
-                               frame(5),
-                               finish("finished")};
+const std::vector<Step> run = {create(case_text),   frame(0),  row(1),        checkpoint(1),
+                               mesh(false),         discard(), row(0),        frame(0),
+                               checkpoint(1),       row(2),    frame(2, 600), row(3),
+                               abandon(),           resume(3), mesh(true),    checkpoint(3),
+                               surface_frame(4, 0), abandon(), resume(5),     finish("finished")};
 
 class Durability : public testing::Test {
 protected:
     void SetUp() override {
-        std::string pattern = (fs::temp_directory_path() / "tubule-durability-XXXXXX").string();
+        // In memory where there is such a folder: a disk takes 5 ms to sync, which no test here can see.
+        const fs::path memory = "/dev/shm";
+        std::string pattern = ((fs::exists(memory) ? memory : fs::temp_directory_path()) / "tubule-XXXXXX").string();
         ASSERT_NE(mkdtemp(pattern.data()), nullptr);
         directory = pattern;
         file = directory / "run.hdf";
@@ -358,7 +334,7 @@ TEST_F(Durability, KilledAtEveryOperationOfARun) {
     };
     take(steps, file);
     durable::fault = nullptr;
-    ASSERT_GT(operations.size(), 100u);
+    ASSERT_GT(operations.size(), 80u);
 
     for (std::size_t n = 0; n < operations.size(); ++n) {
         // All of a write may have happened and the process be dead nevertheless: share 1.
