@@ -59,26 +59,21 @@ class GrowTest(ProgramTest):
 
 
 class Extended(GrowTest):
-    def test_by_values_and_a_range(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
-        out = self.scan("scan.hdf", "--extend", f"--over={AMPLITUDE}=0.3:0.5:3")[0]
-        self.assertIn("3 of 3 points", out)
-        self.assertIn("1 run now", out)  # 0.4; the others were known
-        self.scan("scan.hdf", "--extend", f"--over={AMPLITUDE}=0.2,0.45")
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.2,0.3,0.4,0.45,0.5")
-
-    def test_by_two_axes(self):
-        """Those that are known had the values of the case: 1e-3, and a radius of 1."""
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
-        out = self.scan("scan.hdf", "--extend", f"--over={K42}=1e-5,1e-2", f"--over={RADIUS}=1,1.1")[0]
-        self.assertIn("12 of 12 points", out)
-        self.assertIn("10 run now", out)
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-3,1e-2", f"{RADIUS}=1,1.1")
-
-    def test_by_an_axis_of_which_the_scan_had_one_value_set(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--set={K42}=1e-2", "-o", "scan.hdf")
-        self.scan("scan.hdf", "--extend", f"--over={K42}=1e-5")
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-2")
+    def test_are_as_made_at_once(self):
+        """A scan, what extends it, how many points are run then, and the same at once."""
+        known = f"{AMPLITUDE}=0.3,0.5"
+        for first, more, run, whole in (
+            ([known], [f"{AMPLITUDE}=0.3:0.5:3"], 1, [f"{AMPLITUDE}=0.3,0.4,0.5"]),  # the others were known
+            ([known], [f"{AMPLITUDE}=0.2,0.45"], 2, [f"{AMPLITUDE}=0.2,0.3,0.45,0.5"]),
+            # Those that are known had the values of the case: 1e-3, and a radius of 1.
+            ([known], [f"{K42}=1e-5,1e-2", f"{RADIUS}=1,1.1"], 10, [known, f"{K42}=1e-5,1e-3,1e-2", f"{RADIUS}=1,1.1"]),
+            ([known, f"--set={K42}=1e-2"], [f"{K42}=1e-5"], 2, [known, f"{K42}=1e-5,1e-2"]),
+        ):
+            with self.subTest(more=more):
+                self.scan("case.toml", f"--over={first[0]}", *first[1:], "-o", "scan.hdf", "--overwrite")
+                out = self.scan("scan.hdf", "--extend", *(f"--over={o}" for o in more))[0]
+                self.assertIn(f"{run} run now", out)
+                self.assert_as_made_at_once(*whole, more=["--overwrite"])
 
     def test_into_another_file(self):
         self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "small.hdf")
@@ -137,23 +132,20 @@ class Extended(GrowTest):
 
 
 class Merged(GrowTest):
-    def test_parts_of_one_axis(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.35", f"--over={K42}=1e-5,1e-2", "-o", "scan.hdf")
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.35,0.5", f"--over={K42}=1e-5,1e-2", "-o", "other.hdf")
-        self.assertIn("0 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.35,0.5", f"{K42}=1e-5,1e-2")
-
-    def test_what_a_set_tells_apart_becomes_an_axis(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", "-o", "scan.hdf")
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--set={K42}=1e-2", "-o", "other.hdf")
-        self.assertIn("0 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-3,1e-2")
-
-    def test_what_neither_has_is_run(self):
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.3", f"--over={K42}=1e-5", "-o", "scan.hdf")
-        self.scan("case.toml", f"--over={AMPLITUDE}=0.5", f"--over={K42}=1e-2", "-o", "other.hdf")
-        self.assertIn("2 run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
-        self.assert_as_made_at_once(f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-2")
+    def test_are_as_made_at_once(self):
+        """Two scans, how many points are run when they are merged, and the same at once."""
+        known, both = f"{AMPLITUDE}=0.3,0.5", f"{K42}=1e-5,1e-2"
+        for one, other, run, whole in (
+            ([f"{AMPLITUDE}=0.3,0.35", both], [f"{AMPLITUDE}=0.35,0.5", both], 0, [f"{AMPLITUDE}=0.3,0.35,0.5", both]),
+            ([known], [known, f"--set={K42}=1e-2"], 0, [known, f"{K42}=1e-3,1e-2"]),  # it becomes an axis
+            ([f"{AMPLITUDE}=0.3", f"{K42}=1e-5"], [f"{AMPLITUDE}=0.5", f"{K42}=1e-2"], 2, [known, both]),
+        ):
+            with self.subTest(one=one, other=other):
+                for file, axes in (("scan.hdf", one), ("other.hdf", other)):
+                    options = [axis if axis.startswith("--") else f"--over={axis}" for axis in axes]
+                    self.scan("case.toml", *options, "-o", file, "--overwrite")
+                self.assertIn(f"{run} run now", self.scan("scan.hdf", "--merge", "other.hdf")[0])
+                self.assert_as_made_at_once(*whole, more=["--overwrite"])
 
     def test_other_cases_are_refused(self):
         self.write("other.toml", CASE.replace("20.0", "19.0"))

@@ -150,17 +150,6 @@ TEST_F(ResultFile, RoundTrip) {
     }
 }
 
-TEST_F(ResultFile, EmptyCaseAndNoRows) {
-    ResultWriter::create(file, {"", {}}, {}, {"time"}).finish({});
-    const Result result = read_result(file);
-    EXPECT_EQ(result.case_text.text, "");
-    EXPECT_TRUE(result.case_text.sets.empty());
-    EXPECT_TRUE(result.about.empty());
-    EXPECT_TRUE(result.series.at("time").empty());
-    EXPECT_TRUE(result.frames.empty());
-    EXPECT_FALSE(result.checkpoint);
-}
-
 // HDF5 stores many attributes in another way than few, and lists names by a tree from some number on.
 TEST_F(ResultFile, ManyFramesAndManyNamesKeepTheirOrder) {
     std::vector<std::string> names = {"time"};
@@ -181,34 +170,6 @@ TEST_F(ResultFile, ManyFramesAndManyNamesKeepTheirOrder) {
     EXPECT_EQ(result.about, about);
     expect_same(result.frames[0], record);
     for (int i = 1; i < 50; ++i) EXPECT_EQ(result.frames[i].time, i);
-}
-
-TEST_F(ResultFile, DiscardForgetsRowsFramesAndCheckpoint) {
-    auto writer = create();
-    writer.row(row_at(0));
-    writer.frame(record_at(0));
-    writer.checkpoint(record_at(0));
-    writer.discard();
-    writer.row(row_at(5));
-    writer.finish({});
-    const Result result = read_result(file);
-    EXPECT_EQ(result.series.at("time"), std::vector<double>{5});
-    EXPECT_TRUE(result.frames.empty());
-    EXPECT_FALSE(result.checkpoint);
-}
-
-TEST_F(ResultFile, CreateReplacesAnOldResult) {
-    {
-        auto old = create();
-        old.row(row_at(0));
-        old.frame(record_at(0));
-    }  // not finished
-    auto writer = ResultWriter::create(file, {"y = 2\n", {}}, {}, {"time"});
-    EXPECT_EQ(read_result(file).case_text.text, "x = 1\n");
-    writer.row(std::vector<double>{7});
-    EXPECT_EQ(read_result(file).case_text.text, "y = 2\n");
-    EXPECT_EQ(read_result(file).series.at("time"), std::vector<double>{7});
-    EXPECT_TRUE(read_result(file).frames.empty());
 }
 
 TEST_F(ResultFile, NothingFollowsFinish) {
@@ -519,40 +480,6 @@ TEST_F(ResultFile, FramesOfALargeResultAreWrittenOnce) {
 
 // ---- resuming
 
-TEST_F(ResultFile, ResumeFromTheLastFrameDropsLaterRows) {
-    {
-        auto writer = create();
-        writer.checkpoint(record_at(0.5));
-        for (const double time : {0.0, 1.0, 2.0, 2.5}) writer.row(row_at(time));
-        writer.frame(record_at(0));
-        writer.frame(record_at(2));
-    }
-    auto writer = ResultWriter::resume(file);
-    expect_same(writer.restart_record(), record_at(2));
-    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2, 2.5}));
-    writer.row(row_at(4));
-    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2, 4}));
-    writer.finish({});
-    const Result result = read_result(file);
-    EXPECT_EQ(result.series.at("time"), (std::vector<double>{0, 1, 2, 4}));
-    EXPECT_EQ(result.series.at("energy"), (std::vector<double>{1e17, 1e17 + 1, 1e17 + 2, 1e17 + 4}));
-    EXPECT_EQ(result.frames.size(), 2u);
-    expect_same(*result.checkpoint, record_at(0.5));
-}
-
-TEST_F(ResultFile, ResumeFromALaterCheckpoint) {
-    {
-        auto writer = create();
-        for (const double time : {0.0, 1.0, 2.0, 3.0}) writer.row(row_at(time));
-        writer.frame(record_at(0));
-        writer.checkpoint(record_at(2));
-    }
-    auto writer = ResultWriter::resume(file);
-    expect_same(writer.restart_record(), record_at(2));
-    writer.frame(record_at(2.5));
-    EXPECT_EQ(read_result(file).series.at("time"), (std::vector<double>{0, 1, 2}));
-}
-
 TEST_F(ResultFile, AFinishedResultResumesAndIsNoLongerFinished) {
     {
         auto writer = ResultWriter::create(file, {"", {}}, {{"version", "1"}}, series);
@@ -684,12 +611,6 @@ TEST_F(ResultFile, ADamagedResultNamesItsLack) {
     EXPECT_CONTAINS(damaged("f.move('frames/000000', 'frames/last')"), "000000");
     EXPECT_CONTAINS(damaged("del f['frames/000000'].attrs['time']; f['frames/000000'].attrs['time'] = 'now'"), "time");
     EXPECT_CONTAINS(damaged("del f['case'].attrs['set']"), "set");
-}
-
-TEST_F(ResultFile, ACutOffFileIsRefused) {
-    create().finish({});
-    fs::resize_file(file, fs::file_size(file) / 2);
-    EXPECT_CONTAINS(message_of([&] { read_result(file); }), "it is cut off");
 }
 
 // The writer refuses them; another program may have changed the file since.
