@@ -30,8 +30,8 @@ AMPLITUDE, K42 = "shape.mode.0.amplitude", "energy.k42"
 CASE = UNDULATED_TUBE
 # A map with pinched tubes, unduloids (held open by k42) and straight tubes; 36 points, 0.2 s.
 MAP = ("--over", f"{AMPLITUDE}=0.3:0.5:6", "--over", f"{K42}=1e-5:1e-2:6:log")
-# Points that take 0.3 s each, so that there is time to kill their scan.
-SLOW = ("--over", f"{AMPLITUDE}=0.1:0.12:8", "--set", "time.end=0.5", "--set", "discretisation.elements=40",
+# Points that take 0.5 s each, so that there is time to kill their scan.
+SLOW = ("--over", f"{AMPLITUDE}=0.1:0.12:8", "--set", "time.end=0.5", "--set", "discretisation.elements=150",
         "--set", "discretisation.time_tolerance=1e-12", "--set", "time.max_order=2", "--to-the-end")
 
 
