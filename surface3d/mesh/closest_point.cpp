@@ -1,5 +1,6 @@
 #include "surface3d/mesh/closest_point.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -7,10 +8,15 @@
 namespace tubule::surface3d {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int most_iterations = 30;
-constexpr double converged = 1e-14;  // in xi, eta
+// Parts are divided until their bulge is at most this fraction of their longest edge, up to this depth: close enough
+// for Newton's method to converge.
+constexpr double flat_enough = 0.05;
+constexpr int deepest = 4;
+
+const std::array<Vector2d, 3> reference_corners{Vector2d(0, 0), Vector2d(1, 0), Vector2d(0, 1)};
 
 int number_of(int j, int m) {
     return (j + m) * (j + m + 1) / 2 + m;
@@ -32,41 +38,72 @@ Eigen::MatrixXd bernstein_from_nodes(int order) {
     return values.inverse();
 }
 
-Eigen::Vector2d on_edge(int edge, double s) {
-    if (edge == 0) return {s, 0};
-    return edge == 1 ? Eigen::Vector2d(1 - s, s) : Eigen::Vector2d(0, 1 - s);
+// The part of a segment, 0 ... 1, that is nearest to x.
+double along_segment(const Vector3d& from, const Vector3d& to, const Vector3d& x) {
+    const Vector3d edge = to - from;
+    const double square = edge.squaredNorm();
+    return square > 0 ? std::clamp(edge.dot(x - from) / square, 0.0, 1.0) : 0;
 }
 
-// How far one can go from a point of the triangle, in units of `step`: 1 at most.
-double room(const Eigen::Vector2d& at, const Eigen::Vector2d& step) {
-    const Eigen::Vector3d l(1 - at.sum(), at[0], at[1]), d(-step.sum(), step[0], step[1]);
-    double part = 1;
-    for (int c = 0; c < 3; ++c)
-        if (d[c] < 0) part = std::min(part, l[c] / -d[c]);
-    return std::max(part, 0.0);
+// Of a flat triangle: barycentric coordinates of the point nearest to x.
+Vector3d nearest_barycentric(const std::array<Vector3d, 3>& corner, const Vector3d& x) {
+    const Vector3d u = corner[1] - corner[0], v = corner[2] - corner[0], w = x - corner[0];
+    const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), det = uu * vv - uv * uv;
+    if (det > 0) {
+        const double s = (vv * u.dot(w) - uv * v.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
+        if (s >= 0 && t >= 0 && s + t <= 1) return {1 - s - t, s, t};
+    }
+    Vector3d best = Vector3d::UnitX();
+    double least = std::numeric_limits<double>::infinity();
+    for (int e = 0; e < 3; ++e) {
+        const Vector3d &from = corner[e], &to = corner[(e + 1) % 3];
+        const double t = along_segment(from, to, x), away = (from + t * (to - from) - x).squaredNorm();
+        if (away >= least) continue;
+        least = away;
+        best.setZero();
+        best[e] = 1 - t, best[(e + 1) % 3] = t;
+    }
+    return best;
 }
 
 }  // namespace
 
-ClosestPoint::ClosestPoint(const CurvedMesh& mesh) : order_(mesh.order), period_(mesh.period), cell_(mesh.triangles()) {
-    const Eigen::MatrixXd to_bernstein = bernstein_from_nodes(order_);
-    for (const auto& [i, j, m] : lattice(order_)) start_.push_back(Eigen::Vector2d(j, m) / order_);
+struct ClosestPoint::Search {
+    Vector3d x;                        // the query point, as the periodic image sees it
+    const Vector3d* normal = nullptr;  // none: points may face any way
+    double square = std::numeric_limits<double>::infinity();
+    int cell = -1;
+    Vector2d at;
+    Vector3d from;  // x where the nearest point was found
+
+    void consider(int c, const Vector2d& place, const CellPoint& p) {
+        const double away = (p.x - x).squaredNorm();
+        if (!(away < square) || (normal && p.u.cross(p.v).dot(*normal) <= 0)) return;
+        square = away, cell = c, at = place, from = x;
+    }
+};
+
+ClosestPoint::ClosestPoint(const CurvedMesh& mesh)
+    : order_(mesh.order), period_(mesh.period), cell_(mesh.triangles()), to_bernstein_(bernstein_from_nodes(order_)) {
+    for (const auto& [i, j, m] : lattice(order_)) node_place_.push_back(Vector2d(j, m) / order_);
     const int n = mesh.nodes_per_cell();
-    std::vector<BoxTree<3>::Box> boxes(mesh.triangles());
-    for (int cell = 0; cell < mesh.triangles(); ++cell)
+    std::vector<BoxTree<3>::Box> boxes;
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
         for (int i = 0; i < n; ++i) {
-            Eigen::Vector3d& b = cell_[cell][i] = Eigen::Vector3d::Zero();
-            for (int a = 0; a < n; ++a) b += to_bernstein(i, a) * mesh.position(cell, a);
-            boxes[cell].extend(b);
+            Vector3d& b = cell_[cell][i] = Vector3d::Zero();
+            for (int a = 0; a < n; ++a) b += to_bernstein_(i, a) * mesh.position(cell, a);
         }
+        add_parts(cell, reference_corners, 0, boxes);
+    }
     tree_ = BoxTree<3>(std::move(boxes));
 }
 
 // De Casteljau; the last levels but one and two hold the derivatives.
-ClosestPoint::Point ClosestPoint::evaluate(int cell, const Eigen::Vector2d& at) const {
+ClosestPoint::CellPoint ClosestPoint::evaluate(int cell, const Eigen::Vector2d& at) const {
     Coefficients b = cell_[cell];
     const double l0 = 1 - at[0] - at[1];
-    Point p;
+    CellPoint p;
+    p.uu = p.uv = p.vv = Eigen::Vector3d::Zero();  // of flat triangles
     for (int level = order_; level > 0; --level) {
         if (level == 2) {
             const double scale = order_ * (order_ - 1);
@@ -83,76 +120,111 @@ ClosestPoint::Point ClosestPoint::evaluate(int cell, const Eigen::Vector2d& at) 
     return p;
 }
 
-void ClosestPoint::accept(int cell, const Eigen::Vector2d& at, const Query& query, MeshPoint& best) const {
-    const Point p = evaluate(cell, at);
-    const double distance = (p.x - query.x).norm();
-    if (!(distance < best.distance)) return;
-    const Eigen::Vector3d normal = p.u.cross(p.v).normalized();
-    if (normal.dot(query.normal) <= 0) return;
-    best = {cell, at, p.x + query.periods * period_ * Eigen::Vector3d::UnitZ(), normal, query.periods, distance};
+void ClosestPoint::add_parts(int cell, const std::array<Vector2d, 3>& corner, int depth,
+                             std::vector<BoxTree<3>::Box>& boxes) {
+    const auto place = [&](const Vector2d& at) {
+        return Vector2d(corner[0] + at[0] * (corner[1] - corner[0]) + at[1] * (corner[2] - corner[0]));
+    };
+    Eigen::MatrixX3d nodes(node_place_.size(), 3);
+    for (std::size_t a = 0; a < node_place_.size(); ++a)
+        nodes.row(a) = evaluate(cell, place(node_place_[a])).x.transpose();
+    const Eigen::MatrixX3d control = to_bernstein_ * nodes;
+    Part part{cell, corner, {}, 0};
+    for (int c = 0; c < 3; ++c) part.x[c] = nodes.row(c).transpose();
+    BoxTree<3>::Box box;
+    for (int a = 0; a <= order_; ++a)
+        for (int b = 0; b <= order_ - a; ++b) {
+            const Vector3d point = control.row(number_of(a, b)).transpose();
+            const Vector3d flat =
+                part.x[0] + (part.x[1] - part.x[0]) * a / order_ + (part.x[2] - part.x[0]) * b / order_;
+            part.bulge = std::max(part.bulge, (point - flat).norm());
+            box.extend(point);
+        }
+    const double edge =
+        std::max({(part.x[1] - part.x[0]).norm(), (part.x[2] - part.x[1]).norm(), (part.x[0] - part.x[2]).norm()});
+    if (part.bulge > flat_enough * edge && depth < deepest) {
+        const Vector2d m01 = (corner[0] + corner[1]) / 2, m12 = (corner[1] + corner[2]) / 2,
+                       m20 = (corner[2] + corner[0]) / 2;
+        add_parts(cell, {corner[0], m01, m20}, depth + 1, boxes);
+        add_parts(cell, {m01, corner[1], m12}, depth + 1, boxes);
+        add_parts(cell, {m20, m12, corner[2]}, depth + 1, boxes);
+        add_parts(cell, {m12, m20, m01}, depth + 1, boxes);
+        return;
+    }
+    part_.push_back(part);
+    boxes.push_back(box);
 }
 
-// Newton's method along a line or within the cell, where steps that do not come nearer are halved.
-Eigen::Vector2d ClosestPoint::approach(int cell, Eigen::Vector2d at, const Eigen::Vector2d* line,
-                                       const Vector3d& x) const {
-    double value = (evaluate(cell, at).x - x).squaredNorm();
-    for (int iteration = 0; iteration < most_iterations; ++iteration) {
-        const Point p = evaluate(cell, at);
-        const Vector3d r = p.x - x;
-        const Eigen::Vector2d slope(p.u.dot(r), p.v.dot(r));
-        Eigen::Matrix2d metric, second;
+void ClosestPoint::search_part(const Part& part, Search& search) const {
+    const Vector3d b = nearest_barycentric(part.x, search.x);
+    const double away = (b[0] * part.x[0] + b[1] * part.x[1] + b[2] * part.x[2] - search.x).norm() - part.bulge;
+    if (away > 0 && away * away >= search.square) return;
+    search_cell(part.cell, b[0] * part.corner[0] + b[1] * part.corner[1] + b[2] * part.corner[2], search);
+}
+
+// Newton's method on the polynomials, which continue beyond the triangle, then along the edges that it has crossed.
+void ClosestPoint::search_cell(int cell, Vector2d at, Search& search) const {
+    constexpr int most = 20;
+    constexpr double longest = 0.5, done = 1e-9, margin = 0.5;
+    double last = 1;
+    bool converged = false;
+    for (int i = 0; i < most; ++i) {
+        const CellPoint p = evaluate(cell, at);
+        if (at.minCoeff() >= 0 && at.sum() <= 1) search.consider(cell, at, p);
+        if ((converged = last < done)) break;
+        const Vector3d away = p.x - search.x;
+        const Vector2d gradient(p.u.dot(away), p.v.dot(away));
+        Eigen::Matrix2d metric;
         metric << p.u.dot(p.u), p.u.dot(p.v), p.u.dot(p.v), p.v.dot(p.v);
-        second << p.uu.dot(r), p.uv.dot(r), p.uv.dot(r), p.vv.dot(r);
-        second += metric;
-        Eigen::Vector2d step;
-        if (line) {
-            const double along = line->dot(second * *line);
-            step = -line->dot(slope) / (along > 0 ? along : line->dot(metric * *line)) * *line;
-        } else {
-            const bool convex = second(0, 0) > 0 && second.determinant() > 0;
-            step = -(convex ? second : metric).inverse() * slope;
-        }
-        double part = room(at, step);
-        const double shortest = converged / std::max(step.norm(), converged);
-        for (; part > shortest; part /= 2) {
-            const double next = (evaluate(cell, at + part * step).x - x).squaredNorm();
-            if (next > value) continue;
-            at += part * step, value = next;
-            break;
-        }
-        if (part <= shortest) break;
+        Eigen::Matrix2d hessian = metric;
+        hessian(0, 0) += p.uu.dot(away), hessian(1, 1) += p.vv.dot(away);
+        hessian(0, 1) += p.uv.dot(away), hessian(1, 0) = hessian(0, 1);
+        const bool convex = hessian(0, 0) > 0 && hessian.determinant() > 1e-3 * metric.determinant();
+        Vector2d step = -(convex ? hessian : metric).inverse() * gradient;
+        last = step.norm();
+        if (!(last < longest)) step *= longest / last;
+        at += step;
+        if (!(std::min(at.minCoeff(), 1 - at.sum()) > -margin)) break;
     }
-    return at;
+    const double inside[3] = {1 - at.sum(), at[0], at[1]};
+    for (int edge = 0; edge < 3; ++edge)  // edge e runs from corner e to the next; corner e + 2 is opposite
+        if (!converged || inside[(edge + 2) % 3] < 0) search_edge(cell, edge, at, search);
 }
 
-// From the nearest node; and if that ends on an edge, also along the edges and from the nearest point there.
-void ClosestPoint::look_at(int cell, const Query& query, MeshPoint& best) const {
-    const auto distance2 = [&](const Eigen::Vector2d& at) { return (evaluate(cell, at).x - query.x).squaredNorm(); };
-    const auto nearer = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return distance2(a) < distance2(b); };
-    const Eigen::Vector2d start = *std::min_element(start_.begin(), start_.end(), nearer);
-    Eigen::Vector2d at = approach(cell, start, nullptr, query.x);
-    if (at.minCoeff() <= 0 || at.sum() >= 1 - converged) {
-        for (int edge = 0; edge < 3; ++edge) {
-            const Eigen::Vector2d from = on_edge(edge, 0), line = on_edge(edge, 1) - from;
-            Eigen::Vector2d begin = from;
-            for (int i = 1; i <= order_; ++i)
-                if (const Eigen::Vector2d other = from + i * line / order_; nearer(other, begin)) begin = other;
-            if (const Eigen::Vector2d found = approach(cell, begin, &line, query.x); nearer(found, at)) at = found;
-        }
-        at = approach(cell, at, nullptr, query.x);
+void ClosestPoint::search_edge(int cell, int edge, const Vector2d& from, Search& search) const {
+    constexpr int most = 15;
+    constexpr double done = 1e-9;
+    const Vector2d begin = reference_corners[edge], way = reference_corners[(edge + 1) % 3] - begin;
+    double t = std::clamp(way.dot(from - begin) / way.squaredNorm(), 0.0, 1.0), last = 1;
+    for (int i = 0; i < most && last > 0; ++i) {
+        const CellPoint p = evaluate(cell, begin + t * way);
+        search.consider(cell, begin + t * way, p);
+        if (last < done) return;
+        const Vector3d tangent = p.u * way[0] + p.v * way[1], away = p.x - search.x;
+        const Vector3d bend = p.uu * (way[0] * way[0]) + p.uv * (2 * way[0] * way[1]) + p.vv * (way[1] * way[1]);
+        const double square = tangent.squaredNorm(), curved = square + bend.dot(away);
+        const double next = std::clamp(t - tangent.dot(away) / (curved > 1e-3 * square ? curved : square), 0.0, 1.0);
+        last = std::abs(next - t);
+        t = next;
     }
-    accept(cell, at, query, best);
 }
 
-MeshPoint ClosestPoint::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) const {
-    MeshPoint best;
-    double square = std::numeric_limits<double>::infinity();
-    tree_.nearest(x, period_, square, [&](std::size_t cell, const Vector3d& image) {
-        const int periods = period_ > 0 ? static_cast<int>(std::round((x.z() - image.z()) / period_)) : 0;
-        look_at(static_cast<int>(cell), {image, normal, periods}, best);
-        square = best.distance * best.distance;
+MeshPoint ClosestPoint::nearest(const Vector3d& x, const Vector3d* normal) const {
+    Search search;
+    search.x = x, search.normal = normal;
+    tree_.nearest(x, period_, search.square, [&](std::size_t part, const Vector3d& image) {
+        search.x = image;
+        search_part(part_[part], search);
     });
-    return best;
+    if (search.cell < 0) return {};
+    const CellPoint p = evaluate(search.cell, search.at);
+    const double up = x.z() - search.from.z();
+    return {search.cell,
+            search.at,
+            p.x + up * Vector3d::UnitZ(),
+            p.u.cross(p.v).normalized(),
+            period_ > 0 ? static_cast<int>(std::round(up / period_)) : 0,
+            std::sqrt(search.square)};
 }
 
 }  // namespace tubule::surface3d

@@ -29,11 +29,8 @@ using surface3d::torus_grid;
 using surface3d::tube_rings;
 
 TriangleSurface surface(const CurvedMesh& mesh) {
-    std::vector<double> points;
-    for (const Vector3d& x : mesh.nodes) points.insert(points.end(), x.begin(), x.end());
-    return TriangleSurface({mesh.order, mesh.nodes.size(), mesh.cells, mesh.period, mesh.shifts}, points);
+    return TriangleSurface(mesh);
 }
-
 template <class Shape>
 TriangleSurface surface(const surface3d::TriangleMesh& base, int order, const Shape& shape) {
     return surface(mapped_mesh(base, order, [&](const Vector3d& p) { return Vector3d(position(shape, p)); }));
@@ -85,13 +82,12 @@ TEST(NearestPoint, OfFlatFacesEdgesAndCorners) {
     // The triangle (0,0,0), (1,0,0), (0,1,0) in every order: what is nearest is plain geometry.
     for (int order = 1; order <= 4; ++order) {
         SCOPED_TRACE(order);
-        SurfaceCells cells{order, 0, {}, 0, {}};
-        std::vector<double> points;
+        CurvedMesh mesh{order, {}, {}, 0, {}};
         for (const auto& [i, j, l] : surface3d::lattice(order)) {
-            cells.cells.push_back(static_cast<int>(cells.nodes++));
-            points.insert(points.end(), {double(j) / order, double(l) / order, 0});
+            mesh.cells.push_back(mesh.size());
+            mesh.nodes.emplace_back(double(j) / order, double(l) / order, 0);
         }
-        const TriangleSurface triangle(cells, points);
+        const TriangleSurface triangle(mesh);
         struct Expected {
             Vector3d from, nearest;
         };

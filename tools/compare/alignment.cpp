@@ -20,7 +20,7 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t coarse_samples = 150, fine_samples = 3000;
 constexpr std::size_t tried_closely = 12;  // initial guesses that are refined, besides those without a rotation
-constexpr double as_good = 1.01;          // mean squares within this factor count as equal: the smallest rotation wins
+constexpr double as_good = 1.01;           // mean squares within this factor count as equal: the smallest rotation wins
 constexpr int most_steps = 30, last_steps = 12;
 // Relative decrease of the mean square in a step below which the iteration ends, in three rounds. The position of the
 // minimum is accurate to the square root of it.

@@ -8,6 +8,7 @@
 
 #include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
+#include "surface3d/run/mesh_record.hpp"
 #include "tools/compare/revolution_surface.hpp"
 #include "tools/compare/triangle_surface.hpp"
 
@@ -39,10 +40,9 @@ Eigen::Vector3d centre(const Surface& surface) {
 // Throws std::invalid_argument if the frame has no surface, or a damaged one.
 std::unique_ptr<Surface> frame_surface(const Record& frame, const Result& result) {
     if (frame.mesh) {
-        const Array* points = find_array(frame, "points");
-        if (!points || *frame.mesh >= result.meshes.size())
-            throw std::invalid_argument("the points or the triangles of its surface are missing");
-        return std::make_unique<TriangleSurface>(result.meshes[*frame.mesh], points->data);
+        if (*frame.mesh >= result.meshes.size())
+            throw std::invalid_argument("the triangles of its surface are missing");
+        return std::make_unique<TriangleSurface>(surface3d::frame_surface(frame, result.meshes[*frame.mesh]));
     }
     const auto profile = profile_of(frame);
     if (const auto* spline = std::get_if<Revolution>(&profile)) return std::make_unique<RevolutionSurface>(*spline);
