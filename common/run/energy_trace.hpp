@@ -17,6 +17,8 @@ public:
     bool empty() const { return time_.empty(); }
     int size() const { return static_cast<int>(time_.size()); }
     double end() const { return time_.back(); }
+    const std::vector<double>& times() const { return time_; }
+    const std::vector<double>& energies() const { return energy_; }
     int points_after(double t) const;
     // The number of steps until t that grew by (clearly) less than this factor: their lengths were chosen for accuracy.
     int limited_steps(double growth, double t) const;

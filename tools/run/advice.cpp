@@ -4,32 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <variant>
 
 #include "common/run/run.hpp"
-#include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
-#include "tools/auto/auto_run.hpp"
+#include "tools/auto/choice.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/model_advice.hpp"
+#include "tools/run/trial_run.hpp"
 
 namespace tubule {
 namespace {
 
 constexpr double watch_limit = 3;  // seconds of a processor: a busy machine must not change what is advised
 constexpr double watch_accuracy = 1e-3;
-
-// Ends a run of tier "auto" that takes long, or goes on in three dimensions.
-class Brief : public RunObserver {
-public:
-    bool interrupted() override { return switched || std::clock() > end_; }
-    void note(const std::string&) override { switched = true; }
-    bool switched = false;
-
-private:
-    std::clock_t end_ = std::clock() + static_cast<std::clock_t>(watch_limit * CLOCKS_PER_SEC);
-};
 
 std::string reason_of(const RunSummary& s) {
     for (const auto& [name, value] : s.details)
@@ -38,18 +26,17 @@ std::string reason_of(const RunSummary& s) {
 }
 
 // Of an axisymmetric start: "axisym" unless waves around the axis grow.
-void choose_tier(const Case& c, const Choice& choice, const Forecast& expected, Advice& out) {
+void choose_tier(const Case& c, const Forecast& expected, Advice& out) {
     Case watched = c;
     watched.tier = Tier::automatic;
     watched.discretisation = {}, watched.surface = {}, watched.time.limit = {};
     watched.accuracy.energy = std::max(c.accuracy.energy, watch_accuracy);
-    Brief brief;
-    const RunSummary s = run_auto(watched, choice, brief, nullptr, nullptr);
-    pause_if_due();
+    const TrialRun trial(watched, {.seconds = watch_limit, .axisymmetric = true});
+    const RunSummary& s = trial.summary;
     out.reason = reason_of(s);
     if (s.stop.reason == Stop::interrupted) {
         out.tier = "auto";
-        if (!brief.switched) out.reason += fmt::format(", as far as a trial shows, until t = {:.3g}", s.stop.time);
+        if (!trial.switched) out.reason += fmt::format(", as far as a trial shows, until t = {:.3g}", s.stop.time);
         return;
     }
     out.tier = "axisym";
@@ -90,7 +77,7 @@ std::optional<Advice> advice(const Case& c, const Forecast& expected) {
         choose_mesh(c, *choice.start, expected, out);
         return out;
     }
-    choose_tier(c, choice, expected, out);
+    choose_tier(c, expected, out);
     advise_model(c, out);
     return out;
 }

@@ -4,14 +4,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 
-#include "common/solve/pause.hpp"
 #include "common/solve/progress.hpp"
 #include "surface3d/run/motion_forecast.hpp"
-#include "tools/run/engine.hpp"
+#include "tools/run/trial_run.hpp"
 
 namespace tubule {
 namespace {
@@ -33,27 +30,20 @@ double memory_in_use() {
 
 Forecast by_its_beginning(Case c) {
     c.time.limit = std::min(pilot_limit, 0.5 * c.time.limit.value_or(pilot_limit / 0.5));
-    const auto engine = engine_for(c);
-    Pilot pilot;
-    const auto begin = std::chrono::steady_clock::now();
-    const std::clock_t before = std::clock();
-    const RunSummary s = engine->run(pilot);
-    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    pause_if_due();
+    const TrialRun trial(c, {});
+    const RunSummary& s = trial.summary;
     Forecast out;
     if (s.elements > 0) out.resolution = fmt::format("{} elements", s.elements);
     out.bytes = memory_in_use();
-    if (s.stop.reason == Stop::ill_posed && !pilot.moved()) out.ill_posed = s.stop.message;
-    // Of a busy machine the time of the processors, else, where threads share the work, that of the clock.
-    const double seconds = std::min(wall, static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
+    if (s.stop.reason == Stop::ill_posed && !trial.moved()) out.ill_posed = s.stop.message;
     if (s.stop.reason != Stop::time_limit) {
-        out.seconds = seconds;
-        if (pilot.moved()) out.steps = pilot.steps();
-    } else if (pilot.moved()) {
-        const double factor = pilot.all_by_done(c.time.end);
+        out.seconds = trial.seconds;
+        if (trial.moved()) out.steps = trial.steps();
+    } else if (trial.moved()) {
+        const double factor = trial.all_by_done(c.time.end);
         if (!(factor < most_extrapolated)) return out;
-        out.steps = factor * pilot.steps();
-        out.seconds = factor * seconds * (pilot.last_run() ? 1 : 1 + reported_by_coarser);
+        out.steps = factor * trial.steps();
+        out.seconds = factor * trial.seconds * (trial.last_run() ? 1 : 1 + reported_by_coarser);
     }
     return out;
 }

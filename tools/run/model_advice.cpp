@@ -4,11 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <iterator>
 #include <numbers>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "common/case/read.hpp"
@@ -17,7 +14,7 @@
 #include "common/solve/sparse.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/choice.hpp"
-#include "tools/run/engine.hpp"
+#include "tools/run/trial_run.hpp"
 
 namespace tubule {
 namespace {
@@ -37,91 +34,48 @@ constexpr double accuracy_of_surface = 1e-2;
 // L^2).
 constexpr double viscous = 2, slower = 4.5;
 
-struct Point {
-    double time, energy;
-};
-
-class Path : public RunObserver {
-public:
-    Path(const std::vector<std::string>& names, int most_rows)
-        : energy_(index(names, "energy")),
-          area_(index(names, "area")),
-          r_max_(index(names, "r_max")),
-          most_rows_(most_rows) {}
-    void row(std::span<const double> values) override {
-        ++rows_;
-        if (points.empty()) area = values[area_], r_max = values[r_max_];
-        points.push_back({values[0], values[energy_]});
-    }
-    void discard() override { points.clear(); }
-    bool interrupted() override { return switched || rows_ > most_rows_ || seconds() > most_seconds; }
-    // Tier "auto" tells that it goes on in three dimensions.
-    void note(const std::string&) override { switched = switched || !points.empty(); }
-    double seconds() const { return static_cast<double>(std::clock() - begin_) / CLOCKS_PER_SEC; }
-
-    double at(double time) const;
-    // The largest fall of the energy within this time: what is set in motion lags behind what is not.
-    double lag(double tau) const;
-    // The largest difference from the path that is slower by this factor.
-    double lead(double factor) const;
-
-    // Whether the energy, falling by steps of `part` > 0, needs less than half the time of an earlier step for one of
-    // them.
-    bool speeds_up(double part) const;
-    double fall() const { return points.front().energy - points.back().energy; }
-    // Nothing moves: the energy falls by no more than rounding.
-    bool rests() const { return !(fall() > rounding * std::abs(points.front().energy)); }
-
-    std::vector<Point> points;
-    double area = 0, r_max = 0;  // at the start
-    bool switched = false;
-
-private:
-    static std::size_t index(const std::vector<std::string>& names, const char* name) {
-        return std::find(names.begin(), names.end(), name) - names.begin();
-    }
-    std::size_t energy_, area_, r_max_;
-    int rows_ = 0, most_rows_;
-    std::clock_t begin_ = std::clock();
-};
-
-double Path::at(double time) const {
-    const auto after =
-        std::upper_bound(points.begin(), points.end(), time, [](double t, const Point& p) { return t < p.time; });
-    if (after == points.begin()) return points.front().energy;
-    const Point& a = *std::prev(after);
-    if (after == points.end()) return a.energy;
-    return std::lerp(a.energy, after->energy, (time - a.time) / (after->time - a.time));
+double fall(const EnergyTrace& path) {
+    return path.energies().front() - path.energies().back();
 }
 
-double Path::lag(double tau) const {
+// Nothing moves: the energy falls by no more than rounding.
+bool rests(const EnergyTrace& path) {
+    return !(fall(path) > rounding * std::abs(path.energies().front()));
+}
+
+double energy_at(const EnergyTrace& path, double time) {
+    return path(std::clamp(time, path.times().front(), path.end()));
+}
+
+// The largest fall of the energy within this time: what is set in motion lags behind what is not.
+double lag(const EnergyTrace& path, double tau) {
     double largest = 0;
-    for (const Point& p : points) largest = std::max(largest, p.energy - at(p.time + tau));
+    for (int i = 0; i < path.size(); ++i)
+        largest = std::max(largest, path.energies()[i] - energy_at(path, path.times()[i] + tau));
     return largest;
 }
 
-double Path::lead(double factor) const {
+// The largest difference from the path that is slower by this factor.
+double lead(const EnergyTrace& path, double factor) {
     double largest = 0;
-    for (const Point& p : points) largest = std::max(largest, at(p.time / factor) - p.energy);
+    for (int i = 0; i < path.size(); ++i)
+        largest = std::max(largest, energy_at(path, path.times()[i] / factor) - path.energies()[i]);
     return largest;
 }
 
-bool Path::speeds_up(double part) const {
-    const double top = points.front().energy;
-    double since = points.front().time, longest = 0;
-    const Point* before = &points.front();
+// Whether the energy, falling by steps of `part` > 0, needs less than half the time of an earlier step for one of them.
+bool speeds_up(const EnergyTrace& path, double part) {
+    const std::vector<double>&time = path.times(), &energy = path.energies();
+    double since = time.front(), longest = 0;
     int parts = 1;
-    for (const Point& p : points) {
+    for (std::size_t i = 1; i < time.size(); ++i)
         // More parts than there are in the whole fall would only be counted where the energy rises again.
-        for (; parts <= 2 * most_parts && p.energy <= top - parts * part; ++parts) {
-            const double level = top - parts * part;
-            const double along = (before->energy - level) / (before->energy - p.energy);
-            const double time = std::lerp(before->time, p.time, along);
-            if (time - since < longest / 2) return true;
-            longest = std::max(longest, time - since), since = time;
+        for (; parts <= 2 * most_parts && energy[i] <= energy[0] - parts * part; ++parts) {
+            const double along = (energy[i - 1] - (energy[0] - parts * part)) / (energy[i - 1] - energy[i]);
+            const double at = std::lerp(time[i - 1], time[i], along);
+            if (at - since < longest / 2) return true;
+            longest = std::max(longest, at - since), since = at;
         }
-        before = &p;
-    }
     return false;
 }
 
@@ -145,27 +99,27 @@ Case pilot_of(const Case& c, ModelKind kind, bool axisymmetric) {
 
 std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymmetric) {
     const Case simple = pilot_of(c, kind, axisymmetric);
-    const auto engine = engine_for(simple);
-    Path path(engine->series_names(), axisymmetric ? most_rows : most_rows_of_surface);
-    RunSummary s;
+    std::optional<TrialRun> trial;
     try {
-        s = engine->run(path);
+        trial.emplace(simple, TrialLimits{axisymmetric ? most_rows : most_rows_of_surface, most_seconds, true});
     } catch (const SolveError&) {
         return {};
     }
-    pause_if_due();
-    if ((s.stop.reason != Stop::finished && s.stop.reason != Stop::stationary) || path.points.empty()) return {};
-    if (path.rests()) return SimplerModel{.kind = kind, .seconds = path.seconds(), .rests = true};
-    if (path.speeds_up(std::clamp(c.accuracy.energy * s.reference_energy / 2, path.fall() / most_parts,
-                                  path.fall() / least_parts)))
-        return SimplerModel{kind, HUGE_VAL, HUGE_VAL, path.seconds()};
-    const double length2 = may_have_period(c.shape) ? path.r_max * path.r_max : path.area / (4 * std::numbers::pi);
+    const RunSummary& s = trial->summary;
+    const EnergyTrace& path = trial->energies;
+    if ((s.stop.reason != Stop::finished && s.stop.reason != Stop::stationary) || path.empty()) return {};
+    if (rests(path)) return SimplerModel{.kind = kind, .seconds = trial->seconds, .rests = true};
+    if (speeds_up(path, std::clamp(c.accuracy.energy * s.reference_energy / 2, fall(path) / most_parts,
+                                   fall(path) / least_parts)))
+        return SimplerModel{kind, HUGE_VAL, HUGE_VAL, trial->seconds};
+    const double length2 =
+        may_have_period(c.shape) ? trial->r_max * trial->r_max : trial->area / (4 * std::numbers::pi);
     const double viscosity = 1 / (c.model.Re * length2), gamma = motion_law(c.model).friction;
     const double tau = model_entry(c.model.kind).inertia ? 1 / (gamma + viscous * viscosity) : 0;
     const double factor = kind == ModelKind::overdamped ? 1 + slower * viscosity / gamma : 1;
-    const double end = path.points.back().time, rest = path.points.back().energy;
-    return SimplerModel{kind, (path.lag(tau) + path.lead(factor)) / s.reference_energy,
-                        (path.at((end - tau) / factor) - rest) / s.reference_energy, path.seconds()};
+    const double at_end = energy_at(path, (path.end() - tau) / factor) - path.energies().back();
+    return SimplerModel{kind, (lag(path, tau) + lead(path, factor)) / s.reference_energy, at_end / s.reference_energy,
+                        trial->seconds};
 }
 
 // Why a path does not tell; empty if it does.

@@ -1,0 +1,31 @@
+#include "tools/run/trial_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "common/solve/pause.hpp"
+#include "tools/run/engine.hpp"
+
+namespace tubule {
+
+TrialRun::TrialRun(const Case& c, const TrialLimits& limits) : limits_(limits) {
+    const auto engine = engine_for(c);
+    series_ = engine->series_names();
+    const auto begin = std::chrono::steady_clock::now();
+    begin_ = std::clock();
+    summary = engine->run(*this);
+    seconds = std::min(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), since_begin());
+    pause_if_due();
+}
+
+void TrialRun::row(std::span<const double> values) {
+    ++rows_;
+    const auto value = [&](const char* name) {
+        const auto column = static_cast<std::size_t>(std::ranges::find(series_, name) - series_.begin());
+        return column < values.size() ? values[column] : 0;
+    };
+    if (energies.empty()) area = value("area"), r_max = value("r_max");
+    energies.add(values[0], value("energy"));
+}
+
+}  // namespace tubule
