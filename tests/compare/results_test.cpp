@@ -173,12 +173,12 @@ TEST(Frames, ThatHoldNoSurfaceAreNamed) {
 
 TEST(Outcomes, AreWhatTheRunSays) {
     Result result = result_of({0, 1, 2.5}, {});
-    EXPECT_EQ(outcome(result).stop, "unfinished");
-    EXPECT_EQ(outcome(result).time, 2.5);
+    EXPECT_EQ(stop_word(result), "unfinished");
+    EXPECT_EQ(stop_time(result), 2.5);
     EXPECT_FALSE(stated_error(result));
     result.about = {{"stop", std::string("pinch-off")}, {"stop_time", 2.25}, {"estimated_error", 1e-5}};
-    EXPECT_EQ(outcome(result).stop, "pinch-off");
-    EXPECT_EQ(outcome(result).time, 2.25);
+    EXPECT_EQ(stop_word(result), "pinch-off");
+    EXPECT_EQ(stop_time(result), 2.25);
     EXPECT_EQ(stated_error(result), 1e-5);
 }
 

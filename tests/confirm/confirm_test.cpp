@@ -194,7 +194,7 @@ Result growing_tube(double first, double factor) {
 TEST(Confirm, seesAWaveThatGrows) {
     PointResult axisymmetric = straight();
     axisymmetric[Measure::time] = 1, axisymmetric[Measure::energy] = 10.5, axisymmetric[Measure::E_ref] = 5;
-    const Answer broken = answer(axisymmetric, growing_tube(1e-3, 20));
+    const SurfaceEnd broken = surface_end(axisymmetric, growing_tube(1e-3, 20));
     EXPECT_EQ(broken.verdict, Verdict::symmetry_broken);
     EXPECT_EQ(broken.n, 1);
     EXPECT_EQ(broken.m, 1);
@@ -204,21 +204,21 @@ TEST(Confirm, seesAWaveThatGrows) {
     EXPECT_NEAR(broken.linear_rate, rate(1, 1), 1e-10);             // of the case, whatever the frames show
     EXPECT_NEAR(broken.energy_difference, (11 - 10.5) / 5, 1e-12);  // at t = 1, where it ended in tier 1
 
-    const Answer calm = answer(axisymmetric, growing_tube(1e-3, 2));  // not yet three times
+    const SurfaceEnd calm = surface_end(axisymmetric, growing_tube(1e-3, 2));  // not yet three times
     EXPECT_EQ(calm.verdict, Verdict::agrees);
     EXPECT_EQ(calm.outcome, Outcome::uniform_tube);
 
     axisymmetric.outcome = Outcome::pinched;
-    EXPECT_EQ(answer(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::other_outcome);
+    EXPECT_EQ(surface_end(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::other_outcome);
     axisymmetric[Measure::time] = 3;  // it was not there then
-    EXPECT_EQ(answer(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::no_answer);
-    EXPECT_TRUE(std::isnan(answer(axisymmetric, growing_tube(1e-3, 1)).energy_difference));
+    EXPECT_EQ(surface_end(axisymmetric, growing_tube(1e-3, 1)).verdict, Verdict::no_answer);
+    EXPECT_TRUE(std::isnan(surface_end(axisymmetric, growing_tube(1e-3, 1)).energy_difference));
 
     Result lost = growing_tube(1e-3, 1);
     lost.about = {{"stop", std::string("solver-failed")}, {"stop_time", 2.0}};
-    EXPECT_EQ(answer(axisymmetric, lost).verdict, Verdict::no_answer);
+    EXPECT_EQ(surface_end(axisymmetric, lost).verdict, Verdict::no_answer);
     lost.about.clear();
-    EXPECT_THROW(answer(axisymmetric, lost), std::runtime_error);  // it is still going on
+    EXPECT_THROW(surface_end(axisymmetric, lost), std::runtime_error);  // it is still going on
 }
 
 }  // namespace

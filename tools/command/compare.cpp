@@ -25,6 +25,8 @@
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
 #include "tools/compare/results.hpp"
+#include "tools/run/continuation.hpp"
+#include "tools/scan/description.hpp"
 
 namespace tubule {
 
@@ -44,7 +46,8 @@ struct Tolerance {
 // Of one result, and what it must keep.
 struct Side {
     std::string path;
-    compare::Outcome outcome;
+    std::string stop;  // by name; "unfinished" if the run goes on or was killed
+    double stop_time = 0;
     std::optional<double> stated_error;
     std::size_t rows = 0;
     double area_drift = 0, volume_drift = 0;
@@ -81,16 +84,11 @@ std::vector<Tolerance> tolerances_of(const CompareOptions& options) {
     std::vector<Tolerance> out;
     for (const std::string& text : options.tolerances) {
         const std::size_t equals = text.find('=');
-        double most = -1;
-        if (equals != std::string::npos) {
-            const char *begin = text.data() + equals + 1, *end = text.data() + text.size();
-            const auto [rest, error] = std::from_chars(begin, end, most);
-            if (error != std::errc() || rest != end) most = -1;
-        }
-        if (!(most >= 0) || !std::isfinite(most))
+        const auto most = equals == std::string::npos ? std::nullopt : number_of(text.substr(equals + 1));
+        if (!most || *most < 0)
             refuse(
                 fmt::format("--tolerance {}: must be NAME=VALUE with a value of 0 or more, such as energy=1e-4", text));
-        out.push_back({text.substr(0, equals), most});
+        out.push_back({text.substr(0, equals), *most});
     }
     return out;
 }
@@ -100,11 +98,11 @@ std::size_t frame_number(const std::string& text, const Result& result, const st
     const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || rest != text.data() + text.size())
         refuse(fmt::format("--frames {}: must be I:J, a frame of A and one of B, such as 3:0 or -1:-1", option));
-    const long count = static_cast<long>(result.frames.size());
-    if (number >= count || number < -count)
+    const auto index = frame_index(result, number);
+    if (!index)
         refuse(fmt::format("--frames {}: no frame {}: there are {} frames, counted from 0, or from -1 backwards",
-                           option, number, count));
-    return static_cast<std::size_t>(number < 0 ? count + number : number);
+                           option, number, result.frames.size()));
+    return *index;
 }
 
 std::string frame_times(const Result& result) {
@@ -142,9 +140,9 @@ double largest(const std::vector<ShapeDifference>& shapes, const Value& value) {
 }
 
 double outcomes_apart(const Side& a, const Side& b) {
-    if (a.outcome.stop != b.outcome.stop) return std::numeric_limits<double>::infinity();
-    const double later = std::max(a.outcome.time, b.outcome.time);
-    return later > 0 ? std::abs(a.outcome.time - b.outcome.time) / later : 0;
+    if (a.stop != b.stop) return std::numeric_limits<double>::infinity();
+    const double later = std::max(a.stop_time, b.stop_time);
+    return later > 0 ? std::abs(a.stop_time - b.stop_time) / later : 0;
 }
 
 // All that a tolerance may be set for.
@@ -177,7 +175,8 @@ void require_known(const std::vector<Tolerance>& tolerances, const std::vector<Q
 
 Side side_of(const std::string& name, const Result& result) {
     return {name,
-            compare::outcome(result),
+            compare::stop_word(result),
+            compare::stop_time(result),
             compare::stated_error(result),
             result.series.at("time").size(),
             compare::drift(result, "area"),
@@ -215,7 +214,7 @@ double turn_of(const compare::RigidMotion& motion) {  // degrees
 }
 
 void add_side(Text& out, char letter, const Side& side) {
-    add(out, "{}  {}: {} at t = {:.8g}, {} rows", letter, side.path, side.outcome.stop, side.outcome.time, side.rows);
+    add(out, "{}  {}: {} at t = {:.8g}, {} rows", letter, side.path, side.stop, side.stop_time, side.rows);
     if (side.stated_error) add(out, "; error of the energy as stated {:.2g} of E_ref", *side.stated_error);
     add(out, "\n");
 }
@@ -258,8 +257,7 @@ Text words(const Comparison& c) {
     add(out, "\n{:<20} {:>10} {:>10}\n", "largest drift of", "A", "B");
     add(out, "{:<20} {:>10.2g} {:>10.2g}\n", "area", c.a.area_drift, c.b.area_drift);
     add(out, "{:<20} {:>10.2g} {:>10.2g}\n", "volume", c.a.volume_drift, c.b.volume_drift);
-    if (c.a.outcome.stop != c.b.outcome.stop)
-        add(out, "\nthe outcomes differ: {} and {}\n", c.a.outcome.stop, c.b.outcome.stop);
+    if (c.a.stop != c.b.stop) add(out, "\nthe outcomes differ: {} and {}\n", c.a.stop, c.b.stop);
     if (!c.checks.empty()) add(out, "\n");
     for (const Check& check : c.checks)
         add(out, "{:<20} {:>10.3g} {:<2} {:<8.3g} {}\n", check.quantity.name, check.quantity.value,
@@ -288,8 +286,8 @@ Text csv(const Comparison& c) {
 
 Json json_of(const Side& side) {
     return {{"file", side.path},
-            {"stop", side.outcome.stop},
-            {"stop_time", side.outcome.time},
+            {"stop", side.stop},
+            {"stop_time", side.stop_time},
             {"stated_error", or_null(side.stated_error)},
             {"rows", side.rows},
             {"area_drift", side.area_drift},

@@ -29,6 +29,7 @@
 #include "tools/command/text.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
+#include "tools/scan/packet.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
@@ -49,27 +50,27 @@ struct ConfirmOptions {
 };
 
 // A picked point in both tiers.
-struct Point {
+struct ConfirmedPoint {
     confirm::Pick pick;
     std::vector<std::string> sets;  // what varies, key=value
     Case c;
     PointResult axisymmetric;
     std::string surface_case, file;  // text; result
-    confirm::Answer answer;
+    confirm::SurfaceEnd surface;
 };
 
-bool agrees(const Point& p) {
-    return p.answer.verdict == Verdict::agrees;
+bool agrees(const ConfirmedPoint& p) {
+    return p.surface.verdict == Verdict::agrees;
 }
 
-std::string outcome_words(const Point& p) {
-    if (p.answer.verdict == Verdict::symmetry_broken) return "asymmetric";
-    return std::string(name(p.answer.outcome));
+std::string outcome_words(const ConfirmedPoint& p) {
+    if (p.surface.verdict == Verdict::symmetry_broken) return "asymmetric";
+    return std::string(name(p.surface.outcome));
 }
 
 // ---- in words
 
-void add_spectrum(std::string& out, const Point& p) {
+void add_spectrum(std::string& out, const ConfirmedPoint& p) {
     const auto waves = confirm::fastest_waves(p.c);
     if (!waves.empty()) add(out, "    the straight tube, fastest of the waves that fit:\n");
     for (const theory::FittingWave& wave : waves)
@@ -79,7 +80,7 @@ void add_spectrum(std::string& out, const Point& p) {
                              : ", grows, and tier 1 cannot see it");
 }
 
-void add_fit(std::string& out, const confirm::Answer& a) {
+void add_fit(std::string& out, const confirm::SurfaceEnd& a) {
     if (std::isnan(a.fit.rate)) return;
     add(out, "    wave {},{}: rate {:.4g} +- {:.2g} for t = {:.4g} to {:.4g}", a.n, a.m, a.fit.rate, a.fit.error,
         a.fit.from, a.fit.to);
@@ -91,23 +92,23 @@ std::string shown(double value) {
     return std::isnan(value) ? "-" : fmt::format("{:.3g}", value);
 }
 
-std::string words(const std::vector<Point>& points) {
+std::string words(const std::vector<ConfirmedPoint>& points) {
     std::string out;
     add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>8}  {:>8}  {:>16}  {:>8}  {}\n", "point", "why",
         "tier 1", "surface3d", "t", "dE/E_ref", "wave", "size", "growth", "rate", "linear", "verdict");
-    for (const Point& p : points) {
-        const confirm::Answer& a = p.answer;
+    for (const ConfirmedPoint& p : points) {
+        const confirm::SurfaceEnd& a = p.surface;
         add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>8}  {:>8}  {:>16}  {:>8}  {}\n", p.pick.point,
             name(p.pick.why), name(p.axisymmetric.outcome), outcome_words(p), shown(a.time), shown(a.energy_difference),
             fmt::format("{},{}", a.n, a.m), shown(a.amplitude), shown(a.amplitude / a.noise),
             std::isnan(a.fit.rate) ? "-" : fmt::format("{:.3g} +- {:.1g}", a.fit.rate, a.fit.error),
             shown(a.linear_rate), name(a.verdict));
     }
-    for (const Point& p : points) {
+    for (const ConfirmedPoint& p : points) {
         if (agrees(p)) continue;
-        add(out, "\npoint {}: {}; {}, {}; {}\n", p.pick.point, fmt::join(p.sets, ", "), name(p.answer.verdict),
-            p.answer.stop, p.file);
-        add_fit(out, p.answer);
+        add(out, "\npoint {}: {}; {}, {}; {}\n", p.pick.point, fmt::join(p.sets, ", "), name(p.surface.verdict),
+            p.surface.stop, p.file);
+        add_fit(out, p.surface);
         add_spectrum(out, p);
     }
     add(out, "\n{} of {} points agree\n", std::count_if(points.begin(), points.end(), agrees), points.size());
@@ -118,8 +119,8 @@ std::string words(const std::vector<Point>& points) {
 
 using Columns = std::vector<std::pair<std::string, Value>>;
 
-Columns columns(const Point& p) {
-    const confirm::Answer& a = p.answer;
+Columns columns(const ConfirmedPoint& p) {
+    const confirm::SurfaceEnd& a = p.surface;
     Columns all{{"why", std::string(name(p.pick.why))},
                 {"axisym_outcome", std::string(name(p.axisymmetric.outcome))},
                 {"axisym_time", p.axisymmetric[Measure::time]},
@@ -144,19 +145,19 @@ Columns columns(const Point& p) {
     return all;
 }
 
-std::string csv(const std::vector<Point>& points) {
+std::string csv(const std::vector<ConfirmedPoint>& points) {
     std::string out = "point,set";
     for (const auto& [key, value] : columns(points.front())) add(out, ",{}", key);
-    for (const Point& p : points) {
+    for (const ConfirmedPoint& p : points) {
         add(out, "\n{},\"{}\"", p.pick.point, fmt::join(p.sets, " "));
         for (const auto& [key, value] : columns(p)) std::visit([&](const auto& v) { add(out, ",{}", v); }, value);
     }
     return out + "\n";
 }
 
-std::string json_text(const ConfirmOptions& options, const std::vector<Point>& points) {
+std::string json_text(const ConfirmOptions& options, const std::vector<ConfirmedPoint>& points) {
     Json list = Json::array();
-    for (const Point& p : points)
+    for (const ConfirmedPoint& p : points)
         list.push_back({{"point", p.pick.point}, {"set", p.sets}, {"values", json_object(columns(p))}});
     return line_of({{"scan", options.scan},
                     {"seed", options.seed},
@@ -185,14 +186,14 @@ void check(const ConfirmOptions& options) {
 }
 
 // All cases are checked before anything is run.
-std::vector<Point> plan(const ConfirmOptions& options, const ScanResult& result) {
+std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult& result) {
     const auto around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
     const auto common = static_cast<std::ptrdiff_t>(result.scan.sets.size());  // settings of all points
-    std::vector<Point> all;
+    std::vector<ConfirmedPoint> all;
     for (const confirm::Pick& pick : confirm::pick_points(result.shape(), result.outcomes(), around,
                                                           static_cast<std::size_t>(options.points), options.seed)) {
         const auto sets = result.scan.sets_of(pick.point);
-        Point p;
+        ConfirmedPoint p;
         p.pick = pick;
         p.sets = {sets.begin() + common, sets.end()};
         p.c = result.scan.case_of(pick.point);
@@ -257,51 +258,36 @@ SurfaceRunEnd run_in_3d(const SurfaceRun& task) {
 
 // ---- on several ranks
 
-Packet packet_of(const std::vector<std::string>& texts) {
-    Packet out;
-    for (const std::string& text : texts) {
-        out.insert(out.end(), text.begin(), text.end());
-        out.push_back('\0');
-    }
-    return out;
-}
-
-std::vector<std::string> texts_in(const Packet& bytes) {
-    std::vector<std::string> out;
-    for (std::size_t at = 0; at < bytes.size(); at += out.back().size() + 1) out.emplace_back(bytes.data() + at);
-    return out;
-}
-
-// A task is the number of a point and its run, a result the number and the end of the run.
+// A task: the number of a point and its run. A result: the number, and how the run ended.
 Packet run_task(const Packet& task) {
-    const auto words = texts_in(task);
+    const auto words = unpacked(task);
     const SurfaceRunEnd end = run_in_3d({words[1], words[2]});
-    return packet_of({words[0], std::to_string(end.status), end.file});
+    return packed({words[0], end.status, end.file});
 }
 
 // The runs of all points, in order, whoever asks for one.
 class SurfaceRuns : public RankTasks {
 public:
-    SurfaceRuns(std::vector<Point>& points, const fs::path& folder, bool quiet)
+    SurfaceRuns(std::vector<ConfirmedPoint>& points, const fs::path& folder, bool quiet)
         : points_(points), folder_(folder), quiet_(quiet) {}
 
-    Answer take(Packet& task, bool) override {
+    NextTask take(Packet& task, bool) override {
         const std::lock_guard lock(mutex_);
-        if (next_ == points_.size() || status_ != 0 || interrupted()) return Answer::over;
-        const Point& p = points_[next_];
+        if (next_ == points_.size() || status_ != 0 || interrupted()) return NextTask::over;
+        const ConfirmedPoint& p = points_[next_];
         if (!quiet_)
             say(stderr, "{} of {}: point {}, {}\n", next_ + 1, points_.size(), p.pick.point, fmt::join(p.sets, ", "));
         const fs::path toml = folder_ / fmt::format("point_{:06}.toml", p.pick.point);
-        task = packet_of({std::to_string(next_), p.surface_case, toml.string()});
+        task = packed({next_, p.surface_case, toml.string()});
         ++next_;
-        return Answer::task;
+        return NextTask::ready;
     }
     void give(const Packet& result) override {
         const std::lock_guard lock(mutex_);
-        const auto words = texts_in(result);
-        const int status = std::stoi(words[1]);
+        const auto words = unpacked(result);
+        const int status = words[1];
         if (status == exit_code(Stop::interrupted) || status == 2) status_ = status;
-        points_[std::stoul(words[0])].file = words[2];
+        points_[words[0]].file = words[2];
     }
     void fail(std::exception_ptr error) override {
         const std::lock_guard lock(mutex_);
@@ -317,7 +303,7 @@ public:
 
 private:
     std::mutex mutex_;
-    std::vector<Point>& points_;
+    std::vector<ConfirmedPoint>& points_;
     fs::path folder_;
     bool quiet_;
     std::size_t next_ = 0;
@@ -327,9 +313,9 @@ private:
 
 int run_all(SurfaceRuns& runs, Ranks* ranks) {
     if (ranks) {
-        ranks->run(runs, packet_of({"confirm"}), run_task);
+        ranks->run(runs, packed("confirm"), run_task);
     } else {
-        for (Packet task; runs.take(task, true) == RankTasks::Answer::task;) runs.give(run_task(task));
+        for (Packet task; runs.take(task, true) == NextTask::ready;) runs.give(run_task(task));
     }
     const int status = runs.status();
     if (ranks && status == exit_code(Stop::interrupted)) abort_interrupted(*ranks);
@@ -338,17 +324,17 @@ int run_all(SurfaceRuns& runs, Ranks* ranks) {
 
 int confirm_scan(const ConfirmOptions& options, Ranks* ranks) {
     check(options);
-    std::vector<Point> points = plan(options, read_scan_result(options.scan));
+    std::vector<ConfirmedPoint> points = plan(options, read_scan_result(options.scan));
     SurfaceRuns runs(points, make_folder(options), options.quiet);
     if (const int status = run_all(runs, ranks); status != 0) return status;
-    for (Point& p : points) {
+    for (ConfirmedPoint& p : points) {
         if (p.file.empty()) {
             say(stderr, "point {}: the run failed at its start, and an earlier result was left as it was\n",
                 p.pick.point);
             continue;
         }
         try {
-            p.answer = confirm::answer(p.axisymmetric, read_result(p.file));
+            p.surface = confirm::surface_end(p.axisymmetric, read_result(p.file));
         } catch (const std::runtime_error& error) {  // given up without a result
             say(stderr, "{}: {}\n", p.file, error.what());
         }

@@ -2,9 +2,6 @@
 #include "tools/command/forward.hpp"
 
 #include <CLI/CLI.hpp>
-#include <array>
-#include <filesystem>
-#include <fstream>
 #include <stdexcept>
 
 #include "common/result/result.hpp"
@@ -12,18 +9,11 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/python.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/continuation.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
 namespace {
-
-bool is_hdf5(const std::string& file) {
-    std::error_code ignored;
-    std::array<char, 8> start{};
-    return std::filesystem::is_regular_file(file, ignored) &&
-           std::ifstream(file, std::ios::binary).read(start.data(), start.size()) &&
-           std::string_view(start.data(), start.size()) == "\x89HDF\r\n\x1a\n";
-}
 
 // HDF5 may crash over a damaged file: Python reads none.
 void refuse_damaged(const std::vector<std::string>& words) {

@@ -270,11 +270,7 @@ struct Ended {
 // before there is a row, and errors of the disk: the file has what was written until then.
 Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Recorder& recorder) {
     const auto failed = [&](const std::exception& error) {
-        Ended ended{{}, true};
-        ended.summary.stop = failure_of(c, error, recorder.reached());
-        ended.summary.estimated_error = 1;
-        ended.summary.warnings.emplace_back("the error is unknown");
-        return ended;
+        return Ended{failed_run(c, error, recorder.reached()), true};
     };
     try {
         Ended ended{engine.run(recorder, result.restart ? &*result.restart : nullptr,

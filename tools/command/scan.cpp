@@ -86,8 +86,8 @@ ScanWriter grown_result(const ScanOptions& options) {
     try {
         ScanResult result = read_scan_result(options.choices.file);
         if (options.resume) return ScanWriter::resume(options.choices.file, result.scan);
-        if (options.extend) result = with_known(extended(result, options.choices.over));
-        for (const std::string& other : options.merge) result = with_known(merged(result, read_scan_result(other)));
+        if (options.extend) result = extended(result, options.choices.over);
+        for (const std::string& other : options.merge) result = merged(result, read_scan_result(other));
         return ScanWriter::extend(scan_path(options, result.scan), result, about_start());
     } catch (const std::runtime_error& error) {
         throw CaseError(explanation(error));

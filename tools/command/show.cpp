@@ -228,13 +228,11 @@ std::string json_text(const Result& result, std::optional<std::size_t> with_data
 
 // ----
 
-// Negative numbers count from the last frame.
-std::size_t frame_index(const Result& result, long asked) {
-    const long count = static_cast<long>(result.frames.size());
-    if (asked >= count || asked < -count)
-        throw std::runtime_error(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
-                                           : fmt::format("no frame {}: there are none", asked));
-    return static_cast<std::size_t>(asked < 0 ? count + asked : asked);
+std::size_t known_frame(const Result& result, long asked) {
+    if (const auto index = frame_index(result, asked)) return *index;
+    const std::size_t count = result.frames.size();
+    throw std::runtime_error(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
+                                       : fmt::format("no frame {}: there are none", asked));
 }
 
 Text shown_scan(const ShowOptions& options) {
@@ -252,7 +250,7 @@ Text shown(const ShowOptions& options) {
     if (is_scan(options.file)) return shown_scan(options);
     const Result result = read_result(options.file);
     std::optional<std::size_t> frame;
-    if (options.frame) frame = frame_index(result, *options.frame);
+    if (options.frame) frame = known_frame(result, *options.frame);
     Text out;
     if (options.json)
         add(out, "{}", json_text(result, frame));

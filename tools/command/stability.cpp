@@ -30,6 +30,7 @@
 #include "tools/command/python.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/run/continuation.hpp"
 
 namespace tubule {
 
@@ -63,11 +64,11 @@ bool is_result(const std::string& file) {
 }
 
 Record frame_of(const StabilityOptions& options, const Result& result) {
-    const long count = static_cast<long>(result.frames.size()), asked = options.frame.value_or(-1);
-    if (asked >= count || asked < -count)
-        throw std::invalid_argument(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
-                                              : "has no frames yet");
-    return result.frames[static_cast<std::size_t>(asked < 0 ? count + asked : asked)];
+    const std::size_t count = result.frames.size();
+    const long asked = options.frame.value_or(-1);
+    if (const auto index = frame_index(result, asked)) return result.frames[*index];
+    throw std::invalid_argument(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
+                                          : "has no frames yet");
 }
 
 StabilitySubject subject_of(const StabilityOptions& options) {

@@ -3,11 +3,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
 
+#include "common/case/text.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
@@ -15,6 +15,7 @@
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/text.hpp"
+#include "tools/scan/description.hpp"
 
 namespace tubule {
 
@@ -50,22 +51,10 @@ struct ModelReport {
 
 // ---- what is asked
 
-double number(const std::string& text, const std::string& option) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
-        throw std::invalid_argument(fmt::format("{}: '{}' is not a number", option, text));
-    return value;
-}
-
-std::vector<std::string> split(const std::string& text, char at) {
-    std::vector<std::string> parts{""};
-    for (const char c : text)
-        if (c == at)
-            parts.emplace_back();
-        else
-            parts.back() += c;
-    return parts;
+double number(const std::string& text) {
+    const auto value = number_of(text);
+    if (!value) throw std::invalid_argument(fmt::format("--q: '{}' is not a number", text));
+    return *value;
 }
 
 std::vector<double> wave_numbers(const std::string& text) {
@@ -77,13 +66,13 @@ std::vector<double> wave_numbers(const std::string& text) {
         const auto parts = split(text, ':');
         if (parts.size() != 3)
             throw std::invalid_argument("--q must be a list q1,q2,... or from:to:count, not " + text);
-        const double from = number(parts[0], "--q"), to = number(parts[1], "--q"), count = number(parts[2], "--q");
+        const double from = number(parts[0]), to = number(parts[1]), count = number(parts[2]);
         if (!(to > from) || count != std::floor(count) || count < 2 || count > most)
             throw std::invalid_argument(
                 fmt::format("--q from:to:count needs to > from and 2 to {} wave numbers, not {}", most, text));
         for (int i = 0; i < count; ++i) q.push_back(from + (to - from) * i / (count - 1));
     } else {
-        for (const std::string& part : split(text, ',')) q.push_back(number(part, "--q"));
+        for (const std::string& part : split(text, ',')) q.push_back(number(part));
     }
     for (const double value : q)
         if (!(value >= 0 && value <= largest_number))

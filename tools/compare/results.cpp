@@ -61,10 +61,13 @@ std::unique_ptr<Surface> surface_of(const Result& result, std::size_t frame, cha
 
 }  // namespace
 
-Outcome outcome(const Result& result) {
+std::string stop_word(const Result& result) {
+    return about<std::string>(result, "stop").value_or("unfinished");
+}
+
+double stop_time(const Result& result) {
     const auto& times = result.series.at("time");
-    return {about<std::string>(result, "stop").value_or("unfinished"),
-            about<double>(result, "stop_time").value_or(times.empty() ? 0 : times.back())};
+    return about<double>(result, "stop_time").value_or(times.empty() ? 0 : times.back());
 }
 
 double reference_energy(const Result& result) {

@@ -12,11 +12,9 @@
 
 namespace tubule::compare {
 
-struct Outcome {
-    std::string stop;  // by name; "unfinished" if the run goes on or was killed
-    double time = 0;
-};
-Outcome outcome(const Result& result);
+// How the run stopped, by name; "unfinished" if it goes on or was killed. When: of an unfinished one, so far.
+std::string stop_word(const Result& result);
+double stop_time(const Result& result);
 
 // E_ref as stated by the run; 0 if it is not.
 double reference_energy(const Result& result);

@@ -93,7 +93,7 @@ std::pair<double, Wave> largest_wave(const Case& c, const Result& result, const 
     return largest;
 }
 
-void fit_largest_wave(Answer& a, const Case& c, const Result& result) {
+void fit_largest_wave(SurfaceEnd& a, const Case& c, const Result& result) {
     std::vector<double> times, amplitudes;
     for (const Record& frame : result.frames) {
         times.push_back(frame.time);
@@ -108,7 +108,7 @@ void fit_largest_wave(Answer& a, const Case& c, const Result& result) {
 
 // The outcome, if the symmetry held. A run that goes on to its end has come to rest if the one in tier 1 had by
 // then.
-Outcome outcome_in_3d(const Answer& a, const PointResult& axisymmetric, const Result& surface) {
+Outcome outcome_in_3d(const SurfaceEnd& a, const PointResult& axisymmetric, const Result& surface) {
     const auto last = [&](const char* name) { return surface.series.at(name).back(); };
     const EndShape end{surface.meshes.front().period > 0, last("r_min"), last("r_max"), last("area"), last("volume")};
     const Stop stop = stop_from_name(a.stop).value();
@@ -117,7 +117,7 @@ Outcome outcome_in_3d(const Answer& a, const PointResult& axisymmetric, const Re
     return outcome_of(Stop::stationary, end);
 }
 
-Verdict verdict(const Answer& a, const PointResult& axisymmetric) {
+Verdict verdict(const SurfaceEnd& a, const PointResult& axisymmetric) {
     if (a.amplitude > grown * a.noise) return Verdict::symmetry_broken;
     if (a.outcome == Outcome::failed || a.stop == name(Stop::time_limit)) return Verdict::no_answer;
     if (a.outcome == axisymmetric.outcome) return Verdict::agrees;
@@ -165,11 +165,11 @@ std::string_view name(Verdict verdict) {
     return names[static_cast<int>(verdict)];
 }
 
-Answer answer(const PointResult& axisymmetric, const Result& surface) {
-    const compare::Outcome ended = compare::outcome(surface);
-    if (!stop_from_name(ended.stop) || surface.frames.empty()) throw std::runtime_error("the result is not complete");
+SurfaceEnd surface_end(const PointResult& axisymmetric, const Result& surface) {
+    const std::string stop = compare::stop_word(surface);
+    if (!stop_from_name(stop) || surface.frames.empty()) throw std::runtime_error("the result is not complete");
     const Case c = parse_case(surface.case_text.text, surface.case_text.sets, "result", surface.case_text.inputs);
-    Answer a{.stop = ended.stop, .time = ended.time};
+    SurfaceEnd a{.stop = stop, .time = compare::stop_time(surface)};
     a.energy_error = compare::stated_error(surface).value_or(not_known);
     if (const double t = axisymmetric[Measure::time]; t <= a.time)
         a.energy_difference =

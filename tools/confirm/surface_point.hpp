@@ -45,7 +45,7 @@ inline constexpr double grown = 3;
 
 inline constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 
-struct Answer {
+struct SurfaceEnd {
     Verdict verdict = Verdict::no_answer;
     Outcome outcome = Outcome::failed;  // by the radii alone; without meaning where the symmetry is broken
     std::string stop;
@@ -60,6 +60,6 @@ struct Answer {
 };
 
 // Throws std::runtime_error if the result is incomplete.
-Answer answer(const PointResult& axisymmetric, const Result& surface);
+SurfaceEnd surface_end(const PointResult& axisymmetric, const Result& surface);
 
 }  // namespace tubule::confirm

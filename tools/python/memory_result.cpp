@@ -85,12 +85,8 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
     } catch (const CaseError&) {
         throw;
     } catch (const std::exception& error) {
-        RunSummary summary;
-        summary.stop = failure_of(c, error, reached());
-        summary.estimated_error = 1;
-        summary.warnings.emplace_back("the error is unknown");
-        if (!reached()) throw std::runtime_error(c.path + ": " + summary.stop.message);
-        return summary;
+        if (!reached()) throw std::runtime_error(c.path + ": " + failure_of(c, error, {}).message);
+        return failed_run(c, error, reached());
     }
 }
 

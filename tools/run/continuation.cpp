@@ -138,6 +138,11 @@ std::optional<ModelKind> chosen_before(const std::filesystem::path& file) {
     return out;
 }
 
+std::optional<std::size_t> frame_index(const Result& result, long number) {
+    const long count = static_cast<long>(result.frames.size()), index = number < 0 ? count + number : number;
+    return index >= 0 && index < count ? std::optional(static_cast<std::size_t>(index)) : std::nullopt;
+}
+
 std::optional<Stop> stop_of(const Result& result) {
     for (const auto& [name, value] : result.about)
         if (name == "stop") return stop_from_name(std::get<std::string>(value));

@@ -57,4 +57,12 @@ StopReport failure_of(const Case& c, const std::exception& error, std::optional<
     return stop;
 }
 
+RunSummary failed_run(const Case& c, const std::exception& error, std::optional<double> reached) {
+    RunSummary summary;
+    summary.stop = failure_of(c, error, reached);
+    summary.estimated_error = 1;
+    summary.warnings.emplace_back("the error is unknown");
+    return summary;
+}
+
 }  // namespace tubule

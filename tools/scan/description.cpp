@@ -268,12 +268,14 @@ BetweenNumbers Scan::between() const {
     return {size(), axes.size(), boundary ? boundary->refine : 0};
 }
 
+double Axis::value(std::size_t at, double part) const {
+    const double from = number_of(values[at][0]).value(), to = number_of(values[at + 1][0]).value();
+    return logarithmic ? from * std::pow(to / from, part) : from + (to - from) * part;
+}
+
 double Scan::value(const Between& b) const {
-    const Axis& axis = axes[b.axis];
-    const std::size_t at = place(b.point)[b.axis];
     const double part = static_cast<double>(b.step) / static_cast<double>(between().steps());
-    const double from = number_of(axis.values[at][0]).value(), to = number_of(axis.values[at + 1][0]).value();
-    return axis.logarithmic ? from * std::pow(to / from, part) : from + (to - from) * part;
+    return axes[b.axis].value(place(b.point)[b.axis], part);
 }
 
 std::vector<std::string> Scan::sets_of(std::size_t point) const {

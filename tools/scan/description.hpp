@@ -19,6 +19,8 @@ struct Axis {
     bool logarithmic = false;                      // spaced so
 
     std::size_t size() const { return values.size(); }
+    // Between a value and the next one, numbers both: `part` of the way, 0 to 1.
+    double value(std::size_t at, double part) const;
 };
 
 // Where only the lines between outcomes are wanted: all of them, or those around one outcome.
@@ -26,6 +28,7 @@ struct BoundaryChoice {
     std::optional<Outcome> around;
     int seeds = 8;   // intervals of the coarse lattice, along each axis, on whose lines crossings are looked for
     int refine = 0;  // halvings of each edge of the grid that a line crosses
+    bool operator==(const BoundaryChoice&) const = default;
 };
 
 struct Scan {

@@ -25,17 +25,17 @@ Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
     progress_.begin(plan_.known());
 }
 
-Dispatcher::Answer Dispatcher::take(Work& work, bool may_wait) {
+NextTask Dispatcher::take(Work& work, bool may_wait) {
     std::unique_lock lock(mutex_);
     while (true) {
-        if (error_ || interrupted() || pause_is_due()) return Answer::over;
+        if (error_ || interrupted() || pause_is_due()) return NextTask::over;
         if (const auto next = plan_.next()) {
             work = *next;
             ++running_;
-            return Answer::work;
+            return NextTask::ready;
         }
-        if (running_ == 0) return Answer::over;
-        if (!may_wait) return Answer::wait;
+        if (running_ == 0) return NextTask::over;
+        if (!may_wait) return NextTask::wait;
         changed_.wait_for(lock, std::chrono::milliseconds(100));  // a signal wakes nobody
     }
 }
@@ -93,8 +93,7 @@ int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
     const auto work = [&] {
         omp_set_num_threads(std::max(1, processors / jobs));  // of this thread: points share the processors
         try {
-            for (Work work; dispatcher.take(work, true) == Dispatcher::Answer::work;)
-                dispatcher.give(run_one(scan, work));
+            for (Work work; dispatcher.take(work, true) == NextTask::ready;) dispatcher.give(run_one(scan, work));
         } catch (...) {
             dispatcher.fail(std::current_exception());
         }

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include "tools/scan/ranks.hpp"
 #include "tools/scan/scan_file.hpp"
 #include "tools/scan/scan_plan.hpp"
 #include "tools/scan/scan_progress.hpp"
@@ -24,10 +25,9 @@ public:
     // Points that `writer` has already are not run again.
     Dispatcher(ScanWriter& writer, bool quiet);
 
-    enum class Answer { work, wait, over };
-    // Work to do; `wait` while it depends on other work that is being done; `over` when there is nothing left, an
-    // interrupt came, or something failed. With `may_wait`, waits instead of saying so.
-    Answer take(Work& work, bool may_wait);
+    // Work to do; `over` also where an interrupt came, or something failed. With `may_wait`, waits instead of saying
+    // so.
+    NextTask take(Work& work, bool may_wait);
     void give(const PointResult& result);  // saves it; a failure to do so ends the scan
     void fail(std::exception_ptr error);
 

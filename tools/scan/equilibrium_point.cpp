@@ -67,7 +67,8 @@ PointResult equilibrium_point(const Case& c, const std::function<bool()>& interr
         p[Measure::tension] = shape.sigma;
         p[Measure::pressure] = -shape.lambda;
         const Loads loads = loads_at(motion_law(c.model), 0);
-        p[Measure::free_energy] = shape.observed.energy + loads.energy(shape.observed.area, shape.observed.volume, shape.length);
+        p[Measure::free_energy] =
+            shape.observed.energy + loads.energy(shape.observed.area, shape.observed.volume, shape.length);
     }
     for (const axisym::ModeRates& mode : modes)
         if (!mode.rates.empty()) p[Measure::growth] = std::fmax(p[Measure::growth], mode.rates.front());

@@ -9,7 +9,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "common/case/read.hpp"
@@ -104,19 +103,26 @@ Source source_of(const Axis& axis, const Scan& scan) {
 }
 
 // The points of a scan, as far as they are known, with their numbers in one over the same keys and more values.
-void take_points(Extension& extension, const ScanResult& result) {
+void take_points(ScanResult& wider, const ScanResult& result) {
     std::vector<Source> sources;
-    for (const Axis& axis : extension.scan.axes) sources.push_back(source_of(axis, result.scan));
+    for (const Axis& axis : wider.scan.axes) sources.push_back(source_of(axis, result.scan));
     for (const PointResult& p : result.points) {
         if (p.outcome == Outcome::not_run) continue;
         const auto at = result.scan.place(p.point);
         std::size_t number = 0;
         for (std::size_t a = 0; a < sources.size(); ++a)
-            number =
-                number * extension.scan.axes[a].size() + sources[a].places[sources[a].axis ? at[*sources[a].axis] : 0];
-        extension.known.push_back(p);
-        extension.known.back().point = number;
+            number = number * wider.scan.axes[a].size() + sources[a].places[sources[a].axis ? at[*sources[a].axis] : 0];
+        wider.points[number] = p;
+        wider.points[number].point = number;
     }
+}
+
+// Checks the wider scan, which then has the points that these results know.
+void take_all(ScanResult& wider, const std::vector<const ScanResult*>& results) {
+    check_scan(wider.scan);
+    add_inputs(wider.scan);
+    wider.points = unknown_points(wider.scan.size());
+    for (const ScanResult* result : results) take_points(wider, *result);
 }
 
 // Keys of which one of the scans says something by --set that the other does not.
@@ -144,15 +150,9 @@ void refuse_different(const Scan& a, const Scan& b) {
         throw CaseError(fmt::format("{} and {} cannot be merged: {}", a.path, b.path, what));
     };
     if (a.case_text != b.case_text) refuse(different_lines(a.case_text, b.case_text));
-    for (const auto& x : a.inputs)
-        for (const auto& y : b.inputs)
-            if (x->name == y->name && !same_input(*x, *y)) refuse(fmt::format("{} was another file", x->name));
+    if (const std::string other = other_input(a, b); !other.empty()) refuse(other + " was another file");
     if (a.to_the_end != b.to_the_end) refuse("only one of them runs its points to the end (--to-the-end)");
-    const auto choice = [](const Scan& s) {
-        return s.boundary ? std::tuple(true, s.boundary->around, s.boundary->seeds, s.boundary->refine)
-                          : std::tuple(false, std::optional<Outcome>(), 0, 0);
-    };
-    if (choice(a) != choice(b)) refuse("they differ in --boundary, --seeds or --refine");
+    if (a.boundary != b.boundary) refuse("they differ in --boundary, --seeds or --refine");
 }
 
 // A key that no case has is named as such, not as one without a value.
@@ -190,15 +190,8 @@ std::optional<PointResult> known_result(const ScanResult& result, std::size_t nu
 
 }  // namespace
 
-ScanResult with_known(const Extension& extension) {
-    ScanResult out{.scan = extension.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
-    for (std::size_t i = 0; i < out.scan.size(); ++i) out.points.push_back(unknown_point(i));
-    for (const PointResult& p : extension.known) out.points[p.point] = p;
-    return out;
-}
-
-Extension extended(const ScanResult& result, const std::vector<std::string>& over) {
-    Extension out{result.scan, {}};
+ScanResult extended(const ScanResult& result, const std::vector<std::string>& over) {
+    ScanResult out{.scan = result.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
     for (const std::string& text : over) {
         const Axis more = parse_axis(text);
         if (!axis_of(out.scan, more.keys)) {
@@ -208,15 +201,13 @@ Extension extended(const ScanResult& result, const std::vector<std::string>& ove
         const auto same = std::ranges::find_if(out.scan.axes, [&](const Axis& axis) { return axis.keys == more.keys; });
         *same = joined(*same, more);
     }
-    check_scan(out.scan);
-    add_inputs(out.scan);
-    take_points(out, result);
+    take_all(out, {&result});
     return out;
 }
 
-Extension merged(const ScanResult& a, const ScanResult& b) {
+ScanResult merged(const ScanResult& a, const ScanResult& b) {
     refuse_different(a.scan, b.scan);
-    Extension out{a.scan, {}};
+    ScanResult out{.scan = a.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
     out.scan.inputs.insert(out.scan.inputs.end(), b.scan.inputs.begin(), b.scan.inputs.end());
     Scan other = b.scan;
     for (const std::string& key : told_apart(a.scan, b.scan))
@@ -225,10 +216,7 @@ Extension merged(const ScanResult& a, const ScanResult& b) {
     add_axes_of(out.scan, other);
     add_axes_of(other, out.scan);
     for (Axis& axis : out.scan.axes) axis = joined(axis, *axis_of(other, axis.keys));
-    check_scan(out.scan);
-    add_inputs(out.scan);
-    take_points(out, a);
-    take_points(out, b);
+    take_all(out, {&a, &b});
     return out;
 }
 

@@ -8,21 +8,14 @@
 
 namespace tubule {
 
-// A scan over more, with the points that are known of it, numbered as in `scan`.
-struct Extension {
-    Scan scan;
-    std::vector<PointResult> known;
-};
-ScanResult with_known(const Extension& extension);
-
-// The values of `over` (as in --over) join those of the same keys, in order if all are increasing numbers, else behind
-// them; other keys make another axis, the last, which contains the value that the scan has had for them. Throws
-// CaseError where that value is unknown, and as check_scan.
-Extension extended(const ScanResult& result, const std::vector<std::string>& over);
+// A scan over more, with the points that are known of it. The values of `over` (as in --over) join those of the same
+// keys, in order if all are increasing numbers, else behind them; other keys make another axis, the last, which
+// contains the value that the scan has had for them. Throws CaseError where that value is unknown, and as check_scan.
+ScanResult extended(const ScanResult& result, const std::vector<std::string>& over);
 
 // All values of both scans on each axis, and their points. Keys that only one of them varies, or that their --set tell
 // apart, make an axis. Throws CaseError where the scans differ in anything else, and as check_scan.
-Extension merged(const ScanResult& a, const ScanResult& b);
+ScanResult merged(const ScanResult& a, const ScanResult& b);
 
 // Those points of a finished scan that it would have without any that were known before: along boundaries, an extended
 // scan knows more.

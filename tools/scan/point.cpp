@@ -202,6 +202,12 @@ PointResult unknown_point(std::size_t point) {
     return p;
 }
 
+std::vector<PointResult> unknown_points(std::size_t count) {
+    std::vector<PointResult> all(count);
+    for (std::size_t i = 0; i < count; ++i) all[i].point = i;
+    return all;
+}
+
 PointResult refused_point(const std::string& message) {
     PointResult p;
     p.outcome = Outcome::failed;

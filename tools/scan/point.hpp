@@ -63,6 +63,7 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
 
 // A point that was not run.
 PointResult unknown_point(std::size_t point);
+std::vector<PointResult> unknown_points(std::size_t count);  // of a grid, in order
 
 // Of a case with [equilibrium]: the shape that is found. Throws as the search.
 PointResult equilibrium_point(const Case& c, const std::function<bool()>& interrupted);

@@ -10,14 +10,16 @@ namespace tubule {
 
 using Packet = std::vector<char>;  // what ranks send each other
 
+// What a queue answers who asks for a task: here it is; `wait`, as it depends on others that are being done; or `over`,
+// there is nothing left to do.
+enum class NextTask { ready, wait, over };
+
 // What rank 0 hands out and takes in, from two threads.
 class RankTasks {
 public:
     virtual ~RankTasks() = default;
-    enum class Answer { task, wait, over };
-    // A task; `wait` while it depends on others that are being done; `over` when there is nothing left to do. With
-    // `may_wait`, waits instead of saying so.
-    virtual Answer take(Packet& task, bool may_wait) = 0;
+    // With `may_wait`, waits instead of saying so.
+    virtual NextTask take(Packet& task, bool may_wait) = 0;
     virtual void give(const Packet& result) = 0;
     virtual void fail(std::exception_ptr error) = 0;  // of a task on rank 0; the tasks are then over
 };

@@ -90,7 +90,7 @@ int Ranks::run(RankTasks& tasks, const Packet& header, const Compute& compute) {
     broadcast(sent);
     std::thread here([&] {
         try {
-            for (Packet task; tasks.take(task, true) == RankTasks::Answer::task;) tasks.give(compute(task));
+            for (Packet task; tasks.take(task, true) == NextTask::ready;) tasks.give(compute(task));
         } catch (...) {
             tasks.fail(std::current_exception());
         }
@@ -111,9 +111,9 @@ int Ranks::run(RankTasks& tasks, const Packet& header, const Compute& compute) {
         }
         while (!idle.empty()) {
             Packet task;
-            const auto answer = tasks.take(task, false);
-            if (answer == RankTasks::Answer::wait) break;
-            if (answer == RankTasks::Answer::task) {
+            const NextTask next = tasks.take(task, false);
+            if (next == NextTask::wait) break;
+            if (next == NextTask::ready) {
                 send(task, idle.back(), work_tag);
             } else {
                 send({}, idle.back(), over_tag);

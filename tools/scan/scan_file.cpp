@@ -4,10 +4,8 @@
 #include <hdf5.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
 #include "common/case/read.hpp"
 #include "common/result/checksums.hpp"
@@ -43,12 +41,6 @@ void put_texts(hid_t parent, const std::string& name, const std::vector<std::siz
     put_dataset(parent, name, text_type(), space(shape), data.data());
 }
 
-double number_or_nan(const std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc{} && end == text.data() + text.size() ? value : std::numeric_limits<double>::quiet_NaN();
-}
-
 void put_axis(hid_t parent, const std::string& name, const Axis& axis) {
     const auto group = make_group(parent, name);
     put_attribute(group, "keys", axis.keys);
@@ -58,7 +50,7 @@ void put_axis(hid_t parent, const std::string& name, const Axis& axis) {
     for (const auto& setting : axis.values)
         for (const std::string& value : setting) {
             texts.push_back(value);
-            numbers.push_back(number_or_nan(value));
+            numbers.push_back(number_of(value).value_or(std::numeric_limits<double>::quiet_NaN()));
         }
     const std::vector<std::size_t> shape{axis.size(), axis.keys.size()};
     put_texts(group, "texts", shape, texts);
@@ -291,13 +283,12 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     const auto group = open_group(file, "points");
     const auto outcomes = get_integers(group, "outcome"), stops = get_integers(group, "stop");
     const auto messages = get_text_array(group, "message");
-    std::vector<PointResult> points(count);
+    std::vector<PointResult> points = unknown_points(count);
     if (outcomes.size() != count || stops.size() != count || messages.size() != count)
         throw std::runtime_error("/points does not have the shape of /axes");
     for (std::size_t i = 0; i < count; ++i) {
         if (outcomes[i] < 0 || outcomes[i] >= n_outcomes)
             throw std::runtime_error("/points/outcome holds an unknown outcome");
-        points[i].point = i;
         points[i].outcome = static_cast<Outcome>(outcomes[i]);
         points[i].stop = static_cast<int>(stops[i]);
         points[i].message = messages[i];
@@ -354,17 +345,17 @@ Stored load(const fs::path& path) {
 
 }  // namespace
 
-bool same_scan(const Scan& a, const Scan& b) {
-    const auto same_axis = [](const Axis& x, const Axis& y) { return x.keys == y.keys && x.values == y.values; };
-    const auto choice = [](const Scan& s) {
-        return s.boundary ? std::tuple(s.boundary->around, s.boundary->seeds, s.boundary->refine)
-                          : std::tuple(std::optional<Outcome>(), 0, 0);
-    };
+std::string other_input(const Scan& a, const Scan& b) {
     for (const auto& x : a.inputs)
         for (const auto& y : b.inputs)
-            if (x->name == y->name && !same_input(*x, *y)) return false;
-    return a.case_text == b.case_text && a.sets == b.sets && a.to_the_end == b.to_the_end &&
-           a.boundary.has_value() == b.boundary.has_value() && choice(a) == choice(b) &&
+            if (x->name == y->name && !same_input(*x, *y)) return x->name;
+    return "";
+}
+
+bool same_scan(const Scan& a, const Scan& b) {
+    const auto same_axis = [](const Axis& x, const Axis& y) { return x.keys == y.keys && x.values == y.values; };
+    return other_input(a, b).empty() && a.case_text == b.case_text && a.sets == b.sets &&
+           a.to_the_end == b.to_the_end && a.boundary == b.boundary &&
            std::equal(a.axes.begin(), a.axes.end(), b.axes.begin(), b.axes.end(), same_axis);
 }
 
@@ -444,8 +435,7 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
     ScanResult& result = impl->stored.result;
     result.scan = scan;
     result.about = about;
-    result.points.resize(scan.size());
-    for (std::size_t i = 0; i < result.points.size(); ++i) result.points[i] = unknown_point(i);
+    result.points = unknown_points(scan.size());
     return ScanWriter(std::move(impl));
 }
 

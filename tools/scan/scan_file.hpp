@@ -59,6 +59,8 @@ bool is_scan(const std::filesystem::path& file);
 
 // Whether they have the same case, overrides, axes and choices, so that one may go on with the points of the other.
 bool same_scan(const Scan& a, const Scan& b);
+// The name of a file that both read, but with other contents; empty if there is none.
+std::string other_input(const Scan& a, const Scan& b);
 // Another scan may be needed: throws CaseError if the file has one that is not the same.
 void refuse_to_replace_another_scan(const Scan& scan, const std::filesystem::path& file);
 

@@ -13,8 +13,7 @@ Plan plan_on(const std::vector<std::size_t>& shape, const std::optional<Boundary
 
 ScanPlan::ScanPlan(const Scan& scan) : scan_(scan), nodes_(scan), plan_(plan_on(nodes_.shape(), scan.boundary)) {
     if (!nodes_.has_starts()) return;
-    points_.reserve(scan.size());
-    for (std::size_t i = 0; i < scan.size(); ++i) points_.push_back(unknown_point(i));
+    points_ = unknown_points(scan.size());
 }
 
 std::size_t ScanPlan::wanted() const {

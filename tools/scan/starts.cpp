@@ -27,19 +27,7 @@ bool holds_given_values(const Case& c) {
 }
 
 bool at_rest(Outcome outcome) {
-    switch (outcome) {
-        case Outcome::uniform_tube:
-        case Outcome::unduloid:
-        case Outcome::sphere:
-        case Outcome::closed:
-        case Outcome::prolate:
-        case Outcome::oblate:
-        case Outcome::stomatocyte:
-        case Outcome::pear:
-            return true;
-        default:
-            return false;
-    }
+    return (outcome >= Outcome::uniform_tube && outcome <= Outcome::closed) || outcome >= Outcome::prolate;
 }
 
 double free_energy(const PointResult& p) {
@@ -172,22 +160,6 @@ std::vector<EnergyCrossing> energy_crossings(const Nodes& nodes, const std::vect
 
 namespace {
 
-// The values of the key along an edge, from 0 to 1.
-class EdgeValues {
-public:
-    EdgeValues(const Axis& axis, std::size_t at)
-        : from_(number_of(axis.values[at][0]).value()),
-          to_(number_of(axis.values[at + 1][0]).value()),
-          logarithmic_(axis.logarithmic) {}
-    double operator()(double part) const {
-        return logarithmic_ ? from_ * std::pow(to_ / from_, part) : from_ + (to_ - from_) * part;
-    }
-
-private:
-    double from_, to_;
-    bool logarithmic_;
-};
-
 // The shape of a point of the grid, with another value of the key.
 PointResult shape_at(const Scan& scan, std::size_t point, const std::string& key, double value,
                      const std::function<bool()>& interrupted) {
@@ -206,8 +178,9 @@ double known_to(const PointResult& p) {
 PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing, const std::function<bool()>& interrupted) {
     constexpr int most = 40;
     const Nodes nodes(scan);
-    const std::string& key = scan.axes[crossing.axis].keys[0];
-    const EdgeValues value_at(scan.axes[crossing.axis], scan.place(nodes.point_of(crossing.node, 0))[crossing.axis]);
+    const Axis& axis = scan.axes[crossing.axis];
+    const std::string& key = axis.keys[0];
+    const std::size_t at = scan.place(nodes.point_of(crossing.node, 0))[crossing.axis];
     double low = 0, high = 1, at_low = crossing.differences[0], at_high = crossing.differences[1];
     PointResult found = unknown_point(0);
     double cpu = 0, wall = 0;
@@ -217,7 +190,7 @@ PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing, cons
         return found;
     };
     for (int k = 0, side = 0; k < most; ++k) {  // regula falsi (Illinois)
-        const double part = (low * at_high - high * at_low) / (at_high - at_low), value = value_at(part);
+        const double part = (low * at_high - high * at_low) / (at_high - at_low), value = axis.value(at, part);
         std::array<PointResult, 2> shapes;
         for (const std::size_t i : {0, 1}) {
             found = shapes[i] =
