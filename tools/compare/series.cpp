@@ -45,10 +45,11 @@ std::vector<double> parabola_slopes(const std::vector<double>& x, const std::vec
     return out;
 }
 
-// At t, the cubic of these values and slopes at t0 and t1.
-double hermite(double t, double t0, double t1, double v0, double v1, double slope0, double slope1) {
-    const double h = t1 - t0, x = (t - t0) / h;
-    return v0 + x * x * (3 - 2 * x) * (v1 - v0) + h * x * (1 - x) * ((1 - x) * slope0 - x * slope1);
+EnergyTrace through(const std::vector<double>& times, const std::vector<double>& values,
+                    const std::vector<double>& slopes) {
+    EnergyTrace out;
+    for (std::size_t i = 0; i < times.size(); ++i) out.add(times[i], values[i], slopes[i]);
+    return out;
 }
 
 double largest_magnitude(const std::vector<double>& values) {
@@ -98,8 +99,7 @@ SeriesDifference difference(const std::string& name, const Trace& a, const Trace
         out.unsure.push_back(unsure);
         out.largest_unsure = std::max(out.largest_unsure, unsure);
         if (apart - unsure > out.largest) out.largest = apart - unsure, out.when = t;
-        if (a.has_row(t) && b.has_row(t))
-            out.largest_in_rows = std::max(out.largest_in_rows, apart), ++out.rows_in_both;
+        if (a.row_at(t) && b.row_at(t)) out.largest_in_rows = std::max(out.largest_in_rows, apart), ++out.rows_in_both;
         out.at_end = apart;
     }
     if (out.scale == 0) out.scale = largest_magnitude(out.a);
@@ -110,17 +110,19 @@ SeriesDifference difference(const std::string& name, const Trace& a, const Trace
 }  // namespace
 
 Trace::Trace(const std::vector<double>& times, const std::vector<double>& values, const std::vector<double>* slopes) {
+    std::vector<double> t, v;
     for (std::size_t i = 0; i < times.size(); ++i) {
-        if (!time_.empty() && same(time_.back(), times[i])) {
-            value_.back() = values[i];
+        if (!t.empty() && same(t.back(), times[i])) {
+            v.back() = values[i];
             if (slopes) slope_.back() = (*slopes)[i];
             continue;
         }
-        time_.push_back(times[i]), value_.push_back(values[i]);
+        t.push_back(times[i]), v.push_back(values[i]);
         if (slopes) slope_.push_back((*slopes)[i]);
     }
-    if (!slopes) slope_ = parabola_slopes(time_, value_);
-    const std::size_t n = time_.size();
+    if (!slopes) slope_ = parabola_slopes(t, v);
+    rows_ = through(t, v, slope_);
+    const std::size_t n = t.size();
     left_out_.assign(n, 0);
     for (std::size_t i = 1; i + 1 < n; ++i) left_out_[i] = off_without(i, slopes != nullptr);
     if (n > 2) left_out_[0] = left_out_[1], left_out_[n - 1] = left_out_[n - 2];
@@ -128,47 +130,33 @@ Trace::Trace(const std::vector<double>& times, const std::vector<double>& values
 
 // The error at row i of the interpolation without this row; unknown slopes are computed without it, too.
 double Trace::off_without(std::size_t i, bool slopes_known) const {
-    if (slopes_known)
-        return std::abs(
-            hermite(time_[i], time_[i - 1], time_[i + 1], value_[i - 1], value_[i + 1], slope_[i - 1], slope_[i + 1]) -
-            value_[i]);
-    std::vector<double> t, v;
-    std::size_t before = 0;
-    for (std::size_t j = i < 3 ? 0 : i - 3; j <= std::min(i + 3, time_.size() - 1); ++j) {
-        if (j == i) {
-            before = t.size() - 1;
-            continue;
-        }
-        t.push_back(time_[j]), v.push_back(value_[j]);
-    }
-    const std::vector<double> slope = parabola_slopes(t, v);
-    return std::abs(
-        hermite(time_[i], t[before], t[before + 1], v[before], v[before + 1], slope[before], slope[before + 1]) -
-        value_[i]);
+    std::vector<double> t, v, slope;
+    for (std::size_t j = i < 3 ? 0 : i - 3; j <= std::min(i + 3, times().size() - 1); ++j)
+        if (j != i) t.push_back(times()[j]), v.push_back(values()[j]), slope.push_back(slope_[j]);
+    return std::abs(through(t, v, slopes_known ? slope : parabola_slopes(t, v))(times()[i]) - values()[i]);
 }
 
-// The row before t, or at it.
-std::size_t Trace::interval(double t) const {
-    const auto after = std::upper_bound(time_.begin(), time_.end(), t);
-    return after == time_.begin() ? 0 : static_cast<std::size_t>(after - time_.begin()) - 1;
+// The first row at t or after it.
+std::size_t Trace::next_row(double t) const {
+    return static_cast<std::size_t>(std::ranges::lower_bound(times(), t) - times().begin());
+}
+
+std::optional<std::size_t> Trace::row_at(double t) const {
+    const std::size_t next = next_row(t);
+    if (next < times().size() && same(times()[next], t)) return next;
+    if (next > 0 && same(times()[next - 1], t)) return next - 1;
+    return std::nullopt;
 }
 
 double Trace::operator()(double t) const {
-    const std::size_t i = interval(t);
-    if (same(time_[i], t) || i + 1 == time_.size()) return value_[i];
-    if (same(time_[i + 1], t)) return value_[i + 1];
-    return hermite(t, time_[i], time_[i + 1], value_[i], value_[i + 1], slope_[i], slope_[i + 1]);
-}
-
-bool Trace::has_row(double t) const {
-    const std::size_t i = interval(t);
-    return same(time_[i], t) || (i + 1 < time_.size() && same(time_[i + 1], t));
+    const auto row = row_at(t);
+    return row ? values()[*row] : rows_(t);
 }
 
 double Trace::error(double t) const {
-    if (has_row(t)) return 0;
-    const std::size_t i = interval(t);
-    return std::max(left_out_[i], left_out_[i + 1]) / halved;
+    if (row_at(t)) return 0;
+    const std::size_t next = next_row(t);
+    return std::max(left_out_[next - 1], left_out_[next]) / halved;
 }
 
 namespace {

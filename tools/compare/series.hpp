@@ -1,35 +1,38 @@
 // Differences of two results' series over time.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/result/result.hpp"
+#include "common/run/energy_trace.hpp"
 
 namespace tubule::compare {
 
-// A series of one result between its rows: cubic Hermite interpolation.
+// A series of one result, between its rows by EnergyTrace, and what that may be off.
 class Trace {
 public:
     // Of rows at the same time the last one counts. Without `slopes` those of parabolas through neighbours are taken.
     Trace(const std::vector<double>& times, const std::vector<double>& values, const std::vector<double>* slopes);
 
-    double begin() const { return time_.front(); }
-    double end() const { return time_.back(); }
-    const std::vector<double>& times() const { return time_; }
-    const std::vector<double>& values() const { return value_; }
+    double begin() const { return times().front(); }
+    double end() const { return times().back(); }
+    const std::vector<double>& times() const { return rows_.times(); }
+    const std::vector<double>& values() const { return rows_.energies(); }
 
     double operator()(double t) const;  // begin() <= t <= end()
-    bool has_row(double t) const;
+    std::optional<std::size_t> row_at(double t) const;
     double slope(std::size_t row) const { return slope_[row]; }
     // Estimated error of the interpolation at t: a quarter of that at the neighbouring rows when each is left out.
     double error(double t) const;
 
 private:
-    std::size_t interval(double t) const;
+    std::size_t next_row(double t) const;
     double off_without(std::size_t i, bool slopes_known) const;
 
-    std::vector<double> time_, value_, slope_, left_out_;
+    EnergyTrace rows_;
+    std::vector<double> slope_, left_out_;
 };
 
 // The energy's slope is minus the dissipation, unless there is kinetic energy too.
