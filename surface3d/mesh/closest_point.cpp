@@ -45,7 +45,7 @@ double along_segment(const Vector3d& from, const Vector3d& to, const Vector3d& x
     return square > 0 ? std::clamp(edge.dot(x - from) / square, 0.0, 1.0) : 0;
 }
 
-// Of a flat triangle: barycentric coordinates of the point nearest to x.
+// Barycentric coordinates of the point of a flat triangle that is nearest to x.
 Vector3d nearest_barycentric(const std::array<Vector3d, 3>& corner, const Vector3d& x) {
     const Vector3d u = corner[1] - corner[0], v = corner[2] - corner[0], w = x - corner[0];
     const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), det = uu * vv - uv * uv;

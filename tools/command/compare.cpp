@@ -43,7 +43,7 @@ struct Tolerance {
     double most;
 };
 
-// Of one result, and what it must keep.
+// What is shown of one result, and what it must keep.
 struct Side {
     std::string path;
     std::string stop;  // by name; "unfinished" if the run goes on or was killed

@@ -188,7 +188,7 @@ std::vector<Column> frame_columns(const Result& result, std::size_t index) {
 
 // ---- JSON
 
-// Of arrays only the shapes, unless `data` too is wanted (row-major, in one list).
+// Arrays by their shapes alone, unless `data` too is wanted (row-major, in one list).
 Json json_of(const Record& record, bool data) {
     Json arrays = Json::object();
     for (const Array& array : record.arrays) {
@@ -202,7 +202,7 @@ Json json_of(const Record& record, bool data) {
     return out;
 }
 
-// Of cells only the number, unless `data` too is wanted.
+// Cells by their number alone, unless `data` too is wanted.
 Json json_of(const SurfaceCells& mesh, bool data) {
     Json out{{"order", mesh.order}, {"nodes", mesh.nodes}, {"triangles", cell_count(mesh)}, {"period", mesh.period}};
     if (data) out["cells"] = mesh.cells, out["shifts"] = mesh.shifts;

@@ -13,7 +13,7 @@ namespace tubule::compare {
 // A series of one result, between its rows by EnergyTrace, and what that may be off.
 class Trace {
 public:
-    // Of rows at the same time the last one counts. Without `slopes` those of parabolas through neighbours are taken.
+    // The last one of rows at the same time counts. Without `slopes` those of parabolas through neighbours are taken.
     Trace(const std::vector<double>& times, const std::vector<double>& values, const std::vector<double>* slopes);
 
     double begin() const { return times().front(); }

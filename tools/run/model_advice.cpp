@@ -23,8 +23,8 @@ namespace {
 // the model must be the same each time: rows are counted first.
 constexpr int most_rows = 20000, most_rows_of_surface = 600;
 constexpr double most_seconds = 20;
-// Of the fall of the energy, to see whether it speeds up: what grows from little is late by far more than the criterion
-// says, since its delays add up.
+// Parts of the fall of the energy, to see whether it speeds up: what grows from little is late by far more than the
+// criterion says, since its delays add up.
 constexpr double least_parts = 20, most_parts = 1000;
 constexpr double rounding = 1e-12;  // of an energy
 constexpr double accuracy = 1e-4;   // of the pilots in tier axisym, or better if the case is

@@ -15,7 +15,7 @@ struct ProfilePoints {
     std::vector<double> r, z;
 };
 
-// Of the whole cell or period.
+// Points along the whole cell or period.
 ProfilePoints profile_of(const axisym::Equilibrium& shape) {
     constexpr int intervals = 400;
     const Meridian whole = axisym::meridian(*shape.space, shape.x);

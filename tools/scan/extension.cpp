@@ -68,7 +68,7 @@ Axis joined(const Axis& a, const Axis& b) {
     return out;
 }
 
-// Of a key that the scan does not vary: what all its points have.
+// The value that all points have of a key that the scan does not vary.
 std::string value_in(const Scan& scan, const std::string& key) {
     for (auto set = scan.sets.rbegin(); set != scan.sets.rend(); ++set)
         if (key_of(*set) == key) return set->substr(key.size() + 1);
@@ -86,7 +86,7 @@ void vary(Scan& scan, const std::string& key) {
     scan.axes.push_back(std::move(axis));
 }
 
-// Of an axis of the wider scan: which axis of the other one it is, and where its values are.
+// Which axis of the other scan an axis of the wider one is, and where its values are.
 struct Source {
     std::optional<std::size_t> axis;
     std::vector<std::size_t> places;  // of one value where that scan does not vary it

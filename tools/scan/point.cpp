@@ -22,7 +22,7 @@ namespace {
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 // A rate counts as none below this part of the fastest one: a tube may be shifted along itself at no cost.
 constexpr double translation = 1e-12;
-// Of stop_words(): those after the reasons why runs end.
+// Places in stop_words() behind the reasons why runs end.
 constexpr int decided_word = static_cast<int>(stop_kinds.size()), refused_word = decided_word + 1;
 constexpr double near_rest = 0.1;           // distance to the shape at rest / amplitude
 constexpr double next_stationarity = 1e-2;  // what a run that was not at rest is asked for next

@@ -13,7 +13,7 @@
 
 namespace tubule {
 
-// Of the last state, but for energy_error, which is that of the whole run. What a run does not tell is not a number.
+// At the last state, but for energy_error, which is that of the whole run. What a run does not tell is not a number.
 // height to free_energy are those of an equilibrium; growth is the largest rate of all m, with equilibrium.modes.
 enum class Measure {
     energy,
@@ -65,7 +65,7 @@ PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()
 PointResult unknown_point(std::size_t point);
 std::vector<PointResult> unknown_points(std::size_t count);  // of a grid, in order
 
-// Of a case with [equilibrium]: the shape that is found. Throws as the search.
+// The shape that a case with [equilibrium] finds. Throws as the search.
 PointResult equilibrium_point(const Case& c, const std::function<bool()>& interrupted);
 
 // The result of a point whose keys are not a valid case.

@@ -39,12 +39,12 @@ public:
     int rank() const { return rank_; }
     int count() const { return count_; }
 
-    // Of rank 0: does the tasks on all ranks, one at a time each, until they are over or an interrupt comes. `header`,
+    // Rank 0 does the tasks on all ranks, one at a time each, until they are over or an interrupt comes. `header`,
     // not empty, is what all of them need. How many ranks there are.
     int run(RankTasks& tasks, const Packet& header, const Compute& compute);
-    // Of rank 0 in place of run: there is nothing to do.
+    // Rank 0 calls it in place of run: there is nothing to do.
     void dismiss();
-    // Of the others: computes what rank 0 hands out, until it says that all is over. `begin` reads the header.
+    // The others compute what rank 0 hands out, until it says that all is over. `begin` reads the header.
     void serve(const std::function<Compute(const Packet& header)>& begin);
     // Ends all ranks at once with this exit status: none waits for what another is doing.
     [[noreturn]] void abort(int status);

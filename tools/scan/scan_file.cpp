@@ -83,7 +83,7 @@ void put_points(hid_t file, const ScanResult& result) {
     put_texts(group, "message", shape, messages);
 }
 
-// Of each node of the grid: that of the least energy, if there are several starts.
+// Outcomes of the nodes of the grid: those of the least energy, if there are several starts.
 std::vector<Outcome> outcomes_of_nodes(const ScanResult& result, const Nodes& nodes) {
     std::vector<Outcome> all;
     for (std::size_t node = 0; node < result.points.size() / nodes.starts(); ++node)
