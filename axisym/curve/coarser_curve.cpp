@@ -2,13 +2,8 @@
 
 #include <utility>
 
-#include "common/run/stall.hpp"
-
 namespace tubule::axisym {
 namespace {
-
-constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
-constexpr double tiny_step = 1e-9;
 
 const std::string prefix = "restart_coarser_";
 
@@ -33,13 +28,6 @@ bool continues(const Saved& s, const TimeSpan& time) {
 RunObserver nobody;  // who sees its rows; pauses come from the clock
 
 }  // namespace
-
-Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
-    Loop out(run, c, watch, clock, run.is_reported());
-    out.add(std::make_unique<Stall>(most_stalled, tiny_step * c.time.end, c.accuracy.energy,
-                                    "try another accuracy, discretisation.elements or parametrisation"));
-    return out;
-}
 
 CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock,
                            const CurveSettings& settings)

@@ -10,10 +10,6 @@
 
 namespace tubule::axisym {
 
-// The loop of a run of a curve, once that has begun: with the callbacks that curves have. All references must outlive
-// it.
-Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock);
-
 class CoarserCurve {
 public:
     // References must outlive it. A new run; one that was saved (throws as RecordReader); one that has ended.

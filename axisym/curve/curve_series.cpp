@@ -30,8 +30,7 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
     table.add({{"time", [](const CurveRow& r) { return r.time; }},
                {"step_size", [](const CurveRow& r) { return r.flow.step_size(); }},
                {"order", [](const CurveRow& r) { return static_cast<double>(r.flow.order()); }},
-               {"newton_iterations",
-                [](const CurveRow& r) { return static_cast<double>(r.flow.counters().newton_iterations); }},
+               {"newton_iterations", [](const CurveRow& r) { return static_cast<double>(r.newton_iterations); }},
                {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "axisym/curve/curve_snapshot.hpp"
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/case/problem.hpp"
 #include "common/series/table.hpp"
 
@@ -14,7 +14,8 @@ struct CurveRow {
     const Snapshot& now;
     const double* y;
     const CurveMotion& motion;
-    const Flow& flow;
+    const TimeIntegrator& flow;
+    long newton_iterations;
     double identity_defect, work, energy_error;
     int elements;
     double wall_seconds;

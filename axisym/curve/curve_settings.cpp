@@ -29,7 +29,7 @@ CurveSettings first_settings(const Problem& c, int images) {
     return s;
 }
 
-double first_step_of(const CurveSettings& s) {
+double first_step_factor(const CurveSettings& s) {
     return s.is_coarser ? coarser_start : 1;
 }
 

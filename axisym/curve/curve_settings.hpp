@@ -24,7 +24,7 @@ CurveSettings first_settings(const Problem& c, int images);
 // The first step of the integrator relative to what the initial state requires, and the largest ratio of a step to the
 // last. A run of short duration takes all its steps as fast as they may grow, whatever its tolerance: only if they
 // grow differently do the runs of a pair have different errors.
-double first_step_of(const CurveSettings& s);
+double first_step_factor(const CurveSettings& s);
 double step_growth_of(const CurveSettings& s);
 
 // Settings of the other run of a pair.

@@ -148,10 +148,10 @@ Snapshot CurveSetup::initial_shape(Snapshot s) const {
     return s;
 }
 
-FlowSystem CurveSetup::system() const {
+ImplicitSystem CurveSetup::system() const {
     const CurveMotion& motion = *this->motion;
     const MotionLayout& at = motion.layout();
-    FlowSystem system;
+    ImplicitSystem system;
     system.residual = [&motion](double t, const double* y, const double* v, double* F) {
         return motion.residual(t, y, v, F);
     };
@@ -241,7 +241,7 @@ CurveBegin begin_state(const CurveSetup& setup) {
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
     const double first_output = OutputTimes(setup.c).next();
-    double h = std::min(1e-8 * first_step_of(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
+    double h = std::min(1e-8 * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
     const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
                         most_risen * setup.reference_energy;
     for (int tries = 0; !consistent; ++tries) try {

@@ -9,7 +9,7 @@
 #include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/curve/shape_integrals.hpp"
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/case/problem.hpp"
 
 namespace tubule::axisym {
@@ -48,7 +48,7 @@ struct CurveSetup {
     // shape.
     Snapshot initial_shape(Snapshot measured) const;
     // Without the monitored quantities: dissipation and guards.
-    FlowSystem system() const;
+    ImplicitSystem system() const;
     TimeControl control(double first_step) const;
 };
 

@@ -7,8 +7,9 @@
 
 #include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_series.hpp"
-#include "axisym/integration/bdf_flow.hpp"
+#include "axisym/integration/ida_integrator.hpp"
 #include "common/run/energy_checks.hpp"
+#include "common/run/stall.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -23,6 +24,8 @@ constexpr double least_share = 0.2;                // of the difference of a pai
 constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
 constexpr int few_steps = 8;
 const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
+constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
+constexpr double tiny_step = 1e-9;
 constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
 
 // Number of starts of the integrator until t: the first one, and one at each kink of the loads.
@@ -47,7 +50,8 @@ struct CurveSimulation::View : StateView {
 
     std::vector<double> row(double wall_seconds) const override {
         const double defect = s.total() - run.past_.total_start + dissipated - work;
-        return run.setup_.series.values({t, s, y.data(), *run.setup_.motion, *run.flow_, defect, work, run.error_now_,
+        return run.setup_.series.values({t, s, y.data(), *run.setup_.motion, *run.integrator_,
+                                         run.counters().newton_iterations, defect, work, run.error_now_,
                                          run.summary.elements, wall_seconds});
     }
 
@@ -101,7 +105,7 @@ void CurveSimulation::begin() {
             StopReport{Stop::solver_failed, 0, error.what(),
                        "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
     }
-    make_flow(at.y, at.rate, at.time, at.first_step);
+    make_integrator(at.y, at.rate, at.time, at.first_step);
     const Snapshot s = setup_.initial_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
     past_.total_start = s.total();
     past_.least = past_.total_start;
@@ -129,7 +133,7 @@ void CurveSimulation::resume(const Record& restart) {
     mesh_need = state.mesh_need;
     summary.reference_energy = state.reference_energy;
     trace = state.trace;
-    make_flow(state.y, state.rate, restart.time, 0);
+    make_integrator(state.y, state.rate, restart.time, 0);
     past_.least = now_.total() - past_.work;
     add_to_trace(restart.time);
     look_at_mesh();
@@ -139,7 +143,7 @@ Energetics CurveSimulation::energetics() const {
     const Snapshot& s = initial_ ? initial_->s : now_;
     return {.bending = s.o.energy,
             .free_energy = s.free_energy,
-            .total = s.total() - work(flow_->time()),
+            .total = s.total() - work(integrator_->time()),
             .start = past_.total_start,
             .least = past_.least,
             .kinetic = s.balance.kinetic,
@@ -159,18 +163,19 @@ std::unique_ptr<StateView> CurveSimulation::at(double t) {
 std::unique_ptr<CurveSimulation::View> CurveSimulation::view(double t) {
     if (initial_ && t == 0) return std::make_unique<View>(*initial_);
     const int n = setup_.motion->layout().size;
-    if (t == flow_->time())
+    if (t == integrator_->time())
         return std::make_unique<View>(*this, t, dissipated(t), work(t),
-                                      Eigen::Map<const Eigen::VectorXd>(flow_->x(), n),
-                                      Eigen::Map<const Eigen::VectorXd>(flow_->v(), n), now_);
+                                      Eigen::Map<const Eigen::VectorXd>(integrator_->x(), n),
+                                      Eigen::Map<const Eigen::VectorXd>(integrator_->v(), n), now_);
     Eigen::VectorXd y(n), rate(n);
-    flow_->interpolate(t, y.data(), rate.data());
+    integrator_->interpolate(t, y.data(), rate.data());
     return std::make_unique<View>(*this, t, dissipated(t), work(t), y, rate,
                                   measure(*setup_.motion, t, y.data(), rate.data()));
 }
 
-void CurveSimulation::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step) {
-    FlowSystem system = setup_.system();
+void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time,
+                                      double first_step) {
+    ImplicitSystem system = setup_.system();
     system.dissipation = [this](double t, const double* at, const double* v) {
         return observe(t, at, v).balance.dissipation;
     };
@@ -187,23 +192,23 @@ void CurveSimulation::make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd&
     };
     system.n_guards = curve_guards().size();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    flow_ = std::make_unique<BdfFlow>(std::move(system), y, rate, time, setup_.control(first_step));
-    observe(time, flow_->x(), flow_->v());
+    integrator_ = std::make_unique<IdaIntegrator>(std::move(system), y, rate, time, setup_.control(first_step));
+    observe(time, integrator_->x(), integrator_->v());
     keep_good();
 }
 
 // From the last good state, with its loads.
-void CurveSimulation::restart_flow() {
+void CurveSimulation::restart_integrator() {
     const Eigen::VectorXd y = past_.y, rate = past_.rate;
     const double time = past_.time;
     past_.dissipated = dissipated(time), past_.work = work(time);
     past_.counters = counters();
-    make_flow(y, rate, time, 0);
+    make_integrator(y, rate, time, 0);
 }
 
-FlowCounters CurveSimulation::counters() const {
-    FlowCounters out = past_.counters;
-    return out += flow_->counters();
+IntegratorCounters CurveSimulation::counters() const {
+    IntegratorCounters out = past_.counters;
+    return out += integrator_->counters();
 }
 
 void CurveSimulation::add_to_trace(double t) {
@@ -211,8 +216,8 @@ void CurveSimulation::add_to_trace(double t) {
     const Loads loads = loads_at(law, t);
     const Eigen::VectorXd gradient = setup_.motion->forms().gradient(
                               {.energy = 1, .area = loads.tension, .volume = -loads.pressure},
-                              setup_.curve(flow_->x())),
-                          moves = setup_.curve(flow_->v());
+                              setup_.curve(integrator_->x())),
+                          moves = setup_.curve(integrator_->v());
     const double lengthens = law.free_period ? setup_.space->images() * moves[setup_.motion->layout().rise] : 0;
     trace.add(
         t, now_.free_energy,
@@ -221,38 +226,38 @@ void CurveSimulation::add_to_trace(double t) {
 
 void CurveSimulation::look_at_mesh() {
     std::vector<double> lost;
-    setup_.motion->forms().observe(setup_.curve(flow_->x()), &lost);
+    setup_.motion->forms().observe(setup_.curve(integrator_->x()), &lost);
     mesh_need.add(setup_.space->splines(), lost);
 }
 
 // At intervals, since it takes long; not at the end, which no longer needs a mesh.
 std::optional<StopReport> CurveSimulation::find_event(bool) {
-    const double t = flow_->time();
-    if (outcome_ == Flow::Outcome::guard) return curve_guards()[flow_->tripped()].report(now_, t);
-    const bool due = at_kink_ || flow_->counters().steps % steps_between_looks == 0;
-    if (outcome_ == Flow::Outcome::end || !due) return std::nullopt;
+    const double t = integrator_->time();
+    if (outcome_ == TimeIntegrator::Outcome::guard) return curve_guards()[integrator_->tripped()].report(now_, t);
+    const bool due = at_kink_ || integrator_->counters().steps % steps_between_looks == 0;
+    if (outcome_ == TimeIntegrator::Outcome::end || !due) return std::nullopt;
     look_at_mesh();
-    return find_bad_profile(*setup_.space, setup_.curve(flow_->x()), now_, t);
+    return find_bad_profile(*setup_.space, setup_.curve(integrator_->x()), now_, t);
 }
 
 std::optional<StopReport> CurveSimulation::advance(double until) {
     initial_.reset();
-    if (at_kink_) restart_flow();
-    outcome_ = flow_->advance(std::min(next_kink(setup_.motion->law(), flow_->time()), until));
-    const double t = flow_->time();
-    at_kink_ = outcome_ == Flow::Outcome::end && t < until;
-    if (at_kink_) outcome_ = Flow::Outcome::step;
-    if (outcome_ == Flow::Outcome::failed && may_be_undefined(now_.o.domain))
+    if (at_kink_) restart_integrator();
+    outcome_ = integrator_->advance(std::min(next_kink(setup_.motion->law(), integrator_->time()), until));
+    const double t = integrator_->time();
+    at_kink_ = outcome_ == TimeIntegrator::Outcome::end && t < until;
+    if (at_kink_) outcome_ = TimeIntegrator::Outcome::step;
+    if (outcome_ == TimeIntegrator::Outcome::failed && may_be_undefined(now_.o.domain))
         return undefined_energy(now_.o.domain, t, fmt::format("s = {:.4g}", now_.o.domain.place));
-    if (outcome_ == Flow::Outcome::failed)
-        return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + flow_->failure(),
+    if (outcome_ == TimeIntegrator::Outcome::failed)
+        return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + integrator_->failure(),
                           another_resolution};
-    if (outcome_ == Flow::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    return find_rise(observe(t, flow_->x(), flow_->v()));
+    if (outcome_ == TimeIntegrator::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
+    return find_rise(observe(t, integrator_->x(), integrator_->v()));
 }
 
 std::optional<StopReport> CurveSimulation::update_error() {
-    const double t = flow_->time();
+    const double t = integrator_->time();
     least_symbol = std::min(least_symbol, now_.o.symbol);
     add_to_trace(t);
     if (coarser_) coarser_->lead_to(t);
@@ -261,7 +266,7 @@ std::optional<StopReport> CurveSimulation::update_error() {
 }
 
 StopReport CurveSimulation::failure(const SolveError& what) {
-    return {Stop::solver_failed, flow_->time(), what.what(), another_resolution};
+    return {Stop::solver_failed, integrator_->time(), what.what(), another_resolution};
 }
 
 void CurveSimulation::summarise() {
@@ -298,12 +303,12 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
 // step.
 std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
     const bool asked = !setup_.settings.is_coarser && !setup_.c.profile_resolution_given();
-    const double bound = s.total() - work(flow_->time()), rise = bound - past_.least,
+    const double bound = s.total() - work(integrator_->time()), rise = bound - past_.least,
                  hopeless = hopeless_rise * summary.reference_energy,
                  wanted = setup_.c.accuracy.energy * summary.reference_energy,
                  allowed = asked ? std::max(wanted, std::min(error, hopeless)) : hopeless;
     if (!is_admissible(s) || !(rise <= allowed)) {
-        restart_flow();
+        restart_integrator();
         return StopReport{
             Stop::resolution_lost, past_.time,
             fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
@@ -317,20 +322,27 @@ std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
 
 void CurveSimulation::keep_good() {
     const int n = setup_.motion->layout().size;
-    past_.y = Eigen::Map<const Eigen::VectorXd>(flow_->x(), n);
-    past_.rate = Eigen::Map<const Eigen::VectorXd>(flow_->v(), n);
-    past_.time = flow_->time();
+    past_.y = Eigen::Map<const Eigen::VectorXd>(integrator_->x(), n);
+    past_.rate = Eigen::Map<const Eigen::VectorXd>(integrator_->v(), n);
+    past_.time = integrator_->time();
 }
 
 // IDA sees only guards that change their sign later.
 std::optional<StopReport> CurveSimulation::check_start() {
-    return initial_stop_ ? initial_stop_ : find_guard(now_, flow_->time());
+    return initial_stop_ ? initial_stop_ : find_guard(now_, integrator_->time());
 }
 
 std::optional<StopReport> CurveSimulation::find_guard(const Snapshot& s, double t) const {
     for (const CurveGuard& guard : curve_guards())
         if (!(guard.value(s, setup_.c.accuracy.r_min) > 0)) return guard.report(s, t);
     return std::nullopt;
+}
+
+Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
+    Loop out(run, c, watch, clock, run.is_reported());
+    out.add(std::make_unique<Stall>(most_stalled, tiny_step * c.time.end, c.accuracy.energy,
+                                    "try another accuracy, discretisation.elements or parametrisation"));
+    return out;
 }
 
 }  // namespace tubule::axisym

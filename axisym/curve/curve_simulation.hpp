@@ -10,6 +10,7 @@
 #include "axisym/curve/curve_setup.hpp"
 #include "axisym/integration/effort.hpp"
 #include "common/run/energy_trace.hpp"
+#include "common/run/loop.hpp"
 #include "common/run/simulation.hpp"
 
 namespace tubule::axisym {
@@ -31,8 +32,8 @@ public:
     void compare_no_more() { coarser_ = nullptr; }
 
     bool is_reported() const { return !setup_.settings.is_coarser; }
-    double time() const override { return initial_stop_ ? 0 : flow_->time(); }
-    double step_size() const override { return flow_->step_size(); }
+    double time() const override { return initial_stop_ ? 0 : integrator_->time(); }
+    double step_size() const override { return integrator_->step_size(); }
     Energetics energetics() const override;
     std::unique_ptr<StateView> at(double t) override;
     std::optional<StopReport> check_start() override;
@@ -53,7 +54,7 @@ private:
     struct Past {
         double total_start = 0, dissipated = 0, work = 0;  // before this flow began
         double least = 0;                                  // over all steps, of what never rises: total less work
-        FlowCounters counters;
+        IntegratorCounters counters;
         Loads rates;              // of change, of the loads of this flow
         Eigen::VectorXd y, rate;  // of the last good step
         double time = 0;
@@ -61,8 +62,8 @@ private:
 
     std::unique_ptr<View> view(double t);
     const Snapshot& observe(double t, const double* y, const double* rate);
-    void make_flow(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
-    void restart_flow();
+    void make_integrator(const Eigen::VectorXd& y, const Eigen::VectorXd& rate, double time, double first_step);
+    void restart_integrator();
     std::optional<StopReport> find_guard(const Snapshot& s, double t) const;
     std::optional<StopReport> find_rise(const Snapshot& s);
     void look_at_mesh();
@@ -72,21 +73,26 @@ private:
     void keep_good();
     void add_to_trace(double t);
 
-    double dissipated(double t) const { return past_.dissipated + flow_->dissipated(t); }
-    double work(double t) const { return past_.work + flow_->work(t); }
-    FlowCounters counters() const;
+    double dissipated(double t) const { return past_.dissipated + integrator_->dissipated(t); }
+    double work(double t) const { return past_.work + integrator_->work(t); }
+    IntegratorCounters counters() const;
 
     CurveSetup setup_;
     CoarserCurve* coarser_;
-    std::unique_ptr<Flow> flow_;
-    Flow::Outcome outcome_ = Flow::Outcome::step;  // of the last step
-    bool at_kink_ = false;                         // of the loads, where it ended
+    std::unique_ptr<TimeIntegrator> integrator_;
+    TimeIntegrator::Outcome outcome_ = TimeIntegrator::Outcome::step;  // of the last step
+    bool at_kink_ = false;                                             // of the loads, where it ended
     double observed_at_ = std::numeric_limits<double>::quiet_NaN();
     Snapshot now_;
     Past past_;
     double error_now_ = 0;
-    std::unique_ptr<View> initial_;  // with the exact curve
+    std::unique_ptr<View>
+        initial_;  // at t = 0, with the exact curve; until the first step, which begins a little later
     std::optional<StopReport> initial_stop_;
 };
+
+// The loop of a run of a curve, once that has begun: with the callbacks that curves have. All references must outlive
+// it.
+Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock);
 
 }  // namespace tubule::axisym

@@ -236,9 +236,10 @@ private:
         const auto where = self_intersection(space, x);
         if (!where) return false;
         const CurvePoint p = space.evaluate(x, (*where)[0]);
-        branch_.message = fmt::format("at parameter {:.6g} the shape intersects itself or crosses the axis at "
-                                      "r = {:.4g}, z = {:.4g}",
-                                      parameter, p.r, p.z);
+        branch_.message = fmt::format(
+            "at parameter {:.6g} the shape intersects itself or crosses the axis at "
+            "r = {:.4g}, z = {:.4g}",
+            parameter, p.r, p.z);
         return true;
     }
 

@@ -10,12 +10,12 @@ constexpr double error_change = 0.25;
 
 }  // namespace
 
-bool GraphError::due(const Observation& o, bool long_steps) {
+bool GraphError::due(const Observation& o, bool rosenbrock) {
     const double change = std::abs(std::log(o.dissipation / dissipation_last_));
-    return ++steps_since_ >= error_steps || long_steps || !(change < error_change);
+    return ++steps_since_ >= error_steps || rosenbrock || !(change < error_change);
 }
 
-void GraphError::carry_on(GraphStage& stage, const Observation& o) {
+void GraphError::transport(GraphMesh& stage, const Observation& o) {
     if (steps_since_ > 0) stage.transport.advance();
     latest = stage.transport.energy_error(o.free_energy);
     begin(o);

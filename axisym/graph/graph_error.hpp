@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/graph/graph_settings.hpp"
-#include "axisym/graph/graph_stage.hpp"
 
 namespace tubule::axisym {
 
@@ -16,8 +16,8 @@ public:
     void begin(const Observation& o) { dissipation_last_ = o.dissipation, steps_since_ = 0; }
     // Whether to transport the error after a step: after each long step of a one-step method, or when some short ones
     // of backward differences have changed the shape.
-    bool due(const Observation& o, bool long_steps);
-    void carry_on(GraphStage& stage, const Observation& o);
+    bool due(const Observation& o, bool rosenbrock);
+    void transport(GraphMesh& stage, const Observation& o);
     // Whether it exceeds what is allowed, for a reason that finer settings remedy.
     bool is_curable(const GraphSettings& settings, double allowed) const;
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "axisym/splines/band_lu.hpp"
 
 namespace tubule::axisym {
@@ -38,7 +38,7 @@ public:
     // polynomial of its method and Gauss' rule. (The error estimate of the method cannot replace it: it is that of a
     // method of lower order.) A short one takes the cubic through states and rates at its ends and Simpson's rule, as
     // at the ends only the residual of space is left.
-    void add_step(const Flow& flow, double from, bool long_step);
+    void add_step(const TimeIntegrator& flow, double from, bool rosenbrock);
     // Brings the errors to the time of the last step.
     void advance();
 

@@ -32,6 +32,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_energy_start", s.energy_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error_max", s.error_max), f.number("restart_time_tolerance", s.time_tolerance);
     f.number("restart_defect", s.defect), f.number("restart_least_symbol", s.least_symbol);
+    f.number("restart_rosenbrock", s.rosenbrock), f.number("restart_attempts", s.attempts);
     f.array("restart_breaks", s.breaks), f.array("restart_coefficients", s.coefficients);
     f.array("restart_error_total", s.error_total), f.array("restart_error_spatial", s.error_spatial);
 }

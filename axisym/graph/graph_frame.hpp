@@ -15,7 +15,9 @@ struct GraphRestart {
     std::vector<double> breaks;
     Eigen::VectorXd coefficients, error_total, error_spatial;
     double reference_energy = 0, energy_start = 0, dissipated = 0, error_max = 0;
-    double time_tolerance = 0, defect = 0, least_symbol = 0;
+    double time_tolerance = 0, defect = 0, least_symbol = 0;  // the defect absolute
+    bool rosenbrock = false;
+    int attempts = 1;
 };
 
 // Numbers degree, length, energy; arrays knots, coefficients (the spline over the period [0, length]), sampled

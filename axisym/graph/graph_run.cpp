@@ -21,7 +21,14 @@ public:
           watch_(watch),
           clock_(clock),
           restart_(restart),
-          settings_(first_graph_settings(c, c.time.integrator == Integrator::rosenbrock)) {}
+          settings_(first_graph_settings(c, c.time.integrator == Integrator::rosenbrock)) {
+        if (!restart) return;
+        const GraphRestart begun = graph_restart(*restart);
+        settings_ = first_graph_settings(c, begun.rosenbrock);
+        settings_.time_tolerance = begun.time_tolerance;
+        settings_.defect = begun.defect / begun.reference_energy;
+        count_ = begun.attempts;
+    }
 
     RunSummary& next() override {
         settings_.may_give_up = --left_ > 0;
@@ -58,7 +65,7 @@ private:
     // flow of a Rosenbrock method does not see; Newton's method does.
     bool fall_back_on_ida(const RunSummary& last) {
         const bool lost = last.stop.reason == Stop::resolution_lost || last.stop.reason == Stop::solver_failed;
-        if (!settings_.one_step || !lost) return false;
+        if (!settings_.rosenbrock || !lost) return false;
         fallback_ = fmt::format("IDA has integrated the run: time.integrator = \"rosenbrock\" failed at t = {:.4g}, {}",
                                 last.stop.time, last.stop.message);
         settings_ = first_graph_settings(case_, false);

@@ -1,8 +1,8 @@
 // The series of a run of a graph, a row each step.
 #pragma once
 
-#include "axisym/graph/graph_stage.hpp"
-#include "axisym/integration/flow.hpp"
+#include "axisym/graph/graph_mesh.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/series/table.hpp"
 
 namespace tubule::axisym {
@@ -12,8 +12,8 @@ struct GraphRow {
     double time;
     const Observation& o;
     const double* x;
-    const GraphStage& stage;
-    const Flow& flow;
+    const GraphMesh& stage;
+    const TimeIntegrator& flow;
     long newton_iterations;
     double identity_defect, energy_error;
     int elements;

@@ -8,21 +8,21 @@ namespace {
 
 // Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
 // The error of Rosenbrock's method falls faster than its tolerance.
-double time_tolerance_for(double asked, bool one_step) {
-    return std::max(!one_step ? 0.35 * asked : 3.5e-5 * std::pow(asked / 1e-4, 0.68), 1e-13);
+double time_tolerance_for(double asked, bool rosenbrock) {
+    return std::max(!rosenbrock ? 0.35 * asked : 3.5e-5 * std::pow(asked / 1e-4, 0.68), 1e-13);
 }
 constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh / (asked accuracy * E_ref)
 
 }  // namespace
 
-GraphSettings first_graph_settings(const Problem& c, bool one_step) {
+GraphSettings first_graph_settings(const Problem& c, bool rosenbrock) {
     const double asked = c.accuracy.energy;
-    return {c.discretisation.time_tolerance.value_or(time_tolerance_for(asked, one_step)),
+    return {c.discretisation.time_tolerance.value_or(time_tolerance_for(asked, rosenbrock)),
             defect_per_accuracy * asked,
             !c.discretisation.time_tolerance,
             !c.discretisation.elements,
             true,
-            one_step};
+            rosenbrock};
 }
 
 // An attempt ends when its error exceeds what is allowed, before it is largest: after the first attempt, settings aim

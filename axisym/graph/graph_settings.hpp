@@ -14,10 +14,10 @@ struct GraphSettings {
     double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
     bool free_time = true, free_mesh = true;
     bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
-    bool one_step = false;    // Rosenbrock's method, else IDA
+    bool rosenbrock = false;  // Rosenbrock's method of long steps instead of IDA
 };
 
-GraphSettings first_graph_settings(const Problem& c, bool one_step);
+GraphSettings first_graph_settings(const Problem& c, bool rosenbrock);
 
 // After attempt number `attempt`, whose error (absolute) was beyond what is allowed.
 GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt);

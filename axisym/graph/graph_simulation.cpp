@@ -8,8 +8,8 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_start.hpp"
-#include "axisym/integration/bdf_flow.hpp"
-#include "axisym/integration/rosenbrock_flow.hpp"
+#include "axisym/integration/ida_integrator.hpp"
+#include "axisym/integration/rosenbrock_integrator.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/error_scale.hpp"
 
@@ -32,20 +32,20 @@ double GraphSimulation::Now::lost() const {
 
 const Observation& GraphSimulation::observe(double t, const double* x, const double* v) {
     if (t != now_.time) {
-        now_.o = stage_->look(x, v, &now_.defect);
+        now_.o = mesh_->look(x, v, &now_.defect);
         now_.time = t;
     }
     return now_.o;
 }
 
-void GraphSimulation::use_stage(std::unique_ptr<GraphStage> stage) {
-    stage_ = std::move(stage);
-    summary.elements = stage_->space.elements() * stage_->space.cell().images();
+void GraphSimulation::use_mesh(std::unique_ptr<GraphMesh> stage) {
+    mesh_ = std::move(stage);
+    summary.elements = mesh_->space.elements() * mesh_->space.cell().images();
 }
 
-FlowSystem GraphSimulation::system() {
-    const Forms& forms = stage_->forms;
-    FlowSystem system;
+ImplicitSystem GraphSimulation::system() {
+    const Forms& forms = mesh_->forms;
+    ImplicitSystem system;
     system.residual = [&forms](double, const double* at, const double* rate, double* out) {
         return forms.residual(at, rate, out);
     };
@@ -53,15 +53,15 @@ FlowSystem GraphSimulation::system() {
         forms.jacobian(at, rate, cj, values);
     };
     system.pattern = &forms.pattern();
-    system.banded = stage_->space.cell().mirror;
+    system.banded = mesh_->space.cell().mirror;
     system.mass = [&forms](const double* at, double* values) { forms.mass(at, values); };
     system.dissipation = [this, &forms](double when, const double* at, const double* rate) {
-        if (when != now_.time && is_one_step()) return forms.observe(at, rate).dissipation;  // within a step
+        if (when != now_.time && is_rosenbrock()) return forms.observe(at, rate).dissipation;  // within a step
         return observe(when, at, rate).dissipation;
     };
     system.guards = [this](double when, const double* at, const double* rate) {
         const Observation& o = observe(when, at, rate);
-        if (is_one_step() && seen_.size() < path_points.size()) seen_.emplace_back(when, o);
+        if (is_rosenbrock() && seen_.size() < path_points.size()) seen_.emplace_back(when, o);
         Guards values;
         for (const GraphGuard& guard : graph_guards()) values.push_back(guard.value(o, limits()));
         return values;
@@ -70,10 +70,10 @@ FlowSystem GraphSimulation::system() {
     return system;
 }
 
-void GraphSimulation::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step) {
-    if (flow_) {
-        past_.dissipated = dissipated(flow_->time());
-        past_.counters += flow_->counters();
+void GraphSimulation::make_integrator(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step) {
+    if (integrator_) {
+        past_.dissipated = dissipated(integrator_->time());
+        past_.counters += integrator_->counters();
     }
     TimeControl control;
     control.relative = settings_.time_tolerance;
@@ -82,12 +82,12 @@ void GraphSimulation::make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd&
     control.max_order = case_.time.max_order;
     control.first_step = first_step;
     now_.time = std::numeric_limits<double>::quiet_NaN();
-    if (is_one_step())
-        flow_ = std::make_unique<RosenbrockFlow>(system(), x, v, t, control);
+    if (is_rosenbrock())
+        integrator_ = std::make_unique<RosenbrockIntegrator>(system(), x, v, t, control);
     else
-        flow_ = std::make_unique<BdfFlow>(system(), x, v, t, control);
-    stage_->transport.begin(flow_->x(), flow_->v());
-    error_.begin(observe(t, flow_->x(), flow_->v()));
+        integrator_ = std::make_unique<IdaIntegrator>(system(), x, v, t, control);
+    mesh_->transport.begin(integrator_->x(), integrator_->v());
+    error_.begin(observe(t, integrator_->x(), integrator_->v()));
     dissipated_.begin(t, now_.o.dissipation);
     if (!least_symbol_) least_symbol_ = least_symbol_of(case_.energy, now_.o);
     good_.x = x;
@@ -103,12 +103,12 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     FirstMesh mesh = first_mesh(case_, settings_, cell, shape);
     summary.reference_energy = mesh.reference_energy;
     settings_.defect *= mesh.reference_energy;
-    use_stage(std::make_unique<GraphStage>(cell, std::move(mesh.breaks), case_));
-    const Eigen::VectorXd x = stage_->space.project(shape);
-    ErrorTransport& transport = stage_->transport;
-    transport.total = transport.space().project(shape) - transport.space().prolong(stage_->space, x);
-    make_flow(x, stage_->forms.rate(x), 0, 0);
-    error_.carry_on(*stage_, now_.o);  // so far that of the first mesh
+    use_mesh(std::make_unique<GraphMesh>(cell, std::move(mesh.breaks), case_));
+    const Eigen::VectorXd x = mesh_->space.project(shape);
+    ErrorTransport& transport = mesh_->transport;
+    transport.total = transport.space().project(shape) - transport.space().prolong(mesh_->space, x);
+    make_integrator(x, mesh_->forms.rate(x), 0, 0);
+    error_.transport(*mesh_, now_.o);  // so far that of the first mesh
     past_.energy_start = now_.o.free_energy;
 }
 
@@ -116,8 +116,8 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
                                  const Record& restart)
     : case_(c), clock_(clock), series_(graph_series(c)), settings_(settings), remesh_margin_(first_remesh_margin) {
     const GraphRestart state = graph_restart(restart);
-    use_stage(std::make_unique<GraphStage>(state.cell, state.breaks, case_));
-    stage_->transport.set(state.error_total, state.error_spatial);
+    use_mesh(std::make_unique<GraphMesh>(state.cell, state.breaks, case_));
+    mesh_->transport.set(state.error_total, state.error_spatial);
     summary.reference_energy = state.reference_energy;
     settings_.time_tolerance = state.time_tolerance;
     settings_.defect = state.defect;
@@ -125,7 +125,7 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     past_.dissipated = state.dissipated;
     error_.largest = state.error_max;
     least_symbol_ = state.least_symbol;
-    make_flow(state.coefficients, stage_->forms.rate(state.coefficients), restart.time, 0);
+    make_integrator(state.coefficients, mesh_->forms.rate(state.coefficients), restart.time, 0);
 }
 
 Energetics GraphSimulation::energetics() const {
@@ -144,19 +144,19 @@ GraphLimits GraphSimulation::limits() const {
 }
 
 // Transports the error; the reason to stop if it exceeds the tolerance and finer settings would help.
-std::optional<StopReport> GraphSimulation::give_up_if_curable() {
-    error_.carry_on(*stage_, now_.o);
+std::optional<StopReport> GraphSimulation::transport_error() {
+    error_.transport(*mesh_, now_.o);
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
     gave_up = settings_.may_give_up && error_.is_curable(settings_, allowed);
-    if (!gave_up) return std::nullopt;
-    return StopReport{Stop::resolution_lost, flow_->time(), "the error exceeds the requested accuracy", ""};
+    if (!gave_up) return std::nullopt;  // the report below is not shown: a finer run replaces this one
+    return StopReport{Stop::resolution_lost, integrator_->time(), "the error exceeds the requested accuracy", ""};
 }
 
 // In gradient flow the energy cannot rise: a rise is an error. Where it exceeds the known error and the tolerance, the
 // run returns to the last good state.
 std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
     const double rise = o.free_energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
-    if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.carry_on(*stage_, o);
+    if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.transport(*mesh_, o);
     if (rise <= std::max(asked, stated_over_computed * error_.now())) {
         error_.largest = std::max(error_.largest, rise / stated_over_computed);
         good_.least_energy = std::min(good_.least_energy, o.free_energy);
@@ -176,7 +176,7 @@ std::optional<StopReport> GraphSimulation::check_error() {
     if (error_.now() <= hopeless_error * summary.reference_energy) return std::nullopt;
     const bool asked = !settings_.free_mesh || !settings_.free_time;
     return StopReport{
-        Stop::resolution_lost, flow_->time(),
+        Stop::resolution_lost, integrator_->time(),
         fmt::format("the error of the energy reached {:.2g} of E_ref{}", error_.now() / summary.reference_energy,
                     asked ? " with the given discretisation" : ""),
         asked ? "omit discretisation.elements and discretisation.time_tolerance, or refine them"
@@ -185,8 +185,9 @@ std::optional<StopReport> GraphSimulation::check_error() {
 
 std::optional<StopReport> GraphSimulation::find_event(bool) {
     const Observation& o = now_.o;
-    const double t = flow_->time();
-    if (outcome_ == Flow::Outcome::guard) return graph_guards()[flow_->tripped()].report(o, *stage_, flow_->x(), t);
+    const double t = integrator_->time();
+    if (outcome_ == TimeIntegrator::Outcome::guard)
+        return graph_guards()[integrator_->tripped()].report(o, *mesh_, integrator_->x(), t);
     if (o.symbol_3d <= 0 && summary.warnings.empty())
         summary.warnings.push_back(
             fmt::format("from t = {:.6g} on, the flow of the full surface is ill-posed in directions that axisymmetric "
@@ -197,25 +198,25 @@ std::optional<StopReport> GraphSimulation::find_event(bool) {
 
 // A shape that keeps sharpening gets more room each time, as every remesh restarts the integrator.
 std::optional<StopReport> GraphSimulation::remesh() {
-    const bool soon = flow_->counters().steps < few_steps && meshes_ > 1;
+    const bool soon = integrator_->counters().steps < few_steps && meshes_ > 1;
     remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
-    const double t = flow_->time();
+    const double t = integrator_->time();
     const Observation o = now_.o;
-    auto breaks = refined_breaks(stage_->space, now_.defect, settings_.defect * remesh_margin_, most_graph_elements);
+    auto breaks = refined_breaks(mesh_->space, now_.defect, settings_.defect * remesh_margin_, most_graph_elements);
     if (static_cast<int>(breaks.size()) > most_graph_elements + 1) {
-        if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
+        if (is_about_to_overhang(o)) return overhang(o, *mesh_, integrator_->x(), integrator_->time());
         return StopReport{Stop::resolution_lost, t,
                           fmt::format("the profile needs more than {} elements per cell near z = {:.6g}",
-                                      most_graph_elements, stage_->place(o.z_steep)),
+                                      most_graph_elements, mesh_->place(o.z_steep)),
                           "ask for less accuracy"};
     }
-    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
-    auto next = std::make_unique<GraphStage>(stage_->space.cell(), std::move(breaks), case_);
-    const Eigen::VectorXd projected = next->space.prolongation(stage_->space) * x;  // all knots of before are here
-    next->transport.inherit(stage_->transport, x, projected);
-    const double step = flow_->step_size();
-    use_stage(std::move(next));  // from here on nothing pauses: stage and flow belong together
-    make_flow(projected, stage_->forms.rate(projected), t, is_one_step() ? step : 0);
+    const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(integrator_->x(), mesh_->space.size());
+    auto next = std::make_unique<GraphMesh>(mesh_->space.cell(), std::move(breaks), case_);
+    const Eigen::VectorXd projected = next->space.prolongation(mesh_->space) * x;  // all knots of before are here
+    next->transport.inherit(mesh_->transport, x, projected);
+    const double step = integrator_->step_size();
+    use_mesh(std::move(next));  // from here on nothing pauses: stage and flow belong together
+    make_integrator(projected, mesh_->forms.rate(projected), t, is_rosenbrock() ? step : 0);
     ++meshes_;
     return std::nullopt;
 }
@@ -223,23 +224,23 @@ std::optional<StopReport> GraphSimulation::remesh() {
 // Names the terms whose derivatives are wrong at the last good state, if any.
 std::string GraphSimulation::suspects() const {
     std::string keys;
-    for (const TermCheck& term : check_terms(stage_->forms, good_.x))
+    for (const TermCheck& term : check_terms(mesh_->forms, good_.x))
         if (!term.check.pass()) keys += (keys.empty() ? "" : ", ") + term.key;
     return keys.empty() ? "the derivatives of all terms are right" : "wrong derivatives: " + keys;
 }
 
 StopReport GraphSimulation::failure(const std::string& what) const {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(good_.x.size());
-    const Observation o = stage_->look(good_.x.data(), rest.data(), nullptr);
-    if (is_about_to_overhang(o)) return overhang(o, *stage_, flow_->x(), flow_->time());
+    const Observation o = mesh_->look(good_.x.data(), rest.data(), nullptr);
+    if (is_about_to_overhang(o)) return overhang(o, *mesh_, integrator_->x(), integrator_->time());
     if (may_be_undefined(o.domain))
-        return undefined_energy(o.domain, good_.time, fmt::format("z = {:.6g}", stage_->place(o.domain.place)));
+        return undefined_energy(o.domain, good_.time, fmt::format("z = {:.6g}", mesh_->place(o.domain.place)));
     return {Stop::solver_failed, good_.time, fmt::format("{} ({})", what, suspects()),
             "ask for more accuracy, or lower time.max_order"};
 }
 
 std::optional<StopReport> GraphSimulation::recover() {
-    const std::string said = flow_->failure();
+    const std::string said = integrator_->failure();
     if (auto pause = clock_.find_pause(good_.time)) return pause;
     if (++good_.failures > most_failures) return failure("the time integrator gave up: " + said);
     return_to_good();
@@ -248,65 +249,66 @@ std::optional<StopReport> GraphSimulation::recover() {
 
 void GraphSimulation::return_to_good() {
     const Eigen::VectorXd x = good_.x;
-    make_flow(x, stage_->forms.rate(x), good_.time, 0);
+    make_integrator(x, mesh_->forms.rate(x), good_.time, 0);
 }
 
 // A start beyond a limit stops at once: the integrator only sees limits being crossed.
 std::optional<StopReport> GraphSimulation::check_start() {
     for (const GraphGuard& guard : graph_guards())
-        if (guard.value(now_.o, limits()) <= 0) return guard.report(now_.o, *stage_, flow_->x(), flow_->time());
+        if (guard.value(now_.o, limits()) <= 0)
+            return guard.report(now_.o, *mesh_, integrator_->x(), integrator_->time());
     return std::nullopt;
 }
 
 std::optional<StopReport> GraphSimulation::advance(double until) {
-    const double before = flow_->time();
+    const double before = integrator_->time();
     error_before_ = error_.now();
     do {
         seen_.clear();
-        outcome_ = flow_->advance(until);
-        if (outcome_ != Flow::Outcome::failed) break;
+        outcome_ = integrator_->advance(until);
+        if (outcome_ != TimeIntegrator::Outcome::failed) break;
         if (auto stop = recover()) return stop;
     } while (true);
-    const double t = flow_->time();
-    if (outcome_ == Flow::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
+    const double t = integrator_->time();
+    if (outcome_ == TimeIntegrator::Outcome::guard) now_.time = std::numeric_limits<double>::quiet_NaN();
     const Observation& o = observe();
     if (t > before) {
-        stage_->transport.add_step(*flow_, before, is_one_step());
+        mesh_->transport.add_step(*integrator_, before, is_rosenbrock());
         dissipated_.add(t, o.dissipation);
     }
     return find_rise(o);
 }
 
 std::optional<StopReport> GraphSimulation::update_error() {
-    const bool due = error_.due(now_.o, is_one_step());
-    return due || outcome_ != Flow::Outcome::step ? give_up_if_curable() : std::nullopt;
+    const bool due = error_.due(now_.o, is_rosenbrock());
+    return due || outcome_ != TimeIntegrator::Outcome::step ? transport_error() : std::nullopt;
 }
 
 void GraphSimulation::accept() {
-    good_.x = Eigen::Map<const Eigen::VectorXd>(flow_->x(), stage_->space.size());
-    good_.time = flow_->time();
+    good_.x = Eigen::Map<const Eigen::VectorXd>(integrator_->x(), mesh_->space.size());
+    good_.time = integrator_->time();
     good_.balance = now_.o.free_energy + dissipated(good_.time);
     good_.failures = 0;
 }
 
 std::optional<StopReport> GraphSimulation::adapt_mesh() {
     if (!settings_.free_mesh || now_.lost() <= settings_.defect) return std::nullopt;
-    if (auto stop = give_up_if_curable()) return stop;
+    if (auto stop = transport_error()) return stop;
     return remesh();
 }
 
 // Few long steps may miss their own error: what is stated is not far below the tolerance of a step, unless the energy
 // has hardly changed.
 double GraphSimulation::least_error() const {
-    if (!is_one_step()) return 0;
+    if (!is_rosenbrock()) return 0;
     return least_share * std::min(settings_.time_tolerance * summary.reference_energy,
                                   std::abs(now_.o.free_energy - past_.energy_start));
 }
 
 void GraphSimulation::summarise() {
     summary.estimated_error = std::max(stated_over_computed * error_.largest, least_error()) / summary.reference_energy;
-    Effort effort{is_one_step() ? "rosenbrock" : "ida", meshes_, settings_.time_tolerance, past_.counters};
-    effort.counters += flow_->counters();
+    Effort effort{is_rosenbrock() ? "rosenbrock" : "ida", meshes_, settings_.time_tolerance, past_.counters};
+    effort.counters += integrator_->counters();
     describe(effort, summary);
 }
 
@@ -317,7 +319,7 @@ struct GraphSimulation::View : StateView {
     Eigen::VectorXd x, v;
     Observation o;
 
-    View(const GraphSimulation& r, double time) : run(r), t(time), x(r.stage_->space.size()), v(x.size()) {}
+    View(const GraphSimulation& r, double time) : run(r), t(time), x(r.mesh_->space.size()), v(x.size()) {}
     std::vector<double> row(double wall_seconds) const override { return run.row(t, error, o, x.data(), wall_seconds); }
     Record record() const override;
 };
@@ -325,12 +327,13 @@ struct GraphSimulation::View : StateView {
 // The error within a step is the larger one of those at its ends, as it may pass through zero at one of them.
 std::unique_ptr<StateView> GraphSimulation::at(double t) {
     auto out = std::make_unique<View>(*this, t);
-    if (t == flow_->time()) {
-        std::copy_n(flow_->x(), out->x.size(), out->x.data()), std::copy_n(flow_->v(), out->v.size(), out->v.data());
+    if (t == integrator_->time()) {
+        std::copy_n(integrator_->x(), out->x.size(), out->x.data()),
+            std::copy_n(integrator_->v(), out->v.size(), out->v.data());
         out->o = now_.o, out->error = error_.now();
     } else {
-        flow_->look_back(t, out->x.data(), out->v.data());
-        out->o = stage_->look(out->x.data(), out->v.data(), nullptr);
+        integrator_->state_within_step(t, out->x.data(), out->v.data());
+        out->o = mesh_->look(out->x.data(), out->v.data(), nullptr);
         out->error = std::max(error_before_, error_.now());
     }
     return out;
@@ -343,7 +346,7 @@ void GraphSimulation::write_path(double from, double until, RunOutput& out) {
     const double asked = case_.accuracy.energy * summary.reference_energy,
                  error = std::max(error_before_, error_.now());
     const double allowed = path_error * std::min(3 * settings_.time_tolerance * summary.reference_energy, asked);
-    Eigen::VectorXd x(stage_->space.size()), v(stage_->space.size());
+    Eigen::VectorXd x(mesh_->space.size()), v(mesh_->space.size());
     for (const auto& [t, o] : seen_) {
         if (!(t > from && t < until) || !out.wants_row(t)) continue;
         const double lost = std::abs(o.free_energy + dissipated(t) - good_.balance);
@@ -352,7 +355,7 @@ void GraphSimulation::write_path(double from, double until, RunOutput& out) {
             if (&seen_[path_points.size() / 2].first == &t) out.row(t, at(t)->row(out.seconds()));
         } else {
             error_.largest = std::max(error_.largest, both);
-            flow_->interpolate(t, x.data(), v.data());
+            integrator_->interpolate(t, x.data(), v.data());
             out.row(t, row(t, both, o, x.data(), out.seconds()));
         }
     }
@@ -360,13 +363,14 @@ void GraphSimulation::write_path(double from, double until, RunOutput& out) {
 
 std::vector<double> GraphSimulation::row(double t, double error, const Observation& o, const double* x,
                                          double wall_seconds) const {
-    const long iterations = flow_->counters().newton_iterations + past_.counters.newton_iterations;
-    return series_.values({t, o, x, *stage_, *flow_, iterations, o.free_energy - past_.energy_start + dissipated(t),
-                           stated_over_computed * error, summary.elements, wall_seconds});
+    const long iterations = integrator_->counters().newton_iterations + past_.counters.newton_iterations;
+    return series_.values({t, o, x, *mesh_, *integrator_, iterations,
+                           o.free_energy - past_.energy_start + dissipated(t), stated_over_computed * error,
+                           summary.elements, wall_seconds});
 }
 
 Record GraphSimulation::View::record() const {
-    const GraphStage& stage = *run.stage_;
+    const GraphMesh& stage = *run.mesh_;
     GraphRestart state;
     state.cell = stage.space.cell();
     state.breaks = stage.space.breaks();
@@ -380,6 +384,8 @@ Record GraphSimulation::View::record() const {
     state.dissipated = run.dissipated(t);
     state.error_max = run.error_.largest;
     state.least_symbol = run.least_symbol_.value_or(0);
+    state.rosenbrock = run.is_rosenbrock();
+    state.attempts = run.summary.attempts;
     return graph_record(t, stage.space, state, v, o.energy);
 }
 

@@ -9,11 +9,11 @@
 #include "axisym/graph/graph_error.hpp"
 #include "axisym/graph/graph_frame.hpp"
 #include "axisym/graph/graph_guards.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/graph/graph_series.hpp"
-#include "axisym/graph/graph_stage.hpp"
 #include "axisym/integration/effort.hpp"
-#include "axisym/integration/flow.hpp"
 #include "axisym/integration/step_integral.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/run/simulation.hpp"
 
 namespace tubule::axisym {
@@ -25,8 +25,8 @@ public:
     GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings);
     GraphSimulation(const Problem& c, const RunClock& clock, const GraphSettings& settings, const Record& restart);
 
-    double time() const override { return flow_->time(); }
-    double step_size() const override { return flow_->step_size(); }
+    double time() const override { return integrator_->time(); }
+    double step_size() const override { return integrator_->step_size(); }
     Energetics energetics() const override;
     std::unique_ptr<StateView> at(double t) override;
     std::optional<StopReport> check_start() override;
@@ -49,7 +49,7 @@ private:
     // Before the present flow began.
     struct Past {
         double energy_start = 0, dissipated = 0;
-        FlowCounters counters;
+        IntegratorCounters counters;
     };
     // The last good state.
     struct Good {
@@ -68,16 +68,16 @@ private:
     };
 
     const Observation& observe(double t, const double* x, const double* v);
-    const Observation& observe() { return observe(flow_->time(), flow_->x(), flow_->v()); }
-    void use_stage(std::unique_ptr<GraphStage> stage);
-    FlowSystem system();
-    bool is_one_step() const { return settings_.one_step; }
-    void make_flow(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
+    const Observation& observe() { return observe(integrator_->time(), integrator_->x(), integrator_->v()); }
+    void use_mesh(std::unique_ptr<GraphMesh> stage);
+    ImplicitSystem system();
+    bool is_rosenbrock() const { return settings_.rosenbrock; }
+    void make_integrator(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
     void return_to_good();
 
     std::optional<StopReport> recover();
     std::optional<StopReport> find_rise(const Observation& o);
-    std::optional<StopReport> give_up_if_curable();
+    std::optional<StopReport> transport_error();
     GraphLimits limits() const;
     std::optional<StopReport> remesh();
     StopReport failure(const std::string& what) const;
@@ -87,16 +87,16 @@ private:
     std::vector<double> row(double t, double error, const Observation& o, const double* x, double wall_seconds) const;
     // IDA integrates less exactly than it steps.
     double dissipated(double t) const {
-        return past_.dissipated + (is_one_step() ? flow_->dissipated(t) : dissipated_.at(t));
+        return past_.dissipated + (is_rosenbrock() ? integrator_->dissipated(t) : dissipated_.at(t));
     }
 
     const Problem& case_;
     const RunClock& clock_;
     const SeriesTable<GraphRow> series_;
     GraphSettings settings_;
-    std::unique_ptr<GraphStage> stage_;
-    std::unique_ptr<Flow> flow_;
-    Flow::Outcome outcome_ = Flow::Outcome::step;  // of the last step
+    std::unique_ptr<GraphMesh> mesh_;
+    std::unique_ptr<TimeIntegrator> integrator_;
+    TimeIntegrator::Outcome outcome_ = TimeIntegrator::Outcome::step;  // of the last step
     Now now_;
     std::vector<std::pair<double, Observation>> seen_;  // on the way of the last step, by time
     StepIntegral dissipated_;                           // since the present flow began

@@ -5,7 +5,7 @@
 namespace tubule::axisym {
 
 void describe(const Effort& effort, RunSummary& s) {
-    const FlowCounters& n = effort.counters;
+    const IntegratorCounters& n = effort.counters;
     s.effort = fmt::format("{} steps, {} elements", n.steps, s.elements);
     s.details = {{"integrator", effort.integrator},
                  {"attempts", std::int64_t{s.attempts}},

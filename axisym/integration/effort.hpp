@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "axisym/integration/flow.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule::axisym {
@@ -12,7 +12,7 @@ struct Effort {
     std::string integrator = "ida";  // as time.integrator names it
     int meshes = 1;                  // of the last attempt, like the counters
     double time_tolerance = 0;
-    FlowCounters counters;
+    IntegratorCounters counters;
 };
 
 // Sets `effort` and `details`.

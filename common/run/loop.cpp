@@ -47,7 +47,7 @@ void Loop::step(double until) try {
     stop_ = run_.find_event(at_output);
     if (!stop_) stop_ = check_progress();
     if (stop_) return;
-    out_.safeguard([this] { return restart_record(); });
+    out_.checkpoint_if_due([this] { return restart_record(); });
     const bool output_is_near = outputs_.next() - run_.time() < 1e-9 * run_.time();
     if (!output_is_near) stop_ = run_.adapt_mesh();
 } catch (const SolveError& error) {

@@ -16,8 +16,8 @@ namespace tubule {
 
 class Loop {
 public:
-    // All references must outlive the loop. A run that is not `reported`, but compared with another, writes restart
-    // records alone.
+    // All references must outlive the loop. A run that is not `reported`, but compared with another, writes
+    // nothing: its owner saves it.
     Loop(Simulation& run, const Problem& c, RunObserver& watch, const RunClock& clock, bool reported = true);
 
     void add(std::unique_ptr<Callback> callback) { callbacks_.push_back(std::move(callback)); }

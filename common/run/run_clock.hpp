@@ -14,6 +14,7 @@ StopReport pause_report(const Paused& pause, double time);
 // The summary of a run that pauses before it has a state to resume from.
 RunSummary paused_at_start(const Paused& pause);
 
+// Has a watch of its own, since runs are called without the command, too.
 class RunClock {
 public:
     RunClock(const Case& c, RunObserver& watch) : watch_(c.time.limit, [&watch] { return watch.interrupted(); }) {}

@@ -15,7 +15,8 @@ void RunOutput::frame(double time, const std::function<Record()>& make) {
     last_frame_ = time;
 }
 
-void RunOutput::safeguard(const std::function<Record()>& make) {
+void RunOutput::checkpoint_if_due(const std::function<Record()>& make) {
+    if (!reported_) return;
     // A little before the result would be written without it (FileWriter::due), and at most 3 % of the time.
     const double now = seconds();
     if (now <= last_checkpoint_ + std::max(1.5, 35 * checkpoint_cost_)) return;
@@ -25,10 +26,10 @@ void RunOutput::safeguard(const std::function<Record()>& make) {
 }
 
 void RunOutput::end(const StopReport& stop, double time, const std::function<Record()>& make) {
-    if (can_go_on(stop.reason))
-        watch_.checkpoint(make());
-    else
+    if (!can_go_on(stop.reason))
         frame(time, make);
+    else if (reported_)
+        watch_.checkpoint(make());
 }
 
 }  // namespace tubule

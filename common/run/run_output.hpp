@@ -11,7 +11,7 @@
 namespace tubule {
 
 // Hands rows and frames to the observer, at no time twice. A run that is not reported, but compared with another,
-// writes nothing but checkpoints.
+// writes nothing: its owner saves it.
 class RunOutput {
 public:
     RunOutput(RunObserver& watch, const RunClock& clock, bool reported)
@@ -31,7 +31,7 @@ public:
     void row(double time, std::span<const double> values);
     void frame(double time, const std::function<Record()>& make);
     // A checkpoint, if the last one is some time ago.
-    void safeguard(const std::function<Record()>& make);
+    void checkpoint_if_due(const std::function<Record()>& make);
     // The state at the end: a checkpoint where the run can be resumed, else a frame.
     void end(const StopReport& stop, double time, const std::function<Record()>& make);
 

@@ -154,7 +154,7 @@ bool CoarserRun::advance_to(double time, double growth) {
 }
 
 void CoarserRun::follow_to(int triangles, int of_run) {
-    if (const auto none = run_.coarsen_to(triangles, of_run)) loop_->end(*none);
+    if (const auto none = run_.follow_with(triangles, of_run)) loop_->end(*none);
 }
 
 }  // namespace tubule::surface3d

@@ -30,9 +30,9 @@ void compared_fields(Fields&& f, R& r, C& c) {
     f.number("restart_compared_slowest_at", c.slowest_at), f.number("restart_compared_slowest", c.slowest);
     f.number("restart_compared_difference_then", c.difference_then);
     f.number("restart_compared_steps_then", c.steps_then), f.number("restart_compared_fastest", c.fastest);
-    f.optional_array("restart_compared_coarser_at", r.coarser_at);
-    f.optional_array("restart_compared_asked", r.asked, r.coarser_at.size());
-    f.optional_array("restart_compared_had", r.had, r.coarser_at.size());
+    f.optional_array("restart_compared_thinned_at", r.thinned_at);
+    f.optional_array("restart_compared_asked", r.asked, r.thinned_at.size());
+    f.optional_array("restart_compared_had", r.had, r.thinned_at.size());
 }
 
 // Coarser runs, by the prefix of their names in the record of the run.
@@ -111,8 +111,8 @@ bool MotionError::catch_up(double smoothness) {
 // again when the run resumes, since which of them has followed is not known.
 void MotionError::follow_mesh(std::size_t i) try {
     const FollowedRun& r = of_run_;
-    for (std::size_t k = 0; k < r.coarser_at.size(); ++k)
-        if (r.coarser_at[k] == static_cast<double>(i))
+    for (std::size_t k = 0; k < r.thinned_at.size(); ++k)
+        if (r.thinned_at[k] == static_cast<double>(i))
             for (const auto* coarser : {&coarser_, &same_steps_}) {
                 if (!*coarser) continue;
                 const int triangles = static_cast<int>(r.asked[k]);
@@ -132,10 +132,10 @@ bool MotionError::is_at(double time) const {
     return failure_ || (there(coarser_) && there(same_steps_));
 }
 
-void MotionError::coarsen(int asked, int triangles) {
+void MotionError::thinned(int asked, int triangles) {
     FollowedRun& r = of_run_;
     const std::size_t last = r.times.size() - 1;
-    r.coarser_at.push_back(static_cast<double>(last)), r.asked.push_back(asked), r.had.push_back(triangles);
+    r.thinned_at.push_back(static_cast<double>(last)), r.asked.push_back(asked), r.had.push_back(triangles);
     if (!failure_) attempt([&] { follow_mesh(last); }, r.times[last]);
 }
 
@@ -187,7 +187,8 @@ void MotionError::follow(double smoothness) {
     }
 }
 
-std::optional<double> MotionError::at(double time, double energy, double dissipation, int order, double smoothness) {
+std::optional<double> MotionError::follow_to(double time, double energy, double dissipation, int order,
+                                             double smoothness) {
     of_run_.times.push_back(time), of_run_.energies.push_back(energy), of_run_.orders.push_back(order);
     of_run_.dissipations.push_back(dissipation);
     if (failure_) return std::nullopt;

@@ -16,7 +16,7 @@ struct FollowedRun {
     double growth = 1e9;  // of steps of the coarser run, from one to the next, at most
     double spare = 1;     // stated over known error, spare_for_waves()
     // Where it continued with fewer triangles: the number of that time, the triangles asked for and obtained.
-    std::vector<double> coarser_at, asked, had;
+    std::vector<double> thinned_at, asked, had;
 };
 
 // How far the run and its coarser runs have been compared.
@@ -50,11 +50,11 @@ public:
     // Absolute error of this energy, after a step of this order, or of the last one compared; dissipation and
     // smoothness are those of MotionMeasures. Nothing where a coarser run has no energy: it has ended before, for
     // whatever reason, or pauses, as the run will.
-    std::optional<double> at(double time, double energy, double dissipation, int order, double smoothness);
+    std::optional<double> follow_to(double time, double energy, double dissipation, int order, double smoothness);
     // Whether coarser runs are at this time, which is that of the last energy, on their initial meshes; then they can
     // get fewer triangles, as the run has: what it asked for, and what it has.
     bool is_at(double time) const;
-    void coarsen(int asked, int triangles);
+    void thinned(int asked, int triangles);
     // Stated over known error, of the balance, too.
     double spare() const { return of_run_.spare; }
     // The largest part of it that is due to time; nothing where that is not known separately.

@@ -34,7 +34,7 @@ struct MotionBalance {
 
 struct MotionCounters {
     int steps = 0, rejected = 0, mesh_since = 0, meshes = 1;
-    int coarser = 0;  // meshes of fewer triangles, on the way
+    int thinned = 0;  // meshes of fewer triangles, on the way
     int rough = 0;    // steps to surfaces that are rough for their mesh
 };
 

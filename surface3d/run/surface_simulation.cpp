@@ -33,15 +33,15 @@ constexpr int steps_between_meshes = 20;
 constexpr double larger_errors = 5;
 // Coarser meshes once the motion is smooth: steps from try to try, most of them; the largest jump of the energy over
 // the tolerance, the least quality of triangles; the first step there over the one before.
-constexpr int steps_between_looks = 6, most_coarser = 2;
-constexpr double part_of_jump = 0.25, quality_of_coarser = 0.5, shorter_first_step = 0.1;
+constexpr int steps_between_looks = 6, most_thinned = 2;
+constexpr double part_of_jump = 0.25, quality_of_thinner = 0.5, shorter_first_step = 0.1;
 constexpr int most_stalled = 100;       // steps
 constexpr double one_condition = 1e-6;  // lack of volume, relative: below, meshes cannot keep both area and volume
 constexpr double unseen_move = 0.25;    // between looks for self-intersection, of the distance of nodes
 constexpr double kept = 1e-8;           // area and volume, relative: a larger drift is reported
 
 // Integral over a step of length tau, after one of length `before`, of the parabola through three rates.
-double sum_of_step(double tau, double before, double rate, double now, double past) {
+double integral_over_step(double tau, double before, double rate, double now, double past) {
     const double slope = (rate - now) / tau;
     const double bend = before > 0 ? (slope - (now - past) / before) / (tau + before) : 0;
     return tau * (now + rate) / 2 - bend * tau * tau * tau / 6;
@@ -92,7 +92,7 @@ void SurfaceSimulation::begin(const Start& from) {
     measure_state();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_));
-    update_error();
+    update_error();  // the begin time is compared, too
     error_now_ = std::max(error_now_, memory_.error);
 }
 
@@ -194,7 +194,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
         const MotionMeasures m = measure(surface(), next.state, &state_);
         if (const auto refusal = check_trial(next, m)) return refusal;
         take(next, m);
-        set_next_step(tau, memory_.next_step, error, next.order);
+        choose_next_step(tau, memory_.next_step, error, next.order);
         return std::nullopt;
     } catch (const TooLarge& failure) {  // for steps of any length
         return Refusal{0, {Stop::solver_failed, t, failure.what(), ""}};
@@ -212,15 +212,16 @@ double SurfaceSimulation::since_kink() const {
 // Work of the loads in a step, in which none changes its slope.
 double SurfaceSimulation::work_of(const MotionStep& next, const MotionMeasures& m) const {
     const auto power = [&](const Extent& e) { return surface().law().power(state_.time, e); };
-    return sum_of_step(next.state.step, state_.step, power({m.bending.area, m.bending.volume, next.state.period}),
-                       power(extent_now()), power(memory_.balance.past));
+    return integral_over_step(next.state.step, state_.step,
+                              power({m.bending.area, m.bending.volume, next.state.period}), power(extent_now()),
+                              power(memory_.balance.past));
 }
 
 void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.work += work_of(next, m);
     memory_.balance.past = extent_now();
-    memory_.balance.dissipated +=
-        sum_of_step(next.state.step, since_kink(), m.dissipation, now_.dissipation, memory_.balance.dissipation_past);
+    memory_.balance.dissipated += integral_over_step(next.state.step, since_kink(), m.dissipation, now_.dissipation,
+                                                     memory_.balance.dissipation_past);
     memory_.balance.dissipation_past = now_.dissipation;
     memory_.balance.corrected += std::abs(next.correction);
     state_ = next.state;
@@ -233,7 +234,7 @@ void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
 }
 
 // A step that was cut short by an output says little about how long the next one may be.
-void SurfaceSimulation::set_next_step(double tau, double asked, double error, int order) {
+void SurfaceSimulation::choose_next_step(double tau, double asked, double error, int order) {
     if (case_.surface.step) return;
     const double factor = error > 0 ? std::clamp(safety / std::pow(error, 1.0 / (order + 1)), 0.4, growth) : growth;
     memory_.next_step = std::max(tau * factor, tau < asked ? std::min(asked, growth * tau) : 0.0);
@@ -258,8 +259,8 @@ void SurfaceSimulation::make_new_mesh() {
 }
 
 // Where the coarser run can follow, which is where it has got to the same time.
-bool SurfaceSimulation::may_be_coarser() const {
-    if (!case_.surface.coarsen || !is_reported() || memory_.count.coarser == most_coarser) return false;
+bool SurfaceSimulation::may_be_thinned() const {
+    if (!case_.surface.coarsen || !is_reported() || memory_.count.thinned == most_thinned) return false;
     const int since = memory_.count.steps - memory_.count.mesh_since, next = fewer_triangles(memory_.grid);
     if (since < steps_between_meshes || memory_.count.steps % steps_between_looks != 0) return false;
     return error_ ? fewer_triangles(next) >= least_triangles && error_->is_at(state_.time) : next >= least_triangles;
@@ -267,7 +268,7 @@ bool SurfaceSimulation::may_be_coarser() const {
 
 // Takes the mesh of about `triangles` of the initial shape, with its nodes where the same points are now. False where
 // that is not a good mesh, or the energy would jump by more than `most_jump`, absolutely.
-bool SurfaceSimulation::make_coarser(int triangles, double most_jump) {
+bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
     if (memory_.grid == 0) return false;
     const int order = case_.element_order;
     try {
@@ -275,27 +276,27 @@ bool SurfaceSimulation::make_coarser(int triangles, double most_jump) {
         if (to.triangles() >= from.triangles()) return false;
         const std::vector<MeshPoint> places = places_of_nodes(to, from);
         const CurvedMesh now = surface().mesh(state_), next = moved_to(places, now, to);
-        if (!(mesh_quality(next).worst > quality_of_coarser)) return false;
+        if (!(mesh_quality(next).worst > quality_of_thinner)) return false;
         if (!change_mesh(next, values_at(places, now, carried()), most_jump)) return false;
     } catch (const SolveError&) {
         return false;
     }
     memory_.grid = triangles;
     memory_.count.mesh_since = memory_.count.steps;
-    ++memory_.count.coarser;
+    ++memory_.count.thinned;
     if (!case_.surface.step) memory_.next_step = shorter_first_step * memory_.next_step;
     return true;
 }
 
-void SurfaceSimulation::look_for_coarser() {
+void SurfaceSimulation::look_for_thinner() {
     const double most = part_of_jump * case_.accuracy.energy * memory_.scale.reference_energy;
-    if (!make_coarser(fewer_triangles(memory_.grid), most)) return;
+    if (!thin_to(fewer_triangles(memory_.grid), most)) return;
     watch_.note(fmt::format("t = {:.4g}: continues with {} triangles", state_.time, summary.elements));
-    if (error_) error_->coarsen(memory_.grid, summary.elements);
+    if (error_) error_->thinned(memory_.grid, summary.elements);
 }
 
-std::optional<StopReport> SurfaceSimulation::coarsen_to(int triangles, int of_run) {
-    if (!make_coarser(triangles, HUGE_VAL))
+std::optional<StopReport> SurfaceSimulation::follow_with(int triangles, int of_run) {
+    if (!thin_to(triangles, HUGE_VAL))
         return StopReport{Stop::resolution_lost, state_.time,
                           fmt::format("there is no mesh of {} triangles", triangles), ""};
     memory_.settings.coarser_by = 1.0 * of_run / summary.elements;
@@ -373,12 +374,13 @@ std::optional<StopReport> SurfaceSimulation::find_event(bool at_output) {
 
 std::optional<StopReport> SurfaceSimulation::check_error() {
     if (!error_ || memory_.error <= error_->give_up * memory_.scale.reference_energy) return std::nullopt;
+    // Not shown: a finer run replaces this one.
     return StopReport{Stop::resolution_lost, state_.time, "far less accurate than asked for, already", ""};
 }
 
 std::optional<StopReport> SurfaceSimulation::adapt_mesh() {
     if (wants_new_mesh()) make_new_mesh();
-    if (may_be_coarser()) look_for_coarser();
+    if (may_be_thinned()) look_for_thinner();
     return std::nullopt;
 }
 
@@ -416,7 +418,8 @@ std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
 std::optional<StopReport> SurfaceSimulation::update_error() {
     if (!is_reported()) return std::nullopt;
     std::optional<double> error;
-    if (error_) error = error_->at(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
+    if (error_)
+        error = error_->follow_to(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
     const double rise = total() - memory_.balance.lowest_total, spare = error_ ? error_->spare() : 1,
                  defect = spare * std::abs(memory_.balance.defect_at(total()));
     error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, defect});
@@ -461,6 +464,7 @@ private:
     const SurfaceSimulation& run_;
 };
 
+// Steps end at outputs: no other time is asked for.
 std::unique_ptr<StateView> SurfaceSimulation::at(double) {
     return std::make_unique<View>(*this);
 }
@@ -490,7 +494,7 @@ void SurfaceSimulation::summarise() {
 }
 
 Loop loop_of(SurfaceSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
-    Loop out(run, c, watch, clock, run.settings().role == Role::reported);
+    Loop out(run, c, watch, clock, run.is_reported());
     if (run.has_state())
         out.add(std::make_unique<Stall>(most_stalled, run.shortest_usual_step(), c.accuracy.energy,
                                         "ask for less accuracy, or use more elements"));

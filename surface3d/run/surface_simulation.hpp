@@ -34,6 +34,7 @@ public:
     void begin(const Start& start);
     void resume(const Restart& restart, const Start& start);
 
+    bool is_reported() const { return memory_.settings.role == Role::reported; }
     bool has_state() const override { return scheme_ != nullptr; }
     double begin_time() const override;
     double time() const override { return state_.time; }
@@ -61,7 +62,7 @@ public:
     // For coarser runs that follow: the length of the next step; a mesh of about `triangles` beside a run that has
     // `of_run` of them now, or why there is none.
     void set_next_step(double tau) { memory_.next_step = tau; }
-    std::optional<StopReport> coarsen_to(int triangles, int of_run);
+    std::optional<StopReport> follow_with(int triangles, int of_run);
 
 private:
     class View;
@@ -83,14 +84,14 @@ private:
     double work_of(const MotionStep& next, const MotionMeasures& m) const;
     double since_kink() const;
     void take(const MotionStep& next, const MotionMeasures& m);
-    void set_next_step(double tau, double asked, double error, int order);
+    void choose_next_step(double tau, double asked, double error, int order);
 
     // Another mesh.
     bool wants_new_mesh() const;
     void make_new_mesh();
-    bool may_be_coarser() const;
-    void look_for_coarser();
-    bool make_coarser(int triangles, double most_jump);
+    bool may_be_thinned() const;
+    void look_for_thinner();
+    bool thin_to(int triangles, double most_jump);
     Eigen::MatrixXd carried() const;
     bool change_mesh(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, double most_jump);
 
@@ -106,7 +107,6 @@ private:
     Extent extent_now() const { return {now_.bending.area, now_.bending.volume, state_.period}; }
     double comparable() const { return now_.free_energy - memory_.balance.work; }
     double moment_of_time() const { return 1e-12 * case_.time.end; }
-    bool is_reported() const { return memory_.settings.role == Role::reported; }
     double next_kink() const { return surface().law().next_kink(state_.time + moment_of_time()); }
 
     const Problem& case_;

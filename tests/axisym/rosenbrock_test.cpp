@@ -7,7 +7,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_start.hpp"
-#include "axisym/integration/rosenbrock_flow.hpp"
+#include "axisym/integration/rosenbrock_integrator.hpp"
 #include "axisym/integration/step_integral.hpp"
 #include "axisym/splines/band_lu.hpp"
 #include "common/solve/sparse.hpp"
@@ -23,8 +23,8 @@ struct Growth {
     Growth() { pattern.insert(0, 0) = 1, pattern.makeCompressed(); }
     static double exact(double t) { return std::pow(1 + 0.8 * t, 0.25); }
     static double rate(double y) { return 0.2 / (y * y * y); }
-    FlowSystem system() const {
-        FlowSystem s;
+    ImplicitSystem system() const {
+        ImplicitSystem s;
         s.residual = [](double, const double* y, const double* v, double* out) {
             out[0] = (1 + y[0] * y[0]) * (v[0] - rate(y[0]));
             return y[0] > 0;
@@ -40,7 +40,7 @@ struct Growth {
         s.n_guards = 1;
         return s;
     }
-    RosenbrockFlow flow(double tolerance, double first_step = 0) const {
+    RosenbrockIntegrator flow(double tolerance, double first_step = 0) const {
         TimeControl control;
         control.relative = tolerance, control.absolute = 1e-3 * tolerance, control.first_step = first_step;
         const Eigen::VectorXd y = Eigen::VectorXd::Ones(1);
@@ -66,10 +66,10 @@ TEST(Rosenbrock, errorsFollowTheTolerance) {
     const Growth growth;
     for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
         auto flow = growth.flow(tolerance);
-        while (flow.advance(5) == Flow::Outcome::step) {
+        while (flow.advance(5) == TimeIntegrator::Outcome::step) {
             const double back = flow.time() - 0.4 * flow.step_size();
             double y = 0, v = 0;
-            flow.look_back(back, &y, &v);
+            flow.state_within_step(back, &y, &v);
             EXPECT_NEAR(y, Growth::exact(back), tolerance);
             EXPECT_NEAR(v, Growth::rate(y), 1e-14);
             EXPECT_NEAR(flow.v()[0], Growth::rate(flow.x()[0]), 1e-14);
@@ -84,9 +84,9 @@ TEST(Rosenbrock, endsWhereAGuardTrips) {
     Growth growth;
     growth.least = 1.2;
     auto flow = growth.flow(1e-9);
-    Flow::Outcome outcome = Flow::Outcome::step;
-    while (outcome == Flow::Outcome::step) outcome = flow.advance(5);
-    EXPECT_EQ(outcome, Flow::Outcome::guard);
+    TimeIntegrator::Outcome outcome = TimeIntegrator::Outcome::step;
+    while (outcome == TimeIntegrator::Outcome::step) outcome = flow.advance(5);
+    EXPECT_EQ(outcome, TimeIntegrator::Outcome::guard);
     EXPECT_EQ(flow.tripped(), 0);
     EXPECT_NEAR(flow.time(), (std::pow(1.2, 4) - 1) / 0.8, 1e-7);
 }
@@ -94,7 +94,7 @@ TEST(Rosenbrock, endsWhereAGuardTrips) {
 TEST(Rosenbrock, refusesToleranceBelowRounding) {
     const Growth growth;
     auto flow = growth.flow(1e-17);
-    EXPECT_EQ(flow.advance(1), Flow::Outcome::failed);
+    EXPECT_EQ(flow.advance(1), TimeIntegrator::Outcome::failed);
     EXPECT_NE(flow.failure().find("too much accuracy"), std::string::npos) << flow.failure();
 }
 

@@ -1,4 +1,4 @@
-#include "axisym/integration/bdf_flow.hpp"
+#include "axisym/integration/ida_integrator.hpp"
 
 #include <fmt/format.h>
 #include <idas/idas.h>
@@ -19,8 +19,8 @@
 namespace tubule::axisym {
 
 // Many fields: the objects of IDA, each to be freed.
-struct BdfFlow::Impl {
-    FlowSystem system;
+struct IdaIntegrator::Impl {
+    ImplicitSystem system;
     SUNContext context = nullptr;
     N_Vector x = nullptr, v = nullptr, slope = nullptr, dissipated = nullptr, scratch = nullptr, weights = nullptr;
     SUNMatrix jacobian = nullptr;
@@ -33,7 +33,7 @@ struct BdfFlow::Impl {
     std::string message;
     SharedPause pause;  // of the step that is under way
 
-    explicit Impl(FlowSystem s) : system(std::move(s)) {}
+    explicit Impl(ImplicitSystem s) : system(std::move(s)) {}
     ~Impl() {
         IDAFree(&ida);
         if (newton) SUNNonlinSolFree(newton);
@@ -65,7 +65,7 @@ void set_pattern(const Eigen::SparseMatrix<double>& pattern, SUNMatrix J) {
 template <class Impl>
 int jacobian(double t, double cj, N_Vector x, N_Vector v, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector,
              N_Vector) {
-    const FlowSystem& system = static_cast<Impl*>(user)->system;
+    const ImplicitSystem& system = static_cast<Impl*>(user)->system;
     set_pattern(*system.pattern, J);  // IDA zeroes the whole matrix before each call
     system.jacobian(t, data(x), data(v), cj, SUNSparseMatrix_Data(J));
     return 0;
@@ -119,8 +119,8 @@ void require(int status, const char* what) {
 
 }  // namespace
 
-BdfFlow::BdfFlow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-                 const TimeControl& control)
+IdaIntegrator::IdaIntegrator(ImplicitSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+                             const TimeControl& control)
     : impl_(std::make_unique<Impl>(std::move(system))) {
     Impl& s = *impl_;
     static_assert(sizeof(sunindextype) == sizeof(std::int64_t) || sizeof(sunindextype) == sizeof(int));
@@ -171,9 +171,9 @@ BdfFlow::BdfFlow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::Vect
     require(IDAQuadInit(s.ida, dissipation<Impl>, s.dissipated), "the dissipation integral");
 }
 
-BdfFlow::~BdfFlow() = default;
+IdaIntegrator::~IdaIntegrator() = default;
 
-Flow::Outcome BdfFlow::advance(double t_end) {
+TimeIntegrator::Outcome IdaIntegrator::advance(double t_end) {
     Impl& s = *impl_;
     require(IDASetStopTime(s.ida, t_end), "the end time");
     N_VScale(1, s.v, s.scratch);
@@ -192,17 +192,17 @@ Flow::Outcome BdfFlow::advance(double t_end) {
     return status < 0 ? Outcome::failed : Outcome::step;
 }
 
-double BdfFlow::time() const {
+double IdaIntegrator::time() const {
     return impl_->time;
 }
-const double* BdfFlow::x() const {
+const double* IdaIntegrator::x() const {
     return data(impl_->x);
 }
-const double* BdfFlow::v() const {
+const double* IdaIntegrator::v() const {
     return data(impl_->v);
 }
 
-void BdfFlow::interpolate(double t, double* x, double* v) const {
+void IdaIntegrator::interpolate(double t, double* x, double* v) const {
     const auto n = N_VGetLength(impl_->x);
     for (int k = 0; k < 2; ++k) {
         require(IDAGetDky(impl_->ida, t, k, impl_->scratch), "dense output");
@@ -210,37 +210,37 @@ void BdfFlow::interpolate(double t, double* x, double* v) const {
     }
 }
 
-double BdfFlow::dissipated(double t) const {
+double IdaIntegrator::dissipated(double t) const {
     require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
     return data(impl_->dissipated)[0];
 }
 
-double BdfFlow::work(double t) const {
+double IdaIntegrator::work(double t) const {
     require(IDAGetQuadDky(impl_->ida, t, 0, impl_->dissipated), "the dissipation integral");
     return data(impl_->dissipated)[1];
 }
 
-double BdfFlow::step_size() const {
+double IdaIntegrator::step_size() const {
     double h = 0;
     IDAGetLastStep(impl_->ida, &h);
     return h;
 }
 
-int BdfFlow::order() const {
+int IdaIntegrator::order() const {
     int k = 0;
     IDAGetLastOrder(impl_->ida, &k);
     return k;
 }
 
-int BdfFlow::tripped() const {
+int IdaIntegrator::tripped() const {
     return impl_->guard;
 }
-std::string BdfFlow::failure() const {
+std::string IdaIntegrator::failure() const {
     return impl_->message;
 }
 
-FlowCounters BdfFlow::counters() const {
-    FlowCounters c;
+IntegratorCounters IdaIntegrator::counters() const {
+    IntegratorCounters c;
     IDAGetNumSteps(impl_->ida, &c.steps);
     IDAGetNumResEvals(impl_->ida, &c.residuals);
     IDAGetNumJacEvals(impl_->ida, &c.jacobians);

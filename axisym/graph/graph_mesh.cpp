@@ -1,4 +1,4 @@
-#include "axisym/graph/graph_stage.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 
 #include <fmt/format.h>
 
@@ -36,17 +36,17 @@ std::vector<int> tracked_graph_modes(const Problem& c) {
     return {waves.begin(), waves.end()};
 }
 
-GraphStage::GraphStage(const Cell& cell, std::vector<double> breaks, const Problem& c)
+GraphMesh::GraphMesh(const Cell& cell, std::vector<double> breaks, const Problem& c)
     : space(space_of(cell, std::move(breaks), c)), forms(space, c.energy, graph_loads(c)), transport(forms) {
     for (int n : tracked_graph_modes(c)) modes.push_back(forms.mode(n));
 }
 
-double GraphStage::place(double z) const {
+double GraphMesh::place(double z) const {
     const double length = space.cell().period();
     return z - std::floor(z / length) * length;
 }
 
-Observation GraphStage::look(const double* x, const double* v, std::vector<double>* defect) const {
+Observation GraphMesh::look(const double* x, const double* v, std::vector<double>* defect) const {
     Observation o = forms.observe(x, v, defect);
     for (auto [z, r] : {std::pair{&o.z_min, &o.r_min}, std::pair{&o.z_max, &o.r_max}}) {
         *z = space.extremum_near(x, *z);

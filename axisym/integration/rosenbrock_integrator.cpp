@@ -1,4 +1,4 @@
-#include "axisym/integration/rosenbrock_flow.hpp"
+#include "axisym/integration/rosenbrock_integrator.hpp"
 
 #include <fmt/format.h>
 
@@ -69,8 +69,8 @@ double lagrange(std::size_t j, double a) {
 }  // namespace
 
 // Many fields: the vectors of a step, and what it is to keep.
-struct RosenbrockFlow::Impl {
-    FlowSystem system;
+struct RosenbrockIntegrator::Impl {
+    ImplicitSystem system;
     TimeControl control;
     int n;
     double time, next = 0;  // next: length of the step
@@ -93,9 +93,9 @@ struct RosenbrockFlow::Impl {
     bool cut = false;                      // the last step ended at a guard
     int guard = -1;
     std::string message;
-    FlowCounters counters;
+    IntegratorCounters counters;
 
-    Impl(FlowSystem s, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0, const TimeControl& c)
+    Impl(ImplicitSystem s, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0, const TimeControl& c)
         : system(std::move(s)),
           control(c),
           n(static_cast<int>(x0.size())),
@@ -315,13 +315,13 @@ struct RosenbrockFlow::Impl {
     }
 };
 
-RosenbrockFlow::RosenbrockFlow(FlowSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
-                               const TimeControl& control)
+RosenbrockIntegrator::RosenbrockIntegrator(ImplicitSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0,
+                                           double t0, const TimeControl& control)
     : impl_(std::make_unique<Impl>(std::move(system), x0, v0, t0, control)) {}
 
-RosenbrockFlow::~RosenbrockFlow() = default;
+RosenbrockIntegrator::~RosenbrockIntegrator() = default;
 
-Flow::Outcome RosenbrockFlow::advance(double t_end) {
+TimeIntegrator::Outcome RosenbrockIntegrator::advance(double t_end) {
     Impl& s = *impl_;
     check_pause();
     if (s.control.relative < std::numeric_limits<double>::epsilon()) {
@@ -345,48 +345,48 @@ Flow::Outcome RosenbrockFlow::advance(double t_end) {
     }
 }
 
-double RosenbrockFlow::time() const {
+double RosenbrockIntegrator::time() const {
     return impl_->time;
 }
-const double* RosenbrockFlow::x() const {
+const double* RosenbrockIntegrator::x() const {
     return impl_->x.data();
 }
-const double* RosenbrockFlow::v() const {
+const double* RosenbrockIntegrator::v() const {
     return impl_->v.data();
 }
 
-void RosenbrockFlow::interpolate(double t, double* x, double* v) const {
+void RosenbrockIntegrator::interpolate(double t, double* x, double* v) const {
     impl_->interpolate(t, x, v);
 }
 
-void RosenbrockFlow::look_back(double t, double* x, double* v) {
+void RosenbrockIntegrator::state_within_step(double t, double* x, double* v) {
     Impl& s = *impl_;
     if (!(t > s.begin) || !s.step_again(t)) return s.interpolate(t, x, v);
     Eigen::Map<Eigen::VectorXd>(x, s.n) = s.x_after;
     Eigen::Map<Eigen::VectorXd>(v, s.n) = s.rate;
 }
 
-double RosenbrockFlow::dissipated(double t) const {
+double RosenbrockIntegrator::dissipated(double t) const {
     return impl_->done_until(t)[0];
 }
 
-double RosenbrockFlow::work(double t) const {
+double RosenbrockIntegrator::work(double t) const {
     return impl_->done_until(t)[1];
 }
 
-double RosenbrockFlow::step_size() const {
+double RosenbrockIntegrator::step_size() const {
     return impl_->time - impl_->begin;
 }
-int RosenbrockFlow::order() const {
+int RosenbrockIntegrator::order() const {
     return 5;
 }
-int RosenbrockFlow::tripped() const {
+int RosenbrockIntegrator::tripped() const {
     return impl_->guard;
 }
-std::string RosenbrockFlow::failure() const {
+std::string RosenbrockIntegrator::failure() const {
     return impl_->message;
 }
-FlowCounters RosenbrockFlow::counters() const {
+IntegratorCounters RosenbrockIntegrator::counters() const {
     return impl_->counters;
 }
 

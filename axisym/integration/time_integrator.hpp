@@ -23,9 +23,9 @@ struct TimeControl {
     bool two_iterations = false;
 };
 
-struct FlowCounters {
+struct IntegratorCounters {
     long steps = 0, residuals = 0, jacobians = 0, newton_iterations = 0, error_failures = 0, newton_failures = 0;
-    FlowCounters& operator+=(const FlowCounters& o) {
+    IntegratorCounters& operator+=(const IntegratorCounters& o) {
         steps += o.steps, residuals += o.residuals, jacobians += o.jacobians;
         newton_iterations += o.newton_iterations, error_failures += o.error_failures;
         newton_failures += o.newton_failures;
@@ -37,13 +37,14 @@ struct FlowCounters {
 using Guards = std::vector<double>;
 
 // What moves, and what is watched. All but `residual` and `jacobian` see accepted states, by time, unknowns and rates.
-struct FlowSystem {
+struct ImplicitSystem {
     // F(t, x, v); false where x is inadmissible: try a smaller step.
     std::function<bool(double t, const double* x, const double* v, double* F)> residual;
     // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
     std::function<void(double t, const double* x, const double* v, double cj, double* values)> jacobian;
     const Eigen::SparseMatrix<double>* pattern = nullptr;
-    // dF/dv at x, likewise, of a system that is linear in v and does not depend on the time; RosenbrockFlow needs it.
+    // dF/dv at x, likewise, of a system that is linear in v and does not depend on the time; RosenbrockIntegrator needs
+    // it.
     std::function<void(const double* x, double* values)> mass;
     bool banded = false;           // the unknowns stand in an order that is good for elimination
     Eigen::VectorXd scale;         // of each unknown; empty: 1
@@ -59,11 +60,11 @@ inline constexpr std::array path_points{0.1127016653792583, 0.5, 0.8872983346207
 inline constexpr std::array path_weights{5.0 / 18, 8.0 / 18, 5.0 / 18};
 
 // The integration of a system in time, by one of several methods.
-class Flow {
+class TimeIntegrator {
 public:
-    Flow() = default;
-    Flow(Flow&&) = delete;
-    virtual ~Flow() = default;
+    TimeIntegrator() = default;
+    TimeIntegrator(TimeIntegrator&&) = delete;
+    virtual ~TimeIntegrator() = default;
 
     enum class Outcome { step, end, guard, failed };
     // One step, not beyond t_end. After `failed` the state is that of the last good step.
@@ -75,14 +76,14 @@ public:
     // The path through the last step, a polynomial in time, and its slope.
     virtual void interpolate(double t, double* x, double* v) const = 0;
     // State and rates at a time within the last step, as exact as at its end.
-    virtual void look_back(double t, double* x, double* v) = 0;
+    virtual void state_within_step(double t, double* x, double* v) = 0;
     virtual double dissipated(double t) const = 0;  // INT dissipation dt from t0 to a time within the last step
     virtual double work(double t) const = 0;        // INT work dt likewise
     virtual double step_size() const = 0;           // of the last step
     virtual int order() const = 0;
     virtual int tripped() const = 0;          // index of the guard that ended the step
     virtual std::string failure() const = 0;  // why the last step failed
-    virtual FlowCounters counters() const = 0;
+    virtual IntegratorCounters counters() const = 0;
 };
 
 }  // namespace tubule::axisym

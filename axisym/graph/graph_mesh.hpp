@@ -18,8 +18,8 @@ Loads graph_loads(const Problem& c);
 // Numbers n > 0 of the initial modes, each once.
 std::vector<int> tracked_graph_modes(const Problem& c);
 
-struct GraphStage {
-    GraphStage(const Cell& cell, std::vector<double> breaks, const Problem& c);
+struct GraphMesh {
+    GraphMesh(const Cell& cell, std::vector<double> breaks, const Problem& c);
 
     ProfileSpace space;
     Forms forms;
