@@ -116,7 +116,7 @@ class Extended(Continued):
         np.testing.assert_array_equal(series(self.result)["energy"][: len(before)], before)
 
     def test_a_surface(self):
-        case = SURFACE.replace("end = 0.2", "end = 0.06").replace(
+        case = SURFACE.replace("end = 0.1", "end = 0.06").replace(
             SURFACE.split("output = ")[1], "[0.02]\n")
         self.write("case.toml", case)
         self.tubule("run", "case.toml", "-o", "whole.hdf")
