@@ -17,7 +17,9 @@ namespace tubule {
 // the work of loads that change; `start` and `least` are its initial and least values so far.
 struct Energetics {
     double bending = 0, free_energy = 0, total = 0, start = 0, least = 0;
-    double kinetic = 0, dissipation = 0, acceleration = 0, area = 0;
+    double kinetic = 0, dissipation = 0;
+    double acceleration = 0;  // at least the kinetic energy gained from rest, per time squared
+    double area = 0;
 };
 
 // The state at one time, as the result shows it.

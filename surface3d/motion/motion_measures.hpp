@@ -24,7 +24,7 @@ struct MotionMeasures {
     double tension = 0, pressure = 0, force = 0;
     double kinetic = 0;       // inertia INT |u|^2/2
     double dissipation = 0;   // INT 2 viscosity |sigma|^2 + friction |u|^2
-    double acceleration = 0;  // inertia INT |d_t u|^2 /2: kinetic energy gained per unit of time
+    double acceleration = 0;  // inertia INT |d_t u|^2 dS/2: kinetic energy gained from rest, per time squared
     double speed = 0;         // largest |u|
     double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible
     Eigen::Vector3d momentum, angular_momentum, centre;
