@@ -69,7 +69,7 @@ Asymmetry wave_around(const std::vector<Mode>& modes) {
     for (std::size_t i = 0; i < modes.size(); ++i)
         if (modes[i].m != 0)
             return {fmt::format("shape.mode.{}.m", i),
-                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no waves around the axis",
+                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no modes m > 0",
                                 modes[i].m)};
     return {};
 }
@@ -79,7 +79,7 @@ Asymmetry noise_around(const std::vector<Noise>& noise) {
     for (std::size_t i = 0; i < noise.size(); ++i)
         if (noise[i].around != 0)
             return {fmt::format("shape.noise.{}.m", i),
-                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no waves around the axis",
+                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no modes m > 0",
                                 noise[i].around)};
     return {};
 }

@@ -45,7 +45,7 @@ std::array<double, terms> fitted(const ProfileCurve& curve, const std::vector<do
 }  // namespace
 
 ProfileWave normal_wave(const ProfileCurve& curve, int m, const std::vector<double>& w) {
-    if (m < 1 || w.size() < terms) throw std::invalid_argument("a wave around the axis needs m >= 1 and enough values");
+    if (m < 1 || w.size() < terms) throw std::invalid_argument("a mode needs m >= 1 and enough values");
     std::vector<double> s, radial, axial;
     for (std::size_t i = 0; i < w.size(); ++i) {
         s.push_back(static_cast<double>(i) / static_cast<double>(w.size() - 1));

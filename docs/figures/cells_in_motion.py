@@ -1,4 +1,4 @@
-"""Draws the paper's tubular cells as fluids in three dimensions, beside the axisymmetric shapes at rest: cuts, and what is
+"""Draws the paper's tubular cells as fluids in three dimensions, beside the axisymmetric equilibria: cuts, and what is
 left of the energy over time. The folder has results moving_lL_K.hdf and rest_lL_K.hdf for L = 2, 3, 4 and K = 0, 006, 012."""
 
 import os
@@ -18,13 +18,13 @@ HEIGHT = 5.4  # inches
 
 
 def energy_left(moving, rest):
-    """E + E_kin of the run less the energy of the shape at rest."""
+    """E + E_kin of the run less the energy of the equilibrium."""
     series = moving.series
     return series["energy"] + series.get("kinetic_energy", 0) - rest.series["energy"][-1]
 
 
 def draw_cuts(axes, moving, rest, shift, colour):
-    """The surface where it is cut by y = 0, wide and pale; the axisymmetric shape at rest, thin and dark."""
+    """The surface where it is cut by y = 0, wide and pale; the axisymmetric equilibrium, thin and dark."""
     shape, frame = moving.surfaces[-1], rest.frames[-1]
     segments = cut(shape, 1, shape.points[..., 1].mean())[..., [0, 2]]
     middle = (segments.reshape(-1, 2).max(axis=0) + segments.reshape(-1, 2).min(axis=0)) / 2

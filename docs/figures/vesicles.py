@@ -17,7 +17,7 @@ LINES = ("-", (0, (3, 1.5)), ":")  # stable, and what a shape is unstable agains
 
 
 def stability(series):
-    """For each shape 0: stable, 1: a wave around the axis grows, 2: the energy falls in an axisymmetric direction. Neutral
+    """For each shape 0: stable, 1: a mode m > 0 grows, 2: the energy falls in an axisymmetric direction. Neutral
     motions do not count."""
     growth = [values for name, values in series.items() if name.startswith("growth_") and name != "growth_0"]
     waves = np.any([values > 1e-3 for values in growth], axis=0) if growth else np.zeros(series["time"].size, bool)
@@ -53,7 +53,7 @@ def draw(paths, outputs):
             x = v[i] + SCALE * np.concatenate([frame.r, -frame.r[::-1]])
             strip.plot(x, tops[row] + SCALE * np.concatenate([z, z[::-1]]), color=colour, linewidth=0.9, clip_on=False)
     handles += [
-        Line2D([], [], color="0.3", linestyle=LINES[1], label="unstable against a wave around the axis"),
+        Line2D([], [], color="0.3", linestyle=LINES[1], label="unstable against a mode m > 0"),
         Line2D([], [], color="0.3", linestyle=LINES[2], label="unstable against an axisymmetric wave"),
         Line2D([], [], color="0.3", linestyle="", marker="<", label="fold"),
         Line2D([], [], color="0.3", linestyle="", marker="x", label="bifurcation"),

@@ -325,11 +325,11 @@ TEST(CurveStart, refusals) {
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Sphere{1, {{0.2, 3, 2}}});
               }),
-              "shape.mode.0.m must be 0, not 2: tier \"axisym\" is axisymmetric and has no waves around the axis");
+              "shape.mode.0.m must be 0, not 2: tier \"axisym\" is axisymmetric and has no modes m > 0");
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Tube{1, 2, {{0.2, 3, 1, 0}}});
               }),
-              "shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no waves around the axis");
+              "shape.mode.0.m must be 0, not 1: tier \"axisym\" is axisymmetric and has no modes m > 0");
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   meridian(Ellipsoid{1, 2, 1});
               }),

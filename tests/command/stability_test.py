@@ -303,7 +303,7 @@ equilibrium = {modes = 2, area = 41.074}
         self.refuses("there are 0 to", result, "--frame", "99")
         for wave in ("x", "1,", "-1", "0", "1,2,3"):
             self.refuses("--fit must be n or n,m", result, f"--fit={wave}")
-        self.refuses("no waves around the axis", result, "--fit", "1,2")
+        self.refuses("no modes m > 0", result, "--fit", "1,2")
         self.refuses("--fit can only be combined with", result, "--fit", "1", "--tension", "1")
         self.refuses("exclude each other", self.tube, "--q", "1", "--waves", "3")
         self.refuses("from:to:count", self.tube, "--q", "1:2")

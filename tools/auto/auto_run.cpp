@@ -121,10 +121,10 @@ RunSummary on_triangles(const Case& c, const surface3d::Start& start, SurfacePar
 std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
     const NoiseGrowth::Peak peak = growth.largest();
     if (peak.amplitude <= c.automatic.noise * (1 + 1e-12))
-        return fmt::format("start and model are axisymmetric, and no wave around the axis grows (m = 1 to {})",
+        return fmt::format("start and model are axisymmetric, and no mode grows (m = 1 to {})",
                            growth.modes());
     return fmt::format(
-        "start and model are axisymmetric, and waves around the axis stay small: at most {} (m = {} at t = {:.6g})",
+        "start and model are axisymmetric, and modes m > 0 stay small: at most {} (m = {} at t = {:.6g})",
         percent(peak.amplitude), peak.m, peak.time);
 }
 

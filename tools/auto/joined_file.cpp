@@ -16,7 +16,7 @@ bool has(const std::vector<std::string>& names, const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// Of an axisymmetric motion these are none.
+// An axisymmetric motion has none of these.
 bool vanishes_by_symmetry(const std::string& name) {
     for (const char* one : {"momentum_x", "momentum_y", "angular_momentum_x", "angular_momentum_y"})
         if (name == one) return true;

@@ -16,7 +16,7 @@ std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymme
 // A tier's rows as those of the file.
 class RowMap {
 public:
-    // Of tier 1 or 2.
+    // The tier: 1 or 2.
     RowMap(const std::vector<std::string>& file, const std::vector<std::string>& own, int tier);
     std::vector<double> operator()(std::span<const double> row) const;
 
@@ -32,7 +32,7 @@ struct Before {
     std::vector<Record> frames;
 };
 
-// Of an unfinished file, its axisymmetric part.
+// The axisymmetric part of an unfinished file.
 Before axisymmetric_part(const Result& unfinished);
 
 // A run in three dimensions, as the file's second part or all of it: where it begins again, the first part stays.

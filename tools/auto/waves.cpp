@@ -12,7 +12,7 @@ namespace tubule {
 
 namespace {
 
-// Of rates: enough for amplitudes, which depend on noise anyway. More elements are not worth their cost.
+// Accuracy of rates: enough for amplitudes, which depend on noise anyway. More elements are not worth their cost.
 constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 

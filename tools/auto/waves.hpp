@@ -1,4 +1,4 @@
-// Waves around the axis of a profile that an axisymmetric run has computed: how fast they grow, and the surface with
+// Modes m > 0 of a profile that an axisymmetric run has computed: how fast they grow, and the surface with
 // them on it.
 #pragma once
 
@@ -15,7 +15,7 @@ struct WaveRates {
     double accuracy = 0;        // relative to the larger of a rate and the slowest one
 };
 
-// Of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be computed.
+// Growth rates of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be computed.
 WaveRates wave_rates(const Case& c, const Record& frame);
 
 // The rate of a wave with inertia, from those of the same model without it (viscosity and friction alone) and of the

@@ -82,7 +82,7 @@ std::optional<Advice> advice_for(const Case& c, const Forecast& expected) {
     }
 }
 
-// Of model.kind = "auto": with --quick, without trial runs, a fluid.
+// What model.kind = "auto" stands for: with --quick, without trial runs, a fluid.
 Case chosen_case(const Case& c, const CheckOptions& options, Checked& out) {
     if (c.model.kind != ModelKind::automatic) return c;
     if (options.quick) return with_model(c, {ModelKind::fluid, ""}).c;

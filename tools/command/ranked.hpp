@@ -11,7 +11,7 @@ namespace tubule {
 // status. What `root` throws before it hands out work ends the others; CaseErrors go on to the caller.
 int run_ranked(const std::function<int(Ranks*)>& root, const std::function<void(Ranks&)>& serve);
 
-// Of `root`, after an interrupt: ends the other ranks, whatever they are doing.
+// For `root`, after an interrupt: ends the other ranks, whatever they are doing.
 [[noreturn]] void abort_interrupted(Ranks& ranks);
 
 }  // namespace tubule

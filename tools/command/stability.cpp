@@ -302,7 +302,7 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--Re", o->Re, "of viscous models, where the case has none");
     command->add_option("--gamma", o->gamma, "friction of all models but gradient flow, where the case has none");
     command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)");
-    command->add_option("--modes", o->modes, "waves around the axis: m = 0 ... this, up to 100")->capture_default_str();
+    command->add_option("--modes", o->modes, "modes m = 0 ... this, up to 100")->capture_default_str();
     command->add_option("--waves", o->waves,
                         "tube: n = 0 ... this, up to 10000; sphere: l (default: all that grow, and some)");
     command->add_option("--q", o->q, "tube: these wave numbers instead, as 0.5,1,1.5 or from:to:count");

@@ -52,7 +52,7 @@ struct TubeSubject {
 // What the command prints. Throws std::invalid_argument for what cannot be asked, SolveError where an equilibrium is
 // not found.
 std::string stability_answer(const StabilityOptions& options, StabilitySubject subject);
-// Of a result: the frame that the options name, counted from the end where negative. Throws std::invalid_argument.
+// The frame of a result that the options name, counted from the end where negative. Throws std::invalid_argument.
 StabilitySubject stability_subject(Result result, const StabilityOptions& options);
 
 // Reports throw std::invalid_argument for what cannot be asked.

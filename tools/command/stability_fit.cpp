@@ -54,7 +54,7 @@ double amplitude_of(const Result& result, const Record& frame, WaveNumbers wave)
     }
     if (wave.m > 0)
         throw std::invalid_argument(
-            fmt::format("--fit {},{}: a result of tier \"axisym\" has no waves around the axis", wave.n, wave.m));
+            fmt::format("--fit {},{}: a result of tier \"axisym\" has no modes m > 0", wave.n, wave.m));
     return axisym::mode_amplitude(axisym::frame_meridian(frame), wave.n);
 }
 

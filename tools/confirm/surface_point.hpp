@@ -24,7 +24,7 @@ struct Choices {
 // The case as one of tier surface3d, as TOML text. Waves with m >= 1 are added to its start: to a tube n = 1 with m = 1
 // and 2, and for each m the one of fastest_waves(); to a sphere l = 2 and 3 with m = 1, l = 2 with m = 2. There are
 // 20 frames until tier 1's end or, where a wave with m >= 1 grows, while it grows by e^6; and 20 after that. Choices
-// that belong to tier 1, time.stationary and [expect] are left out: a symmetric shape at rest may be none in three
+// that belong to tier 1, time.stationary and [expect] are left out: a symmetric equilibrium may be none in three
 // dimensions. Throws CaseError for other shapes.
 std::string surface_case(const Case& c, const PointResult& axisymmetric, const Choices& choices);
 

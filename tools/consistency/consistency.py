@@ -86,7 +86,7 @@ def head(scenes):
 
 
 def draw(scenes, path):
-    """Differences against triangles: shapes at rest, rates, and the energies of what moves."""
+    """Differences against triangles: fixed shapes, rates, and the energies of what moves."""
     from matplotlib.ticker import FixedLocator, NullLocator, ScalarFormatter
     from tubule.drawing import style  # on the path since measures.Program
 

@@ -25,7 +25,7 @@ std::string reason_of(const RunSummary& s) {
     return {};
 }
 
-// An axisymmetric initial shape runs in tier "axisym" unless waves around the axis grow.
+// An axisymmetric initial shape runs in tier "axisym" unless modes m > 0 grow.
 void choose_tier(const Case& c, const Forecast& expected, Advice& out) {
     Case watched = c;
     watched.tier = Tier::automatic;

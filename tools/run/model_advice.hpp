@@ -23,7 +23,7 @@ struct SimplerModels {
     std::string unknown;  // why there are none, in words
 };
 
-// By trial runs of these models: of an axisymmetric start in tier axisym, while no wave around the axis grows if the
+// By trial runs of these models: of an axisymmetric start in tier axisym, while no mode m > 0 grows if the
 // case has another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a
 // start brings its own triangles, or a trial run does not come to its end. Where nothing moves the simplest is the only
 // one. Throws as an engine and its run; Paused where a PauseWatch of this thread ends a trial run.

@@ -45,13 +45,13 @@ struct EndShape {
 // A tube counts as uniform if its radii differ by less than this part of their sum; a cell as a sphere if its reduced
 // volume is within this of 1.
 inline constexpr double waves_of_uniform_tube = 0.01, volume_off_sphere = 1e-3;
-// Of a cell at rest, relative to its largest radius: a profile that differs less from its mirror image is symmetric,
+// Distances of a cell in equilibrium, relative to its largest radius: a profile that differs less from its mirror image is symmetric,
 // and a pole that lies less below the rim is not dented.
 inline constexpr double asymmetry_of_mirrored = 0.02, smallest_dent = 1e-3;
 
 Outcome outcome_of(Stop reason, const EndShape& end);
 
-// Of a cell at rest, by points (r, z) along its profile from pole to pole.
+// Shape of a cell in equilibrium, by points (r, z) along its profile from pole to pole.
 Outcome cell_at_rest(std::span<const double> r, std::span<const double> z, double area, double volume);
 
 }  // namespace tubule

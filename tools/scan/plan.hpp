@@ -34,7 +34,7 @@ public:
     std::size_t wanted() const { return wanted_count_; }   // points asked for by now
     bool follows() const { return follows_; }
 
-    // Of a crossing edge of the grid, the steps (Between) from and to which it is known to cross.
+    // For a crossing edge of the grid, the steps (Between) from and to which it is known to cross.
     std::pair<std::size_t, std::size_t> crossing(const Edge& edge) const;
     Between between(const Edge& edge, std::size_t step) const;
 

@@ -24,7 +24,7 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double translation = 1e-12;
 // Places in stop_words() behind the reasons why runs end.
 constexpr int decided_word = static_cast<int>(stop_kinds.size()), refused_word = decided_word + 1;
-constexpr double near_rest = 0.1;           // distance to the shape at rest / amplitude
+constexpr double near_rest = 0.1;           // distance to the equilibrium / amplitude
 constexpr double next_stationarity = 1e-2;  // what a run that was not at rest is asked for next
 
 double cpu_seconds() {

@@ -6,9 +6,9 @@
 
 namespace tubule {
 
-// Of rank 0: runs the scan on all ranks. How many they are.
+// For rank 0: runs the scan on all ranks; returns their number.
 int run_scan(Ranks& ranks, Dispatcher& dispatcher, const Scan& scan);
-// Of the others.
+// For the others.
 void serve_scan(Ranks& ranks);
 
 // As it is sent to them.

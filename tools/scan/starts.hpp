@@ -39,7 +39,7 @@ private:
 };
 
 // The best start of a node whose points are all known: that of the least energy, E + tension A - pressure V with given
-// loads, among shapes at rest; else the first.
+// loads, among equilibria; else the first.
 std::size_t best_start(const Nodes& nodes, std::size_t node, const std::vector<PointResult>& points);
 
 // Two kinds of shapes, each from its start, on the edge from a node to the next one along an axis. Their energies

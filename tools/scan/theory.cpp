@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t most_nodes = 41;  // along an axis: a line needs fewer than a map
 
-// Of a start with waves along the axis alone: how many of the cells that it repeats there are in its length. Tier 1
+// How many cells an initial shape with modes (n, 0) alone repeats in its length. Tier 1
 // keeps that symmetry.
 int repeats(const Tube& tube) {
     int waves = 0;
@@ -33,7 +33,7 @@ bool only_k20(const Bending& energy) {
     return only && energy.terms.empty();
 }
 
-// Whether its shapes at rest without energy are the surfaces of constant mean curvature H0, and of which period:
+// Whether its equilibria without energy are the surfaces of constant mean curvature H0, and of which period:
 // E = INT k20 (H-H0)^2 alone.
 std::optional<double> delaunay_period(const Case& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
@@ -101,7 +101,7 @@ std::optional<double> waves_around(const Case& c) {
     return driven_most(c, m);
 }
 
-// Of a closed cell with given area and volume, of the bending energy k20 alone: radius of the sphere of its area, and
+// For a closed cell with given area and volume and the bending energy k20 alone: radius of the sphere of its area, and
 // its reduced volume.
 struct Vesicle {
     double radius, reduced_volume;

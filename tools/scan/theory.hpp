@@ -25,7 +25,7 @@ struct ThresholdMap {
     std::vector<double> values;              // row by row; NaN where it does not apply
 };
 
-// Of a grid with two axes of numbers, besides one of starts; those that change their sign on it.
+// For a grid with two axes of numbers, besides one of initial shapes: those that change their sign on it.
 std::vector<ThresholdMap> threshold_maps(const Scan& scan);
 
 }  // namespace tubule

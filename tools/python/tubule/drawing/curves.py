@@ -1,5 +1,5 @@
 """Panel of profiles that are not graphs r(z), or that flow: sections through the axis, coloured by the normal velocity, with
-arrows for the velocity along the profile. Shapes at rest that have no velocity are coloured by H and K."""
+arrows for the velocity along the profile. Shapes without a velocity are coloured by H and K."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -8,7 +8,7 @@ from .results import tangential
 
 LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
 STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
-ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape at rest
+ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape that does not move
 VELOCITY = "RdBu_r"
 SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
 SPACING = 0.15  # inches between arrows on a surface

@@ -17,7 +17,7 @@ from .labels import as_label, formula
 from .results import BadInput, opened, values
 
 HEIGHT = 4.2  # inches
-# By name of the outcome: light for shapes at rest, dark for early stops.
+# By name of the outcome: light for equilibria, dark for early stops.
 COLOURS = {
     "uniform-tube": "#d6e4f0",
     "unduloid": "#f6c667",
