@@ -1,4 +1,4 @@
-"""Commands that may have no more than 80 to 300 MB (`ulimit -v`): they do what they do with more, or say that memory ran out. No
+"""Commands that may have no more than 100 to 300 MB (`ulimit -v`): they do what they do with more, or say that memory ran out. No
 crash, no hang; what was written opens, and goes on with more memory."""
 
 import resource
@@ -32,7 +32,7 @@ def one(rng, box):
     if box.sanitized:
         return "sanitized"
     kind, arguments = command(rng, box)
-    size = int(10 ** rng.uniform(4.903, 5.477)) << 10
+    size = int(10 ** rng.uniform(5.0, 5.477)) << 10
     box.note(f"# ulimit -v {size >> 10}")
     done = box.run(*arguments, limit=15, statuses=(0, 2, 4, 127), prepare=lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size)))
     if done.status == 127 and "shared libraries" not in done.err:  # the program itself does not fit
