@@ -101,9 +101,10 @@ private:
             s.warnings.push_back(why + ": the error is unknown");
             s.estimated_error = 1;
         };
-        if (can_go_on(other.reason))
-            s.stop = other;
-        else if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
+        if (can_go_on(other.reason) && !can_go_on(s.stop.reason)) {  // --resume lets the coarser run continue
+            s.stop = {other.reason, s.stop.time, other.message + ", before the coarser run had ended", other.advice};
+            s.estimated_error = 1;
+        } else if (settings_.pair == 1 && coarser(settings_).elements == settings_.elements)
             unknown("too few elements for a coarser run to compare with");
         else if (!comparable(other, s.stop, case_.time.end))
             unknown(

@@ -28,6 +28,8 @@ public:
         settings_.time_tolerance = begun.time_tolerance;
         settings_.defect = begun.defect / begun.reference_energy;
         count_ = begun.attempts;
+        if (c.time.integrator == Integrator::rosenbrock && !begun.rosenbrock)
+            fallback_ = "IDA has integrated the run: time.integrator = \"rosenbrock\" failed before it was interrupted";
     }
 
     RunSummary& next() override {

@@ -107,6 +107,14 @@ TEST(Rosenbrock, leavesDegenerateFlowsToIda) {
     c.accuracy.energy = 1e-4;
     c.time.integrator = Integrator::rosenbrock;
     const Outcome mixed = run_case(c);
+    // What is resumed from there says so, too.
+    Case longer = c;
+    longer.time.end = 0.051;
+    const Outcome resumed = run_case(longer, &mixed.log.frames.back());
+    EXPECT_EQ(detail<std::string>(resumed.summary, "integrator"), "ida");
+    EXPECT_EQ(resumed.summary.attempts, mixed.summary.attempts);
+    ASSERT_EQ(resumed.summary.warnings.size(), 1U);
+    EXPECT_NE(resumed.summary.warnings[0].find("IDA has integrated the run"), std::string::npos);
     c.time.integrator = Integrator::ida;
     c.accuracy.energy = 1e-5;
     const Outcome other = run_case(c);
