@@ -8,6 +8,7 @@
 #include "common/case/input_file.hpp"
 #include "common/case/overrides.hpp"
 #include "common/case/reader.hpp"
+#include "common/case/requirements.hpp"
 
 namespace tubule {
 namespace {
@@ -54,6 +55,26 @@ std::string rename_time_order(toml::table& root) {
     return where;
 }
 
+// The first requirement of a given key that the case does not meet.
+void check_requirements(const toml::table& root, const Case& c, Complaints& complaints) {
+    const Problem problem(c);
+    for (const Requirement& row : requirements()) {
+        const bool from_points = row.key == "energy.H0" && c.energy.H0_from_points();
+        const std::string key = from_points ? "shape.path" : row.key;
+        const toml::node_view given = root.at_path(key);
+        const Property* missing = given ? missing_property(row, problem) : nullptr;
+        if (!missing) continue;
+        const std::string value = toml_string(given.value_or<std::string>(""));
+        complaints.found.push_back(
+            {place(given.node()->source()), key,
+             fmt::format("{} {}must {} only valid with {}{}{}", key, from_points ? "has a column H0, but H0 " : "",
+                         fmt::format(fmt::runtime(row.instead), value), missing->words, row.reason.empty() ? "" : "; ",
+                         row.reason),
+             ""});
+        return;
+    }
+}
+
 // What its keys say; all that is wrong is thrown. `H0`: from the points of its profile.
 Case read_keys(const toml::table& root, const std::vector<std::string>& sets, const std::string& path,
                std::shared_ptr<const Formula> H0) {
@@ -61,6 +82,7 @@ Case read_keys(const toml::table& root, const std::vector<std::string>& sets, co
     c.energy.H0_formula = std::move(H0);
     Complaints complaints;
     Reader::read(root, "", path + ":1:1", complaints, [&](Reader& k) { keys(k, c); });
+    if (!complaints.any()) check_requirements(root, c, complaints);
     if (!complaints.any()) return c;
     for (Complaint& one : complaints.found)  // several keys may cause it, among them an override
         if (!sets.empty() && !one.place.starts_with("--set "))

@@ -3,6 +3,7 @@
 
 #include "common/case/keys.hpp"
 #include "common/case/read.hpp"
+#include "common/case/requirements.hpp"
 #include "common/case/text.hpp"
 
 namespace tubule {
@@ -23,12 +24,12 @@ std::string toml_list(const std::vector<double>& values) {
 }
 
 // The visitor that writes a table by the descriptions of keys.hpp: its own keys first, as TOML requires, then its
-// tables.
+// tables. Keys that the case cannot have are left out.
 class Writer {
 public:
     static constexpr bool required = true;
 
-    explicit Writer(const std::string& path) : path_(path) {}
+    Writer(const Problem& p, const std::string& path) : problem_(p), path_(path) {}
 
     template <class T>
     void number(const std::string& key, const T& value, const Range& = {}, bool = false) {
@@ -82,15 +83,16 @@ public:
 
     template <class Describe>
     void table(const std::string& key, const Describe& describe) {
-        Writer inner(path_of(key));
+        Writer inner(problem_, path_of(key));
         describe(inner);
-        if (!inner.empty()) sections_ += fmt::format("\n[{}]\n{}", inner.path_, inner.document());
+        if (!inner.empty() && can_have(problem_, path_of(key)))
+            sections_ += fmt::format("\n[{}]\n{}", inner.path_, inner.document());
     }
 
     template <class T, class Describe>
     void optional_table(const std::string& key, std::optional<T>& value, const Describe& describe) {
         if (!value) return;
-        Writer inner(path_of(key));
+        Writer inner(problem_, path_of(key));
         describe(inner, *value);
         sections_ += fmt::format("\n[{}]\n{}", inner.path_, inner.document());
     }
@@ -98,7 +100,7 @@ public:
     template <class T, class Describe>
     void tables(const std::string& key, std::vector<T>& values, const Describe& describe) {
         for (T& value : values) {
-            Writer inner(path_of(key));
+            Writer inner(problem_, path_of(key));
             describe(inner, value);
             sections_ += fmt::format("\n[[{}]]\n{}", inner.path_, inner.document());
         }
@@ -108,7 +110,7 @@ public:
     void entries(const OpenNames&, std::vector<T>& values, std::string T::*name, const Describe& describe) {
         for (T& value : values) {
             const std::string key = value.*name;
-            Writer inner(path_of(key));
+            Writer inner(problem_, path_of(key));
             describe(inner, value);
             line(key, fmt::format("{{{}}}", fmt::join(inner.lines_, ", ")));
         }
@@ -124,8 +126,11 @@ public:
 
 private:
     std::string path_of(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
-    void line(const std::string& key, const std::string& value) { lines_.push_back(key + " = " + value); }
+    void line(const std::string& key, const std::string& value) {
+        if (can_have(problem_, path_of(key))) lines_.push_back(key + " = " + value);
+    }
 
+    const Problem& problem_;
     std::string path_;
     std::vector<std::string> lines_;
     std::string sections_;
@@ -134,7 +139,8 @@ private:
 }  // namespace
 
 std::string effective_toml(const Case& c) {
-    Writer writer("");
+    const Problem problem(c);
+    Writer writer(problem, "");
     Case copy = c;  // a description takes its targets by reference; the writer leaves them as they are
     keys(writer, copy);
     return writer.document();

@@ -114,7 +114,7 @@ class TimeLimit(ProgramTest):
 
     def test_a_case_at_rest_has_a_limit_and_nothing_else_of_time(self):
         case = self.write("limited.toml", EQUILIBRIUM + "[time]\nend = 1.0\nlimit = 2\n")
-        self.assertIn("time.end must be absent: nothing moves in a case with [equilibrium]", self.refused("check", case))
+        self.assertIn("time.end must be absent: only valid with a motion, without [equilibrium]", self.refused("check", case))
 
 
 class CtrlC(ProgramTest):

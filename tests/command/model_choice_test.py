@@ -150,11 +150,11 @@ class ModelChoice(ProgramTest):
         kind = f"case.toml:{OPEN[: OPEN.index('kind')].count(chr(10)) + 1}:8: model.kind must not be \"auto\""
         self.assertEqual(refusal(OPEN, "stability", "case.toml").strip(), kind + " for growth rates: name a model with --model")
         self.assertIn(kind + " in a scan, whose points would have different models", refusal(OPEN, "scan", "case.toml", "--over", "energy.k42=0,0.1", "-o", "scan.hdf"))
-        self.assertIn(kind + ' with discretisation.scheme = "paper", which does not support all models; name one',
+        self.assertIn(kind + ": only valid with a discretisation.scheme for all models; name a model",
                       refusal(OPEN.replace('"axisym"', '"surface3d"') + '[discretisation]\nscheme = "paper"\nstep = 0.1\n', "run", "case.toml"))  # fmt: skip
         self.assertIn('model.kind must not be "auto" in a chart', self.chart_refusal())
         self.write("case.toml", CAPSULE + '[model]\nkind = "auto"\n')
-        self.assertIn('model.kind must not be "auto" with [equilibrium]: nothing moves', self.refused("equilibrium", "case.toml"))
+        self.assertIn('model.kind must not be "auto": only valid with a motion, without [equilibrium]', self.refused("equilibrium", "case.toml"))
 
     def chart_refusal(self):
         self.write("case.toml", OPEN)

@@ -113,21 +113,22 @@ TEST(ShapeKeys, WhatEachTierTakes) {
     const auto still = [](const std::string& more) { return refusal(surface + shape("kind = \"dumbbell\"\n") + more); };
     EXPECT_EQ(still(time_span), "accepted");
     EXPECT_EQ(still("[model]\nkind = \"fluid\"\n"),
-              "case.toml:6:1: model must be absent: without a table [time] nothing moves");
+              "case.toml:6:1: model must be absent: only valid with a table [time]; nothing moves without it");
     EXPECT_EQ(still("[discretisation]\nstep = 0.1\n"),
               "case.toml:7:8: discretisation.step must be absent: only valid with a table [time]");
     EXPECT_EQ(still(time_span + "[discretisation]\nrecovery = \"patch\"\n"),
-              "case.toml:9:12: discretisation.recovery must be absent: the time scheme determines the curvatures of a "
-              "moving surface");
+              "case.toml:9:12: discretisation.recovery must be absent: only valid with a single surface, without "
+              "[time]; the scheme determines the curvatures of a surface in motion");
     EXPECT_EQ(still(time_span + "[discretisation]\nscheme = \"paper\"\n"),
-              "case.toml:9:10: discretisation.scheme \"paper\" needs discretisation.step: it does not adapt the step");
+              "case.toml:9:10: discretisation.scheme must not be \"paper\": only valid with discretisation.step; it "
+              "does not adapt the step");
     const std::string by_bdf = "[discretisation]\nscheme = \"bdf\"\n";
     EXPECT_EQ(still(time_span + "[model]\nkind = \"stokes\"\n" + by_bdf), "accepted");
-    EXPECT_EQ(
-        still(time_span + "[model]\nkind = \"fluid\"\n" + by_bdf),
-        "case.toml:11:10: discretisation.scheme must not be \"bdf\" for a fluid: bending waves grow in its steps");
+    EXPECT_EQ(still(time_span + "[model]\nkind = \"fluid\"\n" + by_bdf),
+              "case.toml:11:10: discretisation.scheme must not be \"bdf\": only valid with a model without inertia; "
+              "bending waves grow in its steps");
     EXPECT_EQ(still("[accuracy]\nr_min = 0.1\n"),
-              "case.toml:7:9: accuracy.r_min must be absent: without a table [time] nothing moves");
+              "case.toml:7:9: accuracy.r_min must be absent: only valid with a table [time]; nothing moves without it");
 }
 
 TEST(ModelKeys, WhatGoesTogether) {
@@ -141,30 +142,30 @@ TEST(ModelKeys, WhatGoesTogether) {
     EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 1\n"), "accepted");
     EXPECT_EQ(tube("kind = \"overdamped\"\ngamma = 0\n"), "case.toml:12:9: model.gamma must be a number > 0, not 0");
     EXPECT_EQ(tube("kind = \"gradient-flow\"\ngamma = 1\n"),
-              "case.toml:12:9: model.gamma must be absent: only valid with kind = \"overdamped\" or \"stokes\" or "
-              "\"fluid\" or \"auto\"");
+              "case.toml:12:9: model.gamma must be absent: only valid with model.kind = \"overdamped\" or \"stokes\" "
+              "or \"fluid\" or \"auto\"");
     EXPECT_EQ(tube("kind = \"auto\"\ngamma = 1\nchosen = \"overdamped\"\n"), "accepted");
     EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"gradient-flow\"\n"),
               "case.toml:12:10: model.chosen must be one of \"overdamped\", \"stokes\", \"fluid\", not "
               "\"gradient-flow\"");
-    EXPECT_EQ(tube("kind = \"fluid\"\nchosen = \"stokes\"\n"),
-              "case.toml:12:10: model.chosen must be absent: only valid with kind = \"auto\", to say what is chosen");
+    EXPECT_EQ(
+        tube("kind = \"fluid\"\nchosen = \"stokes\"\n"),
+        "case.toml:12:10: model.chosen must be absent: only valid with model.kind = \"auto\"; it says what is chosen");
     EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"overdamped\"\n"),
-              "case.toml:12:10: model.chosen must not be \"overdamped\" without model.gamma: nothing would resist the "
-              "motion");
+              "case.toml:12:10: model.chosen must not be \"overdamped\": only valid with model.gamma > 0; nothing else "
+              "would resist the motion");
     EXPECT_EQ(tube("kind = \"auto\"\nchosen = \"stokes\"\n", "[velocity]\ninitial = \"rotation\"\nomega = 1\n"),
-              "case.toml:12:10: model.chosen must not be \"stokes\" with a velocity.initial: only \"fluid\" has one");
+              "case.toml:14:11: velocity.initial must not be \"rotation\": only valid with model.chosen = \"fluid\"");
     EXPECT_EQ(tube("kind = \"stokes\"\n", "[velocity]\ninitial = \"rest\"\n"),
-              "case.toml:13:11: velocity.initial must be absent: only model.kind = \"fluid\" or \"auto\" has a "
-              "velocity at the start");
+              "case.toml:13:11: velocity.initial must be absent: only valid with model.kind = \"fluid\" or \"auto\"");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[velocity]\ninitial = \"rotation\"\n"),
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),
-              "case.toml:13:19: discretisation.parametrisation must not be \"graph\": only the gradient flow of a tube "
-              "with free volume and area, under tension and pressure that do not change, is computed as a graph");
+              "case.toml:13:19: discretisation.parametrisation must not be \"graph\": only valid with a graph r(z): "
+              "the gradient flow of a tube, free volume and area, constant loads");
     EXPECT_EQ(tube("kind = \"gradient-flow\"\n", "[discretisation]\nparametrisation = \"material\"\n"),
-              "case.toml:13:19: discretisation.parametrisation must not be \"material\": the gradient flow has no flow "
-              "along the membrane");
+              "case.toml:13:19: discretisation.parametrisation must not be \"material\": only valid with a flow along "
+              "the membrane: an inextensible model, or H0 that varies");
 }
 
 }  // namespace

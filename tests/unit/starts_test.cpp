@@ -315,13 +315,16 @@ TEST_F(ProfileFiles, H0OfACaseIsThatOfItsFile) {
               "case.toml:4:6: energy.H0 must be absent: " + folder + "/p.csv:1:5 has H0 in a column; or take that out");
     EXPECT_EQ(refused(text(""), {"energy.H0=-1"}).substr(0, 46), "--set energy.H0=-1: energy.H0 must be absent: ");
     // What has no law for it.
-    const std::string still = "shape.path has a column H0, but H0 must be a number without a table [time]";
+    const std::string still =
+        "shape.path has a column H0, but H0 must be a number: what varies is only valid with a table [time]";
     EXPECT_NE(refused(text("", "", "surface3d")).find(still), std::string::npos);
-    const std::string automatic = "case.toml:6:8: shape.path has a column H0, but H0 must be a number in tier \"auto\"";
+    const std::string automatic =
+        "case.toml:6:8: shape.path has a column H0, but H0 must be a number: what varies is only valid with tier";
     EXPECT_TRUE(refused(text("", "[time]\nend = 1.0\n", "auto")).starts_with(automatic));
-    EXPECT_NE(refused(text("", "[equilibrium]\nmodes = 1\n")).find("with equilibrium.modes"), std::string::npos);
+    EXPECT_NE(refused(text("", "[equilibrium]\nmodes = 1\n")).find("only valid with a case without equilibrium.modes"),
+              std::string::npos);
     EXPECT_NE(refused(text("", "[time]\nend = 1.0\n[discretisation]\nparametrisation = \"even\"\n"))
-                  .find("must be \"material\" or absent where energy.H0 varies"),
+                  .find("must not be \"even\": only valid with a number energy.H0"),
               std::string::npos);
     // A file that is wrong says so with its place.
     write(sphere_rows(20) + "1,2\n");
@@ -436,7 +439,7 @@ TEST(StartVelocity, NeedsAFrame) {
         "kind = \"sphere\"\nradius = 1.0\n[time]\nend = 1.0\n";
     EXPECT_NE(message_of<CaseError>([&] {
                   parse_case(text, {}, "case.toml");
-              }).find("only shape.kind = \"result\" has a velocity"),
+              }).find("must not be \"result\": only valid with shape.kind = \"result\""),
               std::string::npos);
 }
 

@@ -1,0 +1,151 @@
+// Each property that a key needs is missing once: the case is refused there, with the words of its row.
+#include "common/case/requirements.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/case/read.hpp"
+
+namespace tubule {
+namespace {
+
+const std::string tube = "[energy]\nk20 = 1\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n",
+                  motion = "[time]\nend = 1\n";
+const std::string axisym = "tier = \"axisym\"\n" + tube + motion, surface = "tier = \"surface3d\"\n" + tube,
+                  moving = surface + motion, automatic = "tier = \"auto\"\n" + tube + motion,
+                  equilibrium =
+                      "tier = \"axisym\"\nequilibrium = {}\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\n"
+                      "radius = 1\n";
+
+// A case, what is set in it, and the property that the last of the keys then lacks.
+struct Refused {
+    std::string text;
+    std::vector<std::string> sets;
+    std::string words;
+};
+const std::string H0_of_z = "energy.H0=sin(pi*z)", H0_of_area = "energy.H0=-1-0.1*area";
+const std::vector<Refused> refused{
+    {axisym, {"auto.modes=2"}, "tier = \"auto\""},
+    {moving, {"equilibrium.modes=2"}, "tier = \"axisym\""},
+    {equilibrium, {"model.kind=fluid", "equilibrium.modes=2"}, "a model without inertia"},
+    {equilibrium, {"shape={kind=\"torus\", radius=2, tube_radius=1}"}, "a motion, without [equilibrium]"},
+    {surface, {"model.kind=fluid"}, "a table [time]"},
+    {axisym, {"model.Re=1"}, "model.kind = \"stokes\" or"},
+    {axisym, {"model.gamma=1"}, "model.kind = \"overdamped\" or"},
+    {axisym, {"model.chosen=fluid"}, "model.kind = \"auto\""},
+    {axisym, {"model.kind=auto", "model.chosen=overdamped"}, "model.gamma > 0"},
+    {equilibrium, {"model.kind=auto"}, "a motion, without [equilibrium]"},
+    {moving, {"discretisation.step=0.1", "discretisation.scheme=paper", "model.kind=auto"}, "a discretisation.scheme"},
+    {axisym, {"model.kind=stokes", "model.area=free"}, "model.kind = \"gradient-flow\""},
+    {axisym, {"model.area=reservoir"}, "model.kind = \"overdamped\" or"},
+    {equilibrium, {"model.area=fixed", "model.period=free"}, "a tube"},
+    {axisym, {"model.period=free"}, "a fixed area or volume"},
+    {axisym, {"model.area=fixed", "model.tension=1"}, "model.area = \"free\" or"},
+    {axisym, {"model.volume=fixed", "model.pressure=1"}, "model.volume = \"free\""},
+    {axisym, {"model.force=1"}, "model.period = \"free\""},
+    {equilibrium, {"model.tension={time=[0,1],value=[0,1]}"}, "a motion, without [equilibrium]"},
+    {equilibrium, {"model.pressure={time=[0,1],value=[0,1]}"}, "a motion, without [equilibrium]"},
+    {"tier = \"axisym\"\nequilibrium = {}\n" + tube,
+     {"model.period=free", "model.area=fixed", "model.force={time=[0,1],value=[0,1]}"},
+     "a motion, without [equilibrium]"},
+    {surface, {"velocity.initial=rest"}, "a table [time]"},
+    {equilibrium, {"model.kind=fluid", "velocity.initial=rest"}, "a motion, without [equilibrium]"},
+    {axisym, {"velocity.initial=rest"}, "model.kind = \"fluid\" or"},
+    {axisym,
+     {"model={kind=\"auto\", chosen=\"stokes\"}", "velocity={omega=1, initial=\"rotation\"}"},
+     "model.chosen = \"fluid\""},
+    {axisym, {"model={kind=\"auto\", chosen=\"stokes\"}", "velocity.initial=result"}, "model.chosen = \"fluid\""},
+    {axisym, {"model.kind=fluid", "velocity.initial=result"}, "shape.kind = \"result\""},
+    {axisym, {"velocity.omega=1"}, "model.kind = \"fluid\" or"},
+    {axisym, {"model.kind=fluid", "velocity.omega=1"}, "velocity.initial = \"rotation\""},
+    {surface, {"accuracy.relative_to=energy"}, "a table [time]"},
+    {equilibrium, {"accuracy.relative_to=energy"}, "a motion, without [equilibrium]"},
+    {surface, {"accuracy.r_min=0.1"}, "a table [time]"},
+    {axisym, {"accuracy.estimate=false"}, "a surface in motion"},
+    {equilibrium, {"time.end=1"}, "a motion, without [equilibrium]"},
+    {equilibrium, {"time.output=[]"}, "a motion, without [equilibrium]"},
+    {equilibrium, {"time.stationary=0.1"}, "a motion, without [equilibrium]"},
+    {moving, {"time.integrator=ida"}, "tier = \"axisym\""},
+    {equilibrium, {"time.integrator=ida"}, "a motion, without [equilibrium]"},
+    {axisym, {"model.kind=stokes", "time.integrator=rosenbrock"}, "a graph r(z): "},
+    {moving, {"time.max_order=2"}, "tier = \"axisym\""},
+    {equilibrium, {"time.max_order=2"}, "a motion, without [equilibrium]"},
+    {axisym, {"time.integrator=rosenbrock", "time.max_order=2"}, "time.integrator = \"ida\""},
+    {axisym, {"model.kind=fluid", "discretisation.parametrisation=graph"}, "a graph r(z): "},
+    {axisym, {H0_of_area, "discretisation.parametrisation=even"}, "a number energy.H0"},
+    {axisym, {"discretisation.parametrisation=material"}, "a flow along the membrane"},
+    {moving, {"discretisation.recovery=patch"}, "a single surface"},
+    {moving, {"discretisation.smoothing=0.1"}, "scheme = \"paper\""},
+    {surface, {"discretisation.scheme=bdf"}, "a table [time]"},
+    {surface, {"discretisation.step=0.1"}, "a table [time]"},
+    {surface, {"discretisation.time_tolerance=1e-3"}, "a table [time]"},
+    {surface, {"discretisation.relaxation=0.1"}, "a table [time]"},
+    {surface, {"discretisation.follow_curvature=true"}, "a table [time]"},
+    {surface, {"discretisation.coarsen=true"}, "a table [time]"},
+    {moving, {H0_of_z, "discretisation.relaxation=0.1"}, "a number energy.H0"},
+    {moving, {H0_of_z, "discretisation.follow_curvature=true"}, "a number energy.H0"},
+    {automatic, {"discretisation.scheme=paper"}, "tier = \"axisym\" or"},
+    {moving, {"model.kind=overdamped", "discretisation.scheme=paper"}, "discretisation.step"},
+    {moving, {"model.kind=fluid", "discretisation.scheme=bdf"}, "a model without inertia"},
+    {automatic, {H0_of_area}, "tier = \"axisym\" or"},
+    {surface, {H0_of_z}, "a table [time]"},
+    {axisym, {"model={area=\"fixed\", period=\"free\"}", H0_of_area}, "model.period = \"fixed\""},
+    {equilibrium, {"equilibrium.modes=2", H0_of_area}, "a case without equilibrium.modes"},
+    {equilibrium,
+     {"equilibrium.branch={vary=\"energy.H0\", to=1, step=0.1}", H0_of_area},
+     "a branch that does not vary it"},
+    {equilibrium, {H0_of_z}, "variable area alone"},
+};
+const std::vector<std::string> by_paper{"model.kind=overdamped", "discretisation.step=0.1"};
+const std::vector<Refused> refused_by_paper{
+    {moving, {"discretisation.time_tolerance=1e-3"}, "a scheme that adapts its step"},
+    {moving, {"discretisation.relaxation=0.1"}, "a scheme that controls its mesh"},
+    {moving, {"discretisation.follow_curvature=true"}, "a scheme that controls its mesh"},
+    {moving, {"discretisation.coarsen=true"}, "a scheme that controls its mesh"},
+    {moving, {"model.kind=gradient-flow", "discretisation.scheme=paper"}, "model.kind = \"overdamped\" or"},
+    {moving, {"model.kind=stokes", "discretisation.scheme=paper"}, "inertia or friction"},
+    {moving, {"model.area=reservoir", "discretisation.scheme=paper"}, "fixed area and period"},
+    {moving, {H0_of_z, "discretisation.scheme=paper"}, "a number energy.H0"},
+    {moving, {"energy.term=[{modulus=1, H=6}]", "discretisation.scheme=paper"}, "the terms k20, k40 and k42 alone"},
+};
+
+std::string refusal(const std::string& text, const std::vector<std::string>& sets) {
+    try {
+        parse_case(text, sets, "case.toml");
+        return "accepted";
+    } catch (const CaseError& error) {
+        return error.what();
+    }
+}
+
+TEST(Requirements, EachMissingPropertyIsNamed) {
+    std::set<std::string> named;
+    const auto expect_refused = [&](const Refused& one, const std::vector<std::string>& before) {
+        std::vector<std::string> sets = before;
+        sets.insert(sets.end(), one.sets.begin(), one.sets.end());
+        const std::string last = one.sets.back().substr(0, one.sets.back().find('=')), what = refusal(one.text, sets);
+        bool found = false;
+        for (const Requirement& row : requirements())
+            for (const Property& need : row.needs)
+                if ((row.key.starts_with(last) || last.starts_with(row.key)) && need.words.starts_with(one.words) &&
+                    what.find(": " + row.key + " must " + row.instead.substr(0, row.instead.find('{'))) != what.npos &&
+                    what.find("only valid with " + need.words) != what.npos)
+                    found = true, named.insert(row.key + row.instead + row.reason + need.words);
+        EXPECT_TRUE(found) << sets.back() << " | " << one.words << "\n" << what;
+    };
+    for (const Refused& one : refused) expect_refused(one, {});
+    for (const Refused& one : refused_by_paper) {
+        std::vector<std::string> before = by_paper;
+        before.push_back("discretisation.scheme=paper");
+        expect_refused(one, before);
+    }
+    for (const Requirement& row : requirements())
+        for (const Property& need : row.needs)
+            EXPECT_TRUE(named.contains(row.key + row.instead + row.reason + need.words)) << row.key << need.words;
+}
+
+}  // namespace
+}  // namespace tubule
