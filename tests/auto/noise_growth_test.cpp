@@ -10,7 +10,7 @@
 #include "tools/auto/waves.hpp"
 
 namespace tubule {
-namespace {
+namespace noise_growth_test {
 
 TEST(NoiseGrowth, constantRatesGiveExponentials) {
     NoiseGrowth growth(1e-6, 2);
@@ -108,5 +108,5 @@ TEST(WaveRates, inertiaOnlySlowsWavesThatGrow) {
             }
 }
 
-}  // namespace
+}  // namespace noise_growth_test
 }  // namespace tubule

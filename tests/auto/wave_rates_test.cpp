@@ -9,7 +9,7 @@
 #include "tools/auto/waves.hpp"
 
 namespace tubule {
-namespace {
+namespace wave_rates_test {
 
 constexpr double length = 9, time = 0.5;
 
@@ -79,5 +79,5 @@ TEST(WaveRates, UnderTensionPressureAndForce) {
     }
 }
 
-}  // namespace
+}  // namespace wave_rates_test
 }  // namespace tubule

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace tubule {
-namespace {
+namespace waved_profile_test {
 
 std::vector<double> tabulated(int last, double (*f)(double s)) {
     std::vector<double> out;
@@ -128,5 +128,5 @@ TEST(WavedProfile, refusesWhatIsNoWave) {
     EXPECT_THROW(along_curve(surface.curve, {1.0}, {1.0}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace waved_profile_test
 }  // namespace tubule

@@ -12,7 +12,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace admissible_test {
 
 TEST(ShapeIntegrals, areThoseOfClosedForms) {
     // Capsule: H = -1/r on the cylinder of length l, -2/r on the spheres. Torus: INT H^2 and INT K^2 by theory.md 12.
@@ -118,5 +118,5 @@ TEST(Admissible, aMeshThatCannotFollowIsAFailureAtTheBeginning) {
     expect_rows_that_the_flow_allows(c, o);
 }
 
-}  // namespace
+}  // namespace admissible_test
 }  // namespace tubule::axisym

@@ -10,7 +10,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace convergence_test {
 
 const TubeMode figure_mode{0.25, 1, 0, -pi / 2};  // 0.25 sin(pi z)
 
@@ -119,5 +119,5 @@ TEST(Symmetry, runsAgreeWithThoseOfTheWholePeriod) {
     }
 }
 
-}  // namespace
+}  // namespace convergence_test
 }  // namespace tubule::axisym

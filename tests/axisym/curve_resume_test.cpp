@@ -6,7 +6,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace curve_resume_test {
 
 // A prolate spheroid with sharp poles: three pairs of runs for 1e-4, where every pair is left by its error alone.
 Case sharp(const std::string& model) {
@@ -113,5 +113,5 @@ TEST(CurveResume, aLaterEndHasAKnownError) {
     }
 }
 
-}  // namespace
+}  // namespace curve_resume_test
 }  // namespace tubule::axisym

@@ -15,7 +15,7 @@
 #include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace curve_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -355,5 +355,5 @@ TEST(CurveStart, refusals) {
               "the curve does not have the topology or the period of its space");
 }
 
-}  // namespace
+}  // namespace curve_test
 }  // namespace tubule::axisym

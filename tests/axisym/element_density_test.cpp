@@ -10,7 +10,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace element_density_test {
 
 std::vector<double> sizes(const std::vector<double>& breaks) {
     std::vector<double> out;
@@ -72,5 +72,5 @@ TEST(MeshNeed, leavesAFineMeshAsItIs) {
     EXPECT_NEAR(o.last("r_min"), 0.4444188369, 1e-6);
 }
 
-}  // namespace
+}  // namespace element_density_test
 }  // namespace tubule::axisym

@@ -11,7 +11,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace ensembles_test {
 
 const Bending all_terms = bending(0.5, -0.7, 0.03, 0.1);
 
@@ -355,5 +355,5 @@ TEST(Ensembles, rampsGoOnWhereARunIsResumed) {
     EXPECT_EQ(resumed.at("force", 0.03), 6);
 }
 
-}  // namespace
+}  // namespace ensembles_test
 }  // namespace tubule::axisym

@@ -13,7 +13,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace equilibrium_run_test {
 
 const std::string good = R"(tier = "axisym"
 [energy]
@@ -391,5 +391,5 @@ TEST(EquilibriumCase, canBeInterrupted) {
     EXPECT_EQ(o.log.rows.size(), 1u);
 }
 
-}  // namespace
+}  // namespace equilibrium_run_test
 }  // namespace tubule::axisym

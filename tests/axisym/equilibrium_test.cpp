@@ -13,7 +13,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace equilibrium_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -424,5 +424,5 @@ TEST(Measures, selfIntersection) {
     EXPECT_EQ((*axis)[0], (*axis)[1]);
 }
 
-}  // namespace
+}  // namespace equilibrium_test
 }  // namespace tubule::axisym

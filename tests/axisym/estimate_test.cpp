@@ -13,7 +13,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace estimate_test {
 
 // A tube with 1 ... 4 modes of random waves, amplitudes and phases, random moduli with or without k40 and k42, a random
 // spontaneous curvature, a random time (around that in which a wave of the period decays) and a random accuracy.
@@ -108,5 +108,5 @@ TEST(EstimateStudy, isHonest) {
     for (const Honesty& h : d.all) EXPECT_LE(h.error, h.asked);
 }
 
-}  // namespace
+}  // namespace estimate_test
 }  // namespace tubule::axisym

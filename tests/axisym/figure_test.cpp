@@ -8,7 +8,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace figure_test {
 
 class Figure : public testing::TestWithParam<double> {};
 
@@ -59,5 +59,5 @@ TEST(ReferenceEnergy, isThatOfTheDesign) {
     EXPECT_NEAR(run_case(c).summary.reference_energy, expected, 1e-4 * expected);
 }
 
-}  // namespace
+}  // namespace figure_test
 }  // namespace tubule::axisym

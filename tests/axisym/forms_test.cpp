@@ -13,7 +13,7 @@
 #include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace forms_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -270,5 +270,5 @@ TEST(WeakForce, convergesToTheStrongForceOfThePaper) {
         }
 }
 
-}  // namespace
+}  // namespace forms_test
 }  // namespace tubule::axisym

@@ -7,7 +7,7 @@
 #include "common/geometry/profile_point.hpp"
 
 namespace tubule {
-namespace {
+namespace geometry_test {
 
 struct Curve {
     double r, r1, r2, z1, z2;
@@ -178,5 +178,5 @@ TEST(CurvatureJet, productsMix) {
     EXPECT_NEAR(g.K, -1, 1e-15);
 }
 
-}  // namespace
+}  // namespace geometry_test
 }  // namespace tubule

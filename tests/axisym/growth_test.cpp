@@ -8,7 +8,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace growth_test {
 
 struct Material {
     double k20, H0, k40, k42;
@@ -187,5 +187,5 @@ TEST(Drift, withFourthOrderTerm) {
     expect_radius(m, 1, 1, base_at(m, 1, 1, 1).R);
 }
 
-}  // namespace
+}  // namespace growth_test
 }  // namespace tubule::axisym

@@ -9,7 +9,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace guards_test {
 
 // The last state can be looked at or resumed from, and the rows end with it.
 void expect_saved(const Outcome& o) {
@@ -273,5 +273,5 @@ TEST(CurveGuards, stepsThatLeadNowhere) {
     EXPECT_EQ(steps_until_stop(1e-5, 1e5), 0);    // a thousandth of the time in 100 steps
 }
 
-}  // namespace
+}  // namespace guards_test
 }  // namespace tubule::axisym

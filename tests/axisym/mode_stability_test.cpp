@@ -13,7 +13,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace mode_stability_test {
 
 const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false}, overdamped{.friction = 1};
 
@@ -275,5 +275,5 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
     EXPECT_LT(rates[2], -0.1);
 }
 
-}  // namespace
+}  // namespace mode_stability_test
 }  // namespace tubule::axisym

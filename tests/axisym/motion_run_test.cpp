@@ -15,7 +15,7 @@
 #include "tests/support/paths.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace motion_run_test {
 
 struct Watch : RunObserver {
     std::vector<std::vector<double>> rows;
@@ -347,5 +347,5 @@ TEST(CurveRun, theFluidStartsAsTheOverdampedModelMoves) {
     EXPECT_LE((acceleration - velocity).norm(), 1e-3 * velocity.norm());
 }
 
-}  // namespace
+}  // namespace motion_run_test
 }  // namespace tubule::axisym

@@ -13,7 +13,7 @@
 #include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace motion_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -164,5 +164,5 @@ TEST(CurveMotion, pressuresAreInfSupStable) {
     EXPECT_GT(inf_sup(graded, some_curve(graded)), 0.1);
 }
 
-}  // namespace
+}  // namespace motion_test
 }  // namespace tubule::axisym

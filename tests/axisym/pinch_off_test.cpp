@@ -7,7 +7,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace pinch_off_test {
 
 Case neck_case(double amplitude, double end) {
     return tube_case(bending(0.2, -2), 1, 2, {{amplitude, 1}}, end);
@@ -69,5 +69,5 @@ TEST(PinchOff, criticalAmplitudeIsBetween) {
     }
 }
 
-}  // namespace
+}  // namespace pinch_off_test
 }  // namespace tubule::axisym

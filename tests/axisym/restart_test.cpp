@@ -11,7 +11,7 @@
 #include "tests/missing_fields.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace restart_test {
 
 Case relaxing(double asked) {
     Case c = tube_case(bending(0.2, -2, 0, 0.06), 1, 2, {{0.25, 1, 0, -pi / 2}, {0.05, 2}}, 0.5, {0.01, 0.05, 0.2});
@@ -169,5 +169,5 @@ TEST(Frame, holdsTheProfileOverThePeriod) {
     }
 }
 
-}  // namespace
+}  // namespace restart_test
 }  // namespace tubule::axisym

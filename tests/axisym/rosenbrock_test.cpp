@@ -14,7 +14,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace rosenbrock_test {
 
 // (1 + y^2) (v - 0.2/y^3) = 0 from y = 1: y = (1 + 0.8 t)^(1/4). Dissipation 1/y, so that INT is (y^3 - 1)/(3 0.2).
 struct Growth {
@@ -179,5 +179,5 @@ TEST(BandLu, refusesSingularMatrices) {
     EXPECT_THROW(lu.factor(A.valuePtr()), SolveError);
 }
 
-}  // namespace
+}  // namespace rosenbrock_test
 }  // namespace tubule::axisym

@@ -12,7 +12,7 @@
 #include "tests/support/random_vector.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace space_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -372,5 +372,5 @@ TEST(Symmetry, cellIsTheSmallestThatDeterminesTheTube) {
     EXPECT_DOUBLE_EQ(cell({{0.1, 4, 0, 0.3}}).period(), 2);
 }
 
-}  // namespace
+}  // namespace space_test
 }  // namespace tubule::axisym

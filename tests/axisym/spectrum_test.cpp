@@ -18,7 +18,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace spectrum_test {
 
 using theory::UniformSphere;
 using theory::UniformTube;
@@ -259,5 +259,5 @@ TEST(Growth, fittedToAFlowWithFreeVolume) {
     }
 }
 
-}  // namespace
+}  // namespace spectrum_test
 }  // namespace tubule::axisym

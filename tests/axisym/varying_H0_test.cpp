@@ -18,7 +18,7 @@
 #define EXPECT_SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
 namespace tubule::axisym {
-namespace {
+namespace varying_H0_test {
 
 using Vector = Eigen::VectorXd;
 using test::message_of, test::ProfilePoints, test::random_vector;
@@ -346,5 +346,5 @@ TEST(VaryingH0, refusals) {
                 "energy.H0 must be mirror-symmetric");
 }
 
-}  // namespace
+}  // namespace varying_H0_test
 }  // namespace tubule::axisym

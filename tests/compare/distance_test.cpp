@@ -18,7 +18,7 @@
 #include "tools/compare/triangle_surface.hpp"
 
 namespace tubule::compare {
-namespace {
+namespace distance_test {
 
 using Eigen::Vector3d;
 using surface3d::CurvedMesh;
@@ -319,5 +319,5 @@ TEST(Distance, RefusesWhatCannotBeCompared) {
               "one is a tube of period 2.000000, the other is a tube of period 3.000000");
 }
 
-}  // namespace
+}  // namespace distance_test
 }  // namespace tubule::compare

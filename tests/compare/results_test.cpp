@@ -12,7 +12,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 
 namespace tubule::compare {
-namespace {
+namespace results_test {
 
 using Function = std::function<double(double)>;
 
@@ -182,5 +182,5 @@ TEST(Outcomes, AreWhatTheRunSays) {
     EXPECT_EQ(stated_error(result), 1e-5);
 }
 
-}  // namespace
+}  // namespace results_test
 }  // namespace tubule::compare

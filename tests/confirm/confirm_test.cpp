@@ -13,7 +13,7 @@
 #include "tools/confirm/surface_point.hpp"
 
 namespace tubule::confirm {
-namespace {
+namespace confirm_test {
 
 // A made-up map of 10 x 10: pinched where i + j < 7, else straight; one point failed.
 std::vector<Outcome> map() {
@@ -221,5 +221,5 @@ TEST(Confirm, seesAWaveThatGrows) {
     EXPECT_THROW(surface_end(axisymmetric, lost), std::runtime_error);  // it is still going on
 }
 
-}  // namespace
+}  // namespace confirm_test
 }  // namespace tubule::confirm

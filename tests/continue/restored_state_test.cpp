@@ -14,7 +14,7 @@
 #include "surface3d/run/run.hpp"
 
 namespace tubule {
-namespace {
+namespace restored_state_test {
 
 // Writes a result, and interrupts the run after so many rows.
 struct Interrupted : RunObserver {
@@ -126,5 +126,5 @@ TEST(RestoredState, ofASurface) {
     EXPECT_TRUE(same_bits(list(restored.state.X.reshaped()), find_array(record, "points")->data));
 }
 
-}  // namespace
+}  // namespace restored_state_test
 }  // namespace tubule

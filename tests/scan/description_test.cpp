@@ -7,7 +7,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace description_test {
 
 using test::message_of;
 
@@ -69,5 +69,5 @@ TEST(Scan, NumbersPointsRowByRow) {
     EXPECT_EQ(scan.sets_of(4), (std::vector<std::string>{"time.end=1.0", "a=2", "b=5", "c=6"}));
 }
 
-}  // namespace
+}  // namespace description_test
 }  // namespace tubule

@@ -7,7 +7,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace extension_test {
 
 using test::message_of;
 
@@ -104,5 +104,5 @@ TEST(Extension, Refuses) {
               "case.toml and case.toml cannot be merged: they differ in --boundary, --seeds or --refine");
 }
 
-}  // namespace
+}  // namespace extension_test
 }  // namespace tubule

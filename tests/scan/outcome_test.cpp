@@ -12,7 +12,7 @@
 #include "tools/scan/uniform_fate.hpp"
 
 namespace tubule {
-namespace {
+namespace outcome_test {
 
 const auto never = [] { return false; };
 
@@ -152,5 +152,5 @@ TEST(UniformFateStudy, IsNeverWrongManyTimes) {
     compare_random_points(2000, 2);
 }
 
-}  // namespace
+}  // namespace outcome_test
 }  // namespace tubule

@@ -9,7 +9,7 @@
 #include <random>
 
 namespace tubule {
-namespace {
+namespace plan_test {
 
 using Map = std::function<Outcome(std::size_t, std::size_t)>;
 constexpr std::size_t n = 60;
@@ -159,5 +159,5 @@ TEST(Plan, HalvesTheEdgesThatALineCrosses) {
     }
 }
 
-}  // namespace
+}  // namespace plan_test
 }  // namespace tubule

@@ -5,7 +5,7 @@
 #include "tools/scan/scan_progress.hpp"
 
 namespace tubule {
-namespace {
+namespace progress_test {
 
 using test::Screen;
 
@@ -42,5 +42,5 @@ TEST(ScanProgress, BarOnATerminal) {
     EXPECT_EQ(screen.text(), "\r[######..................] 25 of 100 points, left 3 s\x1b[K\r\x1b[K");
 }
 
-}  // namespace
+}  // namespace progress_test
 }  // namespace tubule

@@ -12,7 +12,7 @@
 #include "tools/scan/scan_plan.hpp"
 
 namespace tubule {
-namespace {
+namespace starts_test {
 
 using test::message_of;
 
@@ -164,5 +164,5 @@ TEST(Starts, Refusals) {
               std::string::npos);
 }
 
-}  // namespace
+}  // namespace starts_test
 }  // namespace tubule

@@ -5,7 +5,7 @@
 #include "motion.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace bdf_test {
 
 constexpr Scheme bdf = scheme_named("bdf");
 const Sphere wavy{.radius = 1, .modes = {{0.2, 2, 1}, {0.1, 3, 2}}};
@@ -122,5 +122,5 @@ TEST(Bdf, RefusesInertia) {
     }
 }
 
-}  // namespace
+}  // namespace bdf_test
 }  // namespace tubule::surface3d

@@ -13,7 +13,7 @@
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace curvature_test {
 
 const Bending all_terms{.k = {1, 1, 1}, .H0 = -0.3};
 
@@ -176,5 +176,5 @@ TEST(Curvature, ATubeHasNoSeam) {
     }
 }
 
-}  // namespace
+}  // namespace curvature_test
 }  // namespace tubule::surface3d

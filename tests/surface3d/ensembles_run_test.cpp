@@ -8,7 +8,7 @@
 #include "tests/surface3d/run_case.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace ensembles_run_test {
 
 const std::string wavy = R"(
 [energy]
@@ -208,5 +208,5 @@ TEST(EnsembleRuns, WhatASchemeDoesNotHaveIsRefused) {
     EXPECT_NE(refusal({"model.volume=fixed", "model.period=free"}).find("only a tube has a period"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace ensembles_run_test
 }  // namespace tubule::surface3d

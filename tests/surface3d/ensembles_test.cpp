@@ -11,7 +11,7 @@
 #include "tests/surface3d/motion.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace ensembles_test {
 
 const Bending all_terms{.k = {0.5, 0.03, 0.1}, .H0 = -0.6};
 constexpr ModelKind kinds[] = {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid};
@@ -306,5 +306,5 @@ TEST(FreePeriod, WavesGrowOrDecayAtTheRatesOfItsForce) {
         }
 }
 
-}  // namespace
+}  // namespace ensembles_test
 }  // namespace tubule::surface3d

@@ -13,7 +13,7 @@
 #include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace force_test {
 
 double paired(const CurvedMesh& mesh, const Bending& bending) {
     const SurfaceSpace space(mesh);
@@ -33,7 +33,7 @@ double energy_rate(const CurvedMesh& mesh, const Bending& bending) {
 }
 
 template <class Shape>
-CurvedMesh mesh_of(const Shape& shape, const TriangleMesh& base, int order) {
+CurvedMesh curved(const Shape& shape, const TriangleMesh& base, int order) {
     return mapped_mesh(base, order, [&](const auto& p) { return position(shape, p); });
 }
 
@@ -48,7 +48,7 @@ TEST(BendingForce, ApproachesTheRateOfTheDiscreteEnergy) {
     for (const Bending& bending : each_term) {
         double gap[2];
         for (int i : {0, 1}) {
-            const CurvedMesh mesh = mesh_of(sphere, icosphere(4 * (i + 1)), 3);
+            const CurvedMesh mesh = curved(sphere, icosphere(4 * (i + 1)), 3);
             const double rate = energy_rate(mesh, bending);
             gap[i] = std::abs(paired(mesh, bending) + rate) / std::abs(rate);
         }
@@ -60,7 +60,7 @@ TEST(BendingForce, ApproachesTheRateOfTheDiscreteEnergy) {
     for (const auto& [k, order] : {std::pair{2, 1.8}, {4, 5.0}}) {
         double gap[2];
         for (int i : {0, 1}) {
-            const CurvedMesh mesh = mesh_of(sphere, icosphere(4 * (i + 1)), k);
+            const CurvedMesh mesh = curved(sphere, icosphere(4 * (i + 1)), k);
             const double rate = energy_rate(mesh, all);
             gap[i] = std::abs(paired(mesh, all) + rate) / std::abs(rate);
         }
@@ -76,7 +76,7 @@ TEST(BendingForce, VanishesOnTheCliffordTorus) {
         double b[2];
         for (int i : {0, 1}) {
             const int n = 4 * (i + 1);
-            b[i] = std::abs(paired(mesh_of(torus, torus_grid(torus, 4 * n, 2 * n), k), bending));
+            b[i] = std::abs(paired(curved(torus, torus_grid(torus, 4 * n, 2 * n), k), bending));
         }
         EXPECT_GT(std::log2(b[0] / b[1]), order) << k;
         EXPECT_LT(b[1], bound) << k;
@@ -92,7 +92,7 @@ TEST(BendingForce, VanishesOnASphereAtItsEquilibriumRadius) {
             double b[2];
             for (int i : {0, 1})
                 b[i] = std::abs(
-                    paired(mesh_of(Sphere{.radius = radius, .modes = {}}, icosphere(2 * (i + 1)), k), bending));
+                    paired(curved(Sphere{.radius = radius, .modes = {}}, icosphere(2 * (i + 1)), k), bending));
             EXPECT_GT(std::log2(b[0] / b[1]), order) << k << ", R = " << radius;
             EXPECT_LT(b[1], bound) << k << ", R = " << radius;
         }
@@ -104,7 +104,7 @@ TEST(BendingForce, IsThePapersTermByTerm) {
     // paired with v = nu they are b times the area.
     const double R = 1.5, H = -2 / R, K = 1 / (R * R), H0 = -0.5, h = H - H0, B2 = 2 / (R * R);
     const double exact[3] = {-2 * h * (B2 - H * h / 2), -h * h * h * ((3 * H + H0) * H - 8 * K), -H * K * K};
-    const CurvedMesh mesh = mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(4), 4);
+    const CurvedMesh mesh = curved(Sphere{.radius = R, .modes = {}}, icosphere(4), 4);
     const SurfaceSpace space(mesh);
     const CurvatureField curvature = recover(space, mesh);
     for (std::size_t term = 0; term < 3; ++term) {
@@ -118,7 +118,7 @@ TEST(BendingForce, IsThePapersTermByTerm) {
 TEST(BendingForce, OfTermsThatACaseAdds) {
     // On a sphere b = -(2/R) (f + f_H/R - f_K/R^2), theory.md (2.13), by hand: f = h^2 K, h K^3 and log(1 + h^2 K).
     const double R = 1.5, H = -2 / R, K = 1 / (R * R), H0 = -0.5, h = H - H0;
-    const CurvedMesh mesh = mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(4), 4);
+    const CurvedMesh mesh = curved(Sphere{.radius = R, .modes = {}}, icosphere(4), 4);
     const SurfaceSpace space(mesh);
     const CurvatureField curvature = recover(space, mesh);
     const Formula log = parse_formula("log(1 + (H - H0)^2*K)", EnergyTerm::variables);
@@ -142,11 +142,11 @@ TEST(BendingForce, OfTermsThatACaseAdds) {
 TEST(BendingForce, OfGaussianCurvatureAloneIsZero) {
     // f_K is constant, and H K f_K = H f: to rounding on any mesh.
     const Sphere wavy{.radius = 1, .modes = {{0.3, 3, 2}}};
-    const CurvedMesh mesh = mesh_of(wavy, icosphere(2), 3);
+    const CurvedMesh mesh = curved(wavy, icosphere(2), 3);
     const SurfaceSpace space(mesh);
     const Bending bending{.k = {}, .H0 = -1, .terms = {{.modulus = 2, .H = 0, .K = 1}}};
     EXPECT_LT(bending_force(space, mesh, recover(space, mesh), bending).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace force_test
 }  // namespace tubule::surface3d

@@ -19,7 +19,7 @@
 #include "tests/surface3d/motion.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace guards_test {
 
 // A tube of period 1 whose profile is r = 1 + cos(2 pi s)/2, z = s + bulge sin(2 pi s), displaced by `up`: pancakes,
 // whose faces cross those of the next where bulge is more than 1/(2 pi), as z is then less than before around s = 1/2.
@@ -299,5 +299,5 @@ TEST(NewMesh, OnlyNearASphereAreAreaAndVolumeOneCondition) {
     }
 }
 
-}  // namespace
+}  // namespace guards_test
 }  // namespace tubule::surface3d

@@ -10,7 +10,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace import_check_test {
 
 using namespace samples;
 
@@ -329,5 +329,5 @@ TEST(FirstIntersection, ASoupAgreesWithTheIntervalTestOnAllPairs) {
     EXPECT_LT(met, 300) << "too few soups are free to be a test";
 }
 
-}  // namespace
+}  // namespace import_check_test
 }  // namespace tubule::surface3d

@@ -11,7 +11,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace import_fit_test {
 
 using namespace samples;
 
@@ -238,5 +238,5 @@ TEST(Fit, RefusesOptionsOutOfRange) {
     EXPECT_EQ(message({.order = 2, .smoothing = -1}), "fit_surface: smoothing must be 0 to 100, not -1");
 }
 
-}  // namespace
+}  // namespace import_fit_test
 }  // namespace tubule::surface3d

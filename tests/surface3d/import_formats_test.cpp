@@ -10,7 +10,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace import_formats_test {
 
 using namespace samples;
 
@@ -379,5 +379,5 @@ TEST(Weld, CollapsedTrianglesAreDroppedWithANote) {
     EXPECT_EQ(mesh.notes[0], "2 triangles collapsed when vertices were welded, and were dropped.");
 }
 
-}  // namespace
+}  // namespace import_formats_test
 }  // namespace tubule::surface3d

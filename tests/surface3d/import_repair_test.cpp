@@ -10,7 +10,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace import_repair_test {
 
 using namespace samples;
 using testing::Test;
@@ -172,5 +172,5 @@ TEST(RepairMesh, RefusesTrianglesWithoutArea) {
     EXPECT_EQ(refusal(mesh), "mesh: no triangle has an area");
 }
 
-}  // namespace
+}  // namespace import_repair_test
 }  // namespace tubule::surface3d

@@ -12,7 +12,7 @@
 #include "surface3d/meshing/remesh.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace mesh_motion_test {
 
 const Sphere waved{.radius = 1.0, .modes = {{.amplitude = 0.2, .l = 2, .m = 1}, {.amplitude = 0.1, .l = 3, .m = 2}}};
 
@@ -177,5 +177,5 @@ TEST(MeshMotion, FollowsTheCurvatureOfANeck) {
     EXPECT_LT(left.error, 0.5 * even.error);  // grading is not undone either
 }
 
-}  // namespace
+}  // namespace mesh_motion_test
 }  // namespace tubule::surface3d

@@ -10,7 +10,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace mesh_smoothing_test {
 
 using namespace samples;
 
@@ -151,5 +151,5 @@ TEST(MeshDistances, OfConcentricSpheres) {
     EXPECT_NEAR(most, 1.1 - lowest, 2e-3);
 }
 
-}  // namespace
+}  // namespace mesh_smoothing_test
 }  // namespace tubule::surface3d

@@ -18,7 +18,7 @@
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace mesh_test {
 
 // Every edge is shared by two triangles that run through it in opposite directions.
 void expect_closed(const CurvedMesh& mesh) {
@@ -242,5 +242,5 @@ TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesAtANeck) {
     expect_gains(neck, profile_of(base(neck)), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
 }
 
-}  // namespace
+}  // namespace mesh_test
 }  // namespace tubule::surface3d

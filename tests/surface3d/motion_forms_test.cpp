@@ -19,7 +19,7 @@
 #include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace motion_forms_test {
 
 const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.1, 3, 2}}};
 const SurfaceLaw gradient_flow = motion_law({});
@@ -491,5 +491,5 @@ TEST(StepUnknowns, AreThoseOfTheModel) {
     EXPECT_EQ(MotionUnknowns(mesh, fluid, {.k = {1, 0, 1}}).size(), 5 * n + 42);  // 10 (k-1)^2 + 2
 }
 
-}  // namespace
+}  // namespace motion_forms_test
 }  // namespace tubule::surface3d

@@ -22,7 +22,7 @@
 #include "tests/surface3d/run_case.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace motion_run_test {
 
 const std::string wavy = R"(
 [energy]
@@ -833,5 +833,5 @@ TEST(MotionRun, ResumedRunsEndAsUndisturbedOnes) {
     }
 }
 
-}  // namespace
+}  // namespace motion_run_test
 }  // namespace tubule::surface3d

@@ -11,7 +11,7 @@
 #include "surface3d/motion/schemes/alpha_numbers.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace motion_test {
 
 const Bending all_terms{.k = {0.3, 0.02, 0.1}, .H0 = -1};
 
@@ -460,5 +460,5 @@ TEST(Models, StokesFlowWithoutFrictionDoesNotDrift) {
     }
 }
 
-}  // namespace
+}  // namespace motion_test
 }  // namespace tubule::surface3d

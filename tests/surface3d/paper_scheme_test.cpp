@@ -10,7 +10,7 @@
 #include "tests/surface3d/motion_runs.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace paper_scheme_test {
 
 MotionLaw law_of(ModelKind kind, double Re = 1, std::optional<double> gamma = {}) {
     return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
@@ -143,5 +143,5 @@ TEST(PaperScheme, RefusesWhatThePaperHasNot) {
     EXPECT_THROW(Paper(mesh, law_of(ModelKind::fluid), bending, {.smoothing = -1}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace paper_scheme_test
 }  // namespace tubule::surface3d

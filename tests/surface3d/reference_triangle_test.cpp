@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tubule::surface3d {
-namespace {
+namespace reference_triangle_test {
 
 double integral(int degree, int i, int j) {
     double sum = 0;
@@ -92,5 +92,5 @@ TEST(Tabulation, DifferentiatesPolynomialsExactly) {
     }
 }
 
-}  // namespace
+}  // namespace reference_triangle_test
 }  // namespace tubule::surface3d

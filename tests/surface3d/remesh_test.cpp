@@ -20,7 +20,7 @@
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace remesh_test {
 
 using Eigen::Vector3d;
 
@@ -394,5 +394,5 @@ TEST(Remesh, SaysWhereItCannot) {
     EXPECT_THROW(remesh(mesh, {}, {.quality = 1}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace remesh_test
 }  // namespace tubule::surface3d

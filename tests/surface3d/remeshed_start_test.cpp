@@ -15,7 +15,7 @@
 #include "tests/surface3d/import_samples.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace remeshed_start_test {
 
 using namespace samples;
 
@@ -254,5 +254,5 @@ TEST(NewTriangles, OfEqualEdges) {
     for (const Vector3d& x : mesh.points) EXPECT_NEAR(x.norm(), 1, 0.01);  // on the triangles of the file
 }
 
-}  // namespace
+}  // namespace remeshed_start_test
 }  // namespace tubule::surface3d

@@ -14,7 +14,7 @@
 #include "tests/support/paths.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace run_test {
 
 struct Watch : RunObserver {
     std::vector<double> values;
@@ -243,5 +243,5 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "points");
 }
 
-}  // namespace
+}  // namespace run_test
 }  // namespace tubule::surface3d

@@ -15,7 +15,7 @@
 #include "tests/surface3d/errors.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace transfer_test {
 
 using Eigen::Vector3d;
 
@@ -109,5 +109,5 @@ TEST(Transfer, NeedsMeshesOfOneSurface) {
     EXPECT_THROW(places_of_nodes(mesh, reversed), SolveError);
 }
 
-}  // namespace
+}  // namespace transfer_test
 }  // namespace tubule::surface3d

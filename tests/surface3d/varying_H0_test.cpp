@@ -16,7 +16,7 @@
 #include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
-namespace {
+namespace varying_H0_test {
 
 constexpr double step = 1e-3;
 
@@ -198,5 +198,5 @@ TEST(VaryingH0, refusals) {
     says({"discretisation.relaxation=0.1"}, "discretisation.relaxation must be absent where energy.H0 varies");
 }
 
-}  // namespace
+}  // namespace varying_H0_test
 }  // namespace tubule::surface3d

@@ -19,7 +19,7 @@
 #include "tests/support/paths.hpp"
 
 namespace tubule {
-namespace {
+namespace case_test {
 
 const std::string good =
     "tier = \"axisym\"\n"                   // 1
@@ -588,5 +588,5 @@ TEST(Tube, VolumeIsExact) {
     EXPECT_NEAR(volume(tube), std::numbers::pi * tube.length * sum / n, 1e-13);
 }
 
-}  // namespace
+}  // namespace case_test
 }  // namespace tubule

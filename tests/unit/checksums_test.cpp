@@ -17,7 +17,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace checksums_test {
 
 namespace fs = std::filesystem;
 using test::message_of;
@@ -103,5 +103,5 @@ TEST(Crc32, CheckValue) {
     EXPECT_EQ(crc32(first, std::as_bytes(std::span(digits).subspan(4))), 0xCBF43926u);
 }
 
-}  // namespace
+}  // namespace checksums_test
 }  // namespace tubule

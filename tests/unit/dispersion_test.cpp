@@ -15,7 +15,7 @@
 #include "common/theory/waves.hpp"
 
 namespace tubule::theory {
-namespace {
+namespace dispersion_test {
 
 using Complex = std::complex<double>;
 using J = Jet<double, 1, 2>;
@@ -528,5 +528,5 @@ TEST(Waves, meaninglessOnesAreRefused) {
     EXPECT_THROW(waves_in_time(tube, fluid, 6, {{1, 0, 1e-3}}, {1, 0.5}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace dispersion_test
 }  // namespace tubule::theory

@@ -19,7 +19,7 @@
 #include "tests/support/paths.hpp"
 
 namespace tubule {
-namespace {
+namespace docs_test {
 
 std::string page(const std::string& name) {
     std::ifstream file(test::sources + "/" + name);
@@ -266,5 +266,5 @@ TEST(Docs, TellTheKeysOfEveryShape) {
     expect_keys_of_shapes(Shape{});
 }
 
-}  // namespace
+}  // namespace docs_test
 }  // namespace tubule

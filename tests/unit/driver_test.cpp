@@ -10,7 +10,7 @@
 #include "tests/missing_fields.hpp"
 
 namespace tubule {
-namespace {
+namespace driver_test {
 
 struct Watch : RunObserver {
     int discards = 0;
@@ -135,5 +135,5 @@ TEST(Record, HoldsAnotherOne) {
     EXPECT_THROW(nested(inner, "coarser_", RecordKind::curve), std::runtime_error);
 }
 
-}  // namespace
+}  // namespace driver_test
 }  // namespace tubule

@@ -25,7 +25,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace durability_test {
 
 namespace fs = std::filesystem;
 
@@ -532,5 +532,5 @@ TEST_F(Durability, TheJournalOfVersion01IsNamed) {
               std::string::npos);
 }
 
-}  // namespace
+}  // namespace durability_test
 }  // namespace tubule

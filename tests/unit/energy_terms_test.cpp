@@ -10,7 +10,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace energy_terms_test {
 
 using test::message_of;
 
@@ -166,5 +166,5 @@ TEST(EnergyTerms, BadOnesAreRefusedWithTheirPlace) {
               "energy_31");
 }
 
-}  // namespace
+}  // namespace energy_terms_test
 }  // namespace tubule

@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tubule {
-namespace {
+namespace forecast_test {
 
 Pilot pilot(int steps, double first, double growth) {
     Pilot out;
@@ -28,5 +28,5 @@ TEST(Pilot, CollapsesWhereItsStepsBecomeFarShorterThanTheyWere) {
     EXPECT_TRUE(pilot(10, 0.01, 0.5).has_collapsed());
 }
 
-}  // namespace
+}  // namespace forecast_test
 }  // namespace tubule

@@ -10,7 +10,7 @@
 #include "common/geometry/jet.hpp"
 
 namespace tubule {
-namespace {
+namespace formula_test {
 
 constexpr std::array<std::string_view, 2> names{"x", "y"};
 
@@ -139,5 +139,5 @@ TEST(Formula, SizesAddUp) {
     EXPECT_DOUBLE_EQ(f.size, 31);
 }
 
-}  // namespace
+}  // namespace formula_test
 }  // namespace tubule

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 namespace tubule::theory {
-namespace {
+namespace growth_fit_test {
 
 struct Samples {
     std::vector<double> t, a;
@@ -76,5 +76,5 @@ TEST(GrowthFit, tooFewPointsAreRefused) {
     EXPECT_NO_THROW(fit_growth({0, 1, 2, 3, 4, 5}, {1, 1, 1, 1, 1, 1}));
 }
 
-}  // namespace
+}  // namespace growth_fit_test
 }  // namespace tubule::theory

@@ -13,7 +13,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace ldlt_test {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Dense = Eigen::MatrixXd;
@@ -331,5 +331,5 @@ TEST(Gmres, failsLoudly) {
               "the right-hand side or the initial guess of GMRES is not finite");
 }
 
-}  // namespace
+}  // namespace ldlt_test
 }  // namespace tubule

@@ -9,7 +9,7 @@
 #include "common/solve/stop.hpp"
 
 namespace tubule {
-namespace {
+namespace loop_test {
 
 constexpr double step_length = 0.25;
 
@@ -209,5 +209,5 @@ TEST(Loop, ResumesAtItsEnd) {
     EXPECT_TRUE(run.watch.rows.empty());
 }
 
-}  // namespace
+}  // namespace loop_test
 }  // namespace tubule

@@ -6,7 +6,7 @@
 #include "common/case/read.hpp"
 
 namespace tubule {
-namespace {
+namespace model_test {
 
 // What docs/case_files.md says about each model. Without `default`: a model that is missing here does not compile.
 #pragma GCC diagnostic error "-Wswitch"
@@ -127,5 +127,5 @@ TEST(Model, ThatIsChosenIsTheOneWithThatName) {
     }
 }
 
-}  // namespace
+}  // namespace model_test
 }  // namespace tubule

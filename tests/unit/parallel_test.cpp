@@ -11,7 +11,7 @@
 #include <vector>
 
 namespace tubule {
-namespace {
+namespace parallel_test {
 
 class Parallel : public ::testing::Test {
 protected:
@@ -106,5 +106,5 @@ TEST_F(Parallel, IdleThreadsSleep) {
     EXPECT_LT(used, 0.03);  // of 0.1 s times three helpers
 }
 
-}  // namespace
+}  // namespace parallel_test
 }  // namespace tubule

@@ -7,7 +7,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace pause_test {
 
 bool never() {
     return false;
@@ -91,5 +91,5 @@ TEST(Memory, saysWhatIsTooLargeAndWhatToTry) {
     EXPECT_TRUE(message.ends_with(" GB are free: use fewer elements (discretisation.elements)")) << message;
 }
 
-}  // namespace
+}  // namespace pause_test
 }  // namespace tubule

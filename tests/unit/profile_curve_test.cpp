@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tubule {
-namespace {
+namespace profile_curve_test {
 
 // Parameters 0 ... 1 as tier axisym samples them: six equal steps an element, elements of lengths 1 and 2 in turn.
 std::vector<double> uneven(int elements) {
@@ -141,5 +141,5 @@ TEST(ProfileCurve, Refusals) {
     EXPECT_EQ(refusal(doubled_r, doubled_z), "two neighbouring points of a profile coincide");
 }
 
-}  // namespace
+}  // namespace profile_curve_test
 }  // namespace tubule

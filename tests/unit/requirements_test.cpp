@@ -10,7 +10,7 @@
 #include "common/case/read.hpp"
 
 namespace tubule {
-namespace {
+namespace requirements_test {
 
 const std::string tube = "[energy]\nk20 = 1\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n",
                   motion = "[time]\nend = 1\n";
@@ -147,5 +147,5 @@ TEST(Requirements, EachMissingPropertyIsNamed) {
             EXPECT_TRUE(named.contains(row.key + row.instead + row.reason + need.words)) << row.key << need.words;
 }
 
-}  // namespace
+}  // namespace requirements_test
 }  // namespace tubule

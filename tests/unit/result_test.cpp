@@ -21,7 +21,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace result_test {
 
 namespace fs = std::filesystem;
 
@@ -663,5 +663,5 @@ TEST_F(ResultFile, ATableWithoutSetsIsAnEmptyListForH5py) {
     EXPECT_EQ(python("f = h5py.File(name)\nprint(len(f['case'].attrs['set']))"), "0\n");
 }
 
-}  // namespace
+}  // namespace result_test
 }  // namespace tubule

@@ -8,7 +8,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace shapes_test {
 
 const std::string energy = "[energy]\nk20 = 1.0\n";             // lines 2, 3
 const std::string surface = "tier = \"surface3d\"\n" + energy;  // line 1 and these
@@ -168,5 +168,5 @@ TEST(ModelKeys, WhatGoesTogether) {
               "the membrane: an inextensible model, or H0 that varies");
 }
 
-}  // namespace
+}  // namespace shapes_test
 }  // namespace tubule

@@ -18,7 +18,7 @@
 #include "tests/support/screen.hpp"
 
 namespace tubule {
-namespace {
+namespace solve_test {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
@@ -468,5 +468,5 @@ TEST(Interrupt, secondSignalEnds) {
     EXPECT_EQ(WTERMSIG(status), SIGINT);
 }
 
-}  // namespace
+}  // namespace solve_test
 }  // namespace tubule

@@ -11,7 +11,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace sparse_test {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Dense = Eigen::MatrixXd;
@@ -273,5 +273,5 @@ TEST(SparseCholesky, namesWhatIsNotSymmetricPositiveDefinite) {
               "matrix of size 2 is nearly singular: condition number about 1.0e+16");
 }
 
-}  // namespace
+}  // namespace sparse_test
 }  // namespace tubule

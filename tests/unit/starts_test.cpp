@@ -17,7 +17,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace starts_test {
 
 using test::message_of;
 
@@ -443,5 +443,5 @@ TEST(StartVelocity, NeedsAFrame) {
               std::string::npos);
 }
 
-}  // namespace
+}  // namespace starts_test
 }  // namespace tubule

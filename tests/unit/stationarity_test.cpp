@@ -10,7 +10,7 @@
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
-namespace {
+namespace stationarity_test {
 
 constexpr double area = 4 * pi;  // of size 1
 
@@ -101,5 +101,5 @@ TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
     EXPECT_EQ(doubt_after(c, Stop::finished, 10, 10, 100), "") << "it was at rest";
 }
 
-}  // namespace
+}  // namespace stationarity_test
 }  // namespace tubule

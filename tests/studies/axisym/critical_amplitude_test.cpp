@@ -5,7 +5,7 @@
 #include "tests/axisym/runs.hpp"
 
 namespace tubule::axisym {
-namespace {
+namespace critical_amplitude_test {
 
 TEST(CriticalAmplitudeStudy, agreesWithTheReferenceToItsBracket) {
     const auto pinches = [](double amplitude) {
@@ -20,5 +20,5 @@ TEST(CriticalAmplitudeStudy, agreesWithTheReferenceToItsBracket) {
     EXPECT_TRUE(pinches(reference::pinches_at));
 }
 
-}  // namespace
+}  // namespace critical_amplitude_test
 }  // namespace tubule::axisym

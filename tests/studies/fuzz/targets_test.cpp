@@ -8,7 +8,7 @@
 #include <span>
 
 namespace tubule::fuzz {
-namespace {
+namespace targets_test {
 
 class Readers : public testing::TestWithParam<Target> {};
 
@@ -29,5 +29,5 @@ TEST_P(Readers, ReadOrRefuse) {
 INSTANTIATE_TEST_SUITE_P(Fuzz, Readers, testing::ValuesIn(targets()),
                          [](const auto& target) { return std::string(target.param.name); });
 
-}  // namespace
+}  // namespace targets_test
 }  // namespace tubule::fuzz
