@@ -12,7 +12,7 @@ namespace {
 // 2, 3, 4; what little damps would grow in long steps.
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
-constexpr int most_iterations = 20;      // of that, before it is factored
+constexpr int most_carried = 20;     // of that, before it is factored
 constexpr int most_multipliers = 4;      // lambda, tension, supply, stretch
 // Measured: docs/decisions/energies.md.
 constexpr double least_evenness = 0.02;
@@ -210,7 +210,7 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     };
     const auto as_it_is = [](const Eigen::VectorXd& x, Eigen::VectorXd& y) { y = x; };
     try {
-        gmres_.solve(carried, as_it_is, b, out, flux_tolerance, most_iterations);
+        gmres_.solve(carried, as_it_is, b, out, flux_tolerance, most_carried);
     } catch (const SolveError&) {  // far along the surface in a step
         const Eigen::SparseMatrix<double> mass = mass_matrix(surface_.space(), *base.mesh);
         SparseLuLarge lu;
