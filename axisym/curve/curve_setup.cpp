@@ -9,8 +9,7 @@
 #include "axisym/curve/curve_frame.hpp"
 #include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/error_scale.hpp"
-#include "common/run/output_times.hpp"
+#include "common/run/run_output.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {

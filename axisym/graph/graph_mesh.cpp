@@ -9,7 +9,6 @@
 
 #include "axisym/graph/graph_start.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
 namespace {

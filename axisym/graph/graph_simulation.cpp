@@ -11,7 +11,6 @@
 #include "axisym/integration/ida_integrator.hpp"
 #include "axisym/integration/rosenbrock_integrator.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/error_scale.hpp"
 
 namespace tubule::axisym {
 namespace {

@@ -15,8 +15,10 @@
 
 #include "common/energy/bending.hpp"
 #include "common/result/checksums.hpp"
+#include "common/result/contents.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/result/vtk_grid.hpp"
 #include "common/series/catalogue.hpp"
 
@@ -318,6 +320,21 @@ CaseText read_hdf5_case(const std::filesystem::path& file) {
 
 void require_result(const std::filesystem::path& file) {
     with_result(file, [](hid_t) {});
+}
+
+std::vector<std::byte> result_image(const Result& result) {
+    Contents contents;
+    contents.about_begun = result.about.size();
+    contents.case_text = result.case_text, contents.case_text.resolved = resolved_case(result.case_text);
+    contents.about = result.about, contents.series = result.series_names;
+    const std::size_t width = contents.series.size(), rows = result.series.at("time").size();
+    contents.rows.resize(width * rows);
+    for (std::size_t j = 0; j < width; ++j) {
+        const std::vector<double>& column = result.series.at(contents.series[j]);
+        for (std::size_t i = 0; i < rows; ++i) contents.rows[i * width + j] = column[i];
+    }
+    contents.meshes = result.meshes, contents.frames = result.frames, contents.checkpoint = result.checkpoint;
+    return hdf5_image(contents);
 }
 
 }  // namespace tubule

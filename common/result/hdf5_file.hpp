@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/result/contents.hpp"
+#include "common/result/result.hpp"
 
 namespace tubule {
 
@@ -23,5 +24,8 @@ std::vector<std::byte> view_image(const std::string& file, std::size_t frame);
 // All throw std::runtime_error naming the file, and what is missing if it is HDF5 but not a result.
 Contents read_hdf5(const std::filesystem::path& file);
 CaseText read_hdf5_case(const std::filesystem::path& file);
+
+// The bytes of a file from which read_result() gives this result.
+std::vector<std::byte> result_image(const Result& result);
 
 }  // namespace tubule

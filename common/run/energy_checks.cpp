@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
+#include "common/case/read.hpp"
+
 namespace tubule {
 
 namespace {
@@ -53,6 +57,47 @@ std::string key_of_ill_posed(const Case& c) {
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where) {
     return {Stop::undefined, time, fmt::format("the energy is hardly defined any more at {}: {}", where, words(margin)),
             "choose a formula that is defined for all curvatures which the membrane may take"};
+}
+
+namespace {
+
+constexpr double no_change = 1e-9;  // of E_ref: the shape was in equilibrium
+
+constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it has cancelled away
+
+}  // namespace
+
+double reference_energy(const Case& c, double energy, double by_magnitude) {
+    const std::string formula = key_of_formula(c.energy);
+    if (formula != "energy" && !(std::isfinite(energy) && std::isfinite(by_magnitude)))
+        throw complaint(c, formula, "must be finite on the start, but it overflows there");
+    if (!c.accuracy.relative_to_energy) return by_magnitude;
+    if (std::abs(energy) < least_scale * by_magnitude)
+        throw complaint(c, "accuracy.relative_to",
+                        fmt::format("must not be \"energy\": the energy of the start is {:.2g}, of terms as large as "
+                                    "{:.4g}",
+                                    energy, by_magnitude));
+    return std::abs(energy);
+}
+
+std::string doubt_before(const Case& c, double energy, double E_ref) {
+    const double allowed = c.accuracy.energy * E_ref;
+    if (!(allowed > std::abs(energy)) || !std::isfinite(allowed)) return "";
+    const std::string doubt = fmt::format(
+        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy of the start is "
+        "{:.3g}",
+        c.accuracy.energy, allowed, E_ref, energy);
+    if (energy == 0) return doubt;
+    return fmt::format("{}: ask for less than {:.1g}", doubt, std::abs(energy) / E_ref);
+}
+
+std::string doubt_after(const Case& c, Stop stop, double start, double end, double E_ref) {
+    const double allowed = c.accuracy.energy * E_ref, change = std::abs(end - start);
+    if (kind_of(stop).exit_code != 0 || !(allowed > change) || change <= no_change * E_ref) return "";
+    return fmt::format(
+        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy changed by only "
+        "{:.3g}: ask for less than {:.1g}",
+        c.accuracy.energy, allowed, E_ref, change, change / E_ref);
 }
 
 }  // namespace tubule

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/run/error_scale.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/stationarity.hpp"
 
 namespace tubule {

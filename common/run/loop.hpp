@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "common/case/problem.hpp"
-#include "common/run/output_times.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/run/run_output.hpp"
 #include "common/run/simulation.hpp"

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 namespace tubule {
+
 void RunOutput::row(double time, std::span<const double> values) {
     if (!wants_row(time)) return;
     watch_.row(values);

@@ -1,10 +1,13 @@
-// What one run writes.
+// What one run writes, and when.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "common/case/case.hpp"
 #include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
 
@@ -40,6 +43,26 @@ private:
     const RunClock& clock_;
     bool reported_;
     double last_row_ = -1, last_frame_ = -1, last_checkpoint_ = 0, checkpoint_cost_ = 0;
+};
+
+// time.output and time.end, in order, as far as they are later than the begin; those not yet written are ahead.
+class OutputTimes {
+public:
+    explicit OutputTimes(const Case& c, double begin = 0) : times_(c.time.output) {
+        times_.push_back(c.time.end);
+        std::sort(times_.begin(), times_.end());
+        times_.erase(std::unique(times_.begin(), times_.end()), times_.end());
+        go_on_from(begin);
+    }
+    void go_on_from(double time) { next_ = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin(); }
+    bool done() const { return next_ == times_.size(); }
+    double next() const { return times_[next_]; }  // only if not done()
+    bool due(double time) const { return !done() && next() <= time; }
+    double pass() { return times_[next_++]; }
+
+private:
+    std::vector<double> times_;
+    std::size_t next_ = 0;
 };
 
 }  // namespace tubule

@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <string>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/run/energy_checks.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 
 namespace tubule::surface3d {
@@ -100,6 +102,94 @@ std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
     return StopReport{Stop::self_intersection, 0,
                       fmt::format("the surface intersects itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
                       "contact is not modelled: later results are invalid"};
+}
+
+namespace {
+
+// Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
+constexpr double creep = 10;    // increase since its lowest, of the asked accuracy
+constexpr double climb = 0.25;  // increase of the energy in a step, of the asked accuracy
+constexpr double worst_quality = 0.03, sharpest_turn = 2;
+
+std::string where(const Eigen::Vector3d& x) {
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
+}
+
+// A neck that becomes too thin for its triangles closes; one that is too thin initially may open.
+StopReport find_sharp_turn(const MeshTurn& turn, double time) {
+    const bool closes = turn.saddle && time > 0;
+    return {closes ? Stop::pinch_off : Stop::resolution_lost, time,
+            fmt::format("{} at {}: the normal turns by {:.2g} radians from node to node",
+                        closes        ? "a neck is closing"
+                        : turn.saddle ? "a neck is too thin for the triangles"
+                                      : "the surface bends too sharply",
+                        where(turn.where), turn.angle),
+            closes ? "use more elements to follow the neck further" : "use more elements"};
+}
+
+}  // namespace
+
+StopReport undefined_energy(const MotionMeasures& m, double time) {
+    return tubule::undefined_energy(m.domain, time, where(m.least_defined));
+}
+
+double least_neck(const Problem& c, double area) {
+    const bool by_size = std::holds_alternative<MeshFile>(c.shape) && !c.places.contains("accuracy.r_min");
+    return c.accuracy.r_min * (by_size ? std::sqrt(area / (4 * pi)) : 1);
+}
+
+std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
+    if (!(m.symbol > 0))
+        return StopReport{Stop::ill_posed, time,
+                          "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
+                          "the energy does not resist short waves there; more elements help only if these do not "
+                          "resolve the curvature"};
+    if (m.domain.is_small()) return undefined_energy(m, time);
+    if (!(m.neck_radius >= r_min))
+        return StopReport{Stop::pinch_off, time,
+                          fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
+                          "lower accuracy.r_min to follow the neck further"};
+    if (!(m.turn.angle <= sharpest_turn)) return find_sharp_turn(m.turn, time);
+    if (!(m.quality.worst > worst_quality))
+        return StopReport{Stop::mesh_lost, time,
+                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),
+                                      m.quality.worst),
+                          "use more elements or a shorter discretisation.relaxation"};
+    return std::nullopt;
+}
+
+std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step) {
+    if (rise <= climb * asked) return std::nullopt;
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the energy increased by {:.3g} of E_ref in a step of {:.3g}, which the model forbids", rise, step),
+        "use more elements or, if given, a smaller discretisation.step"};
+}
+
+std::optional<StopReport> find_slow_rise(double rise, double asked, double time) {
+    if (rise <= creep * asked) return std::nullopt;
+    return StopReport{Stop::resolution_lost, time,
+                      fmt::format("the energy gradually increased by {:.3g} of E_ref, which the model forbids", rise),
+                      "use more elements or, if given, a smaller discretisation.step"};
+}
+
+std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
+                                                 double time) {
+    auto found = find_impossible_curvature(o, mesh, allowed);
+    if (found) found->time = time, found->advice = "use more elements, or another discretisation.order";
+    return found;
+}
+
+std::optional<StopReport> find_drift(double change, double asked, double time) {
+    if (std::abs(change) <= most_drift * asked) return std::nullopt;
+    if (!std::isfinite(change))
+        return StopReport{Stop::resolution_lost, time, "the volume is not finite", "use more elements"};
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the relative volume drift is {:.3g}: on so few triangles, keeping the area does not keep the "
+                    "volume",
+                    std::abs(change)),
+        "use more elements"};
 }
 
 }  // namespace tubule::surface3d

@@ -1,9 +1,10 @@
-// Moving surfaces as frames of the result file and as restarts.
+// Moving surfaces as frames of the result file and as restarts, and the series of their runs.
 #pragma once
 
 #include <cmath>
 
 #include "common/result/result.hpp"
+#include "common/series/table.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/motion_settings.hpp"
@@ -68,5 +69,16 @@ struct MotionRestart {
 
 // The restart of a run with this scheme. Throws as RecordReader.
 MotionRestart motion_restart(const Record& record, Scheme scheme);
+
+// Values of a row of the series that are not measured on the surface.
+struct MotionRow {
+    const MotionState& state;
+    const MotionMeasures& measures;
+    double work, volume_drift, identity_defect, correction_energy, energy_error;
+    int elements;
+    double wall_seconds;
+};
+
+SeriesTable<MotionRow> motion_series(const Bending& energy);
 
 }  // namespace tubule::surface3d

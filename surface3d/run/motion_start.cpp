@@ -7,7 +7,6 @@
 
 #include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/error_scale.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -14,7 +14,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
-#include "surface3d/run/motion_series.hpp"
+#include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_start.hpp"
 
 namespace tubule::surface3d {

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/shapes/disturbed_shape.hpp"
 #include "surface3d/curvature/curvature.hpp"
+#include "surface3d/mesh/curved_mesh.hpp"
 
 namespace tubule::surface3d {
 
@@ -46,5 +48,15 @@ private:
     std::string time_scale_;
     int fields_ = 1;  // that a run solves for at the nodes
 };
+
+// Surfaces that a case brings as triangles, made larger and disturbed as it says.
+
+double area_of(const CurvedMesh& mesh);
+
+CurvedMesh scaled(CurvedMesh mesh, double factor);
+
+// Each node moved along the normal: of a sphere by the height in its direction from the centroid of the surface, of a
+// tube by that at its height and angle.
+CurvedMesh displaced(CurvedMesh mesh, const DisturbedShape& modes);
 
 }  // namespace tubule::surface3d

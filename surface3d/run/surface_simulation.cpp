@@ -13,7 +13,7 @@
 #include "surface3d/meshing/transfer.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/motion_error.hpp"
-#include "surface3d/run/motion_series.hpp"
+#include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_start.hpp"
 
 namespace tubule::surface3d {

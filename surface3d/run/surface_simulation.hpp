@@ -11,7 +11,7 @@
 #include "common/run/loop.hpp"
 #include "common/run/simulation.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
-#include "surface3d/run/motion_checks.hpp"
+#include "surface3d/run/guards.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/start.hpp"

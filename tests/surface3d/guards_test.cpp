@@ -8,13 +8,12 @@
 #include <map>
 #include <regex>
 
-#include "common/run/stall.hpp"
 #include "common/case/read.hpp"
+#include "common/run/stall.hpp"
 #include "common/shapes/capsule.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
-#include "surface3d/run/motion_checks.hpp"
 #include "tests/surface3d/errors.hpp"
 #include "tests/surface3d/motion.hpp"
 

@@ -306,7 +306,7 @@ TEST(InfSup, HoldsOnFinerMeshesOfEveryOrder) {
 }
 
 TEST(InfSup, HoldsOnEveryMeshThatARunAccepts) {
-    // Triangles nearly as bad as those that end a run (quality 0.03, motion_checks.cpp), long or irregular: no run
+    // Triangles nearly as bad as those that end a run (quality 0.03, guards.cpp), long or irregular: no run
     // comes to a mesh without this stability before it stops for its mesh.
     for (const int order : {2, 3, 4}) {
         const CurvedMesh thin = mesh_of(Tube{1, 6, {{0.2, 1, 0, 0}}}, tube_rings(1, 6, 2, 48), order);

@@ -6,7 +6,7 @@
 
 #include "common/result/record.hpp"
 #include "common/run/energy_trace.hpp"
-#include "common/run/output_times.hpp"
+#include "common/run/run_output.hpp"
 #include "tests/missing_fields.hpp"
 
 namespace tubule {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/case/read.hpp"
-#include "common/run/error_scale.hpp"
+#include "common/run/energy_checks.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace tubule {
