@@ -1,4 +1,4 @@
-// Checks that a triangle mesh is the boundary of one body, as everything built on it assumes.
+// A triangle mesh as the boundary of one body, which everything built on it assumes: checked, or repaired.
 #pragma once
 
 #include "surface3d/import/import_mesh.hpp"
@@ -6,13 +6,9 @@
 namespace tubule::surface3d {
 
 struct MeshReport {
-    std::size_t vertices = 0, edges = 0, triangles = 0;
-    int euler = 0, genus = 0;  // vertices - edges + triangles = 2 - 2 genus
+    int genus = 0;  // vertices - edges + triangles = 2 - 2 genus
     double area = 0, volume = 0;
-    double edge_min = 0, edge_max = 0;
-    double angle_min = 0;                         // of a triangle, degrees
-    double kink_max = 0;                          // between the normals of neighbours, degrees
-    std::size_t kink_first = 0, kink_second = 0;  // these neighbours
+    double kink_max = 0;  // between the normals of neighbours, degrees
 };
 
 // Checks that the triangles form one closed, oriented surface without self-contact, and that each has an area.
@@ -22,6 +18,14 @@ struct MeshReport {
 // they should not.
 // Drops vertices that no triangle uses and reverses a surface that faces inward; `notes` reports both, and also a
 // kink of more than 60 degrees, which a smooth surface resolved by the mesh cannot have.
-MeshReport close_mesh(ImportedMesh& imported);
+MeshReport close_mesh(ImportedMesh& in);
+
+// Repairs what scans and segmentations give, as far as there is one way to do it. In this order: drops triangles with a
+// vertex twice and repeated triangles; turns triangles that face the other way than their neighbours; drops specks,
+// pieces of less than a hundredth of the largest one's area; with `may_be_open`, separates sheets that touch in a
+// vertex of their borders; turns a closed surface that faces inward. `notes` reports each. Throws MeshError that names
+// the place: an edge of three or more triangles, a surface of one side, an open edge (unless it may be open), a vertex
+// where two closed sheets touch, a second piece. Whether triangles meet is not looked at.
+void repair_mesh(ImportedMesh& in, bool may_be_open);
 
 }  // namespace tubule::surface3d

@@ -5,35 +5,21 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "common/solve/pause.hpp"
-#include "surface3d/mesh/reference_triangle.hpp"
+#include "surface3d/curvature/polynomial_graph.hpp"
+#include "surface3d/import/mesh_smoothing.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 
 namespace tubule::surface3d {
 
 namespace {
 
-using Eigen::Matrix3d, Eigen::MatrixXd, Eigen::Vector2d, Eigen::Vector3d, Eigen::VectorXd;
+using Eigen::MatrixXd, Eigen::Vector3d, Eigen::VectorXd;
 
 // Neighbours whose normal is turned further than this (72 degrees) do not belong to a graph over the tangent plane.
 constexpr double cos_turn = 0.3;
-
-// Number of monomials x^i y^j, 1 <= i + j <= degree.
-int monomials(int degree) {
-    return (degree + 1) * (degree + 2) / 2 - 1;
-}
-
-// x, y, x^2, xy, y^2, x^3, ...
-void fill_monomials(int degree, const Vector2d& x, Eigen::Ref<VectorXd> out) {
-    out[0] = x[0];
-    out[1] = x[1];
-    for (int d = 2, k = 2; d <= degree; ++d, k += d) {
-        for (int j = 0; j < d; ++j) out[k + j] = out[k + j - d] * x[0];
-        out[k + d] = out[k - 1] * x[1];
-    }
-}
 
 // How a patch is fitted to its neighbourhood.
 struct Locality {
@@ -46,47 +32,24 @@ struct Locality {
 // Fast decay trades averaging for locality: on irregular samples of an ellipsoid and a bumpy sphere errors of
 // position, normal and curvature are half to a quarter of those of decay 1; from 12 on systems become ill-conditioned.
 Locality interpolating(int degree) {
-    return {degree, std::size_t(1.5 * monomials(degree)), 6, false};
+    return {degree, std::size_t(1.5 * (graph_coefficients(degree) - 1)), 6, false};
 }
 
 // The opposite: averages noise out.
 constexpr Locality smoothing{3, 30, 2, true};
 
-// z = p(x, y) in the frame about a vertex; lengths there are in units of `scale`.
+// The surface about a vertex.
 struct Patch {
-    Vector3d origin;
-    Matrix3d frame;  // rows: two tangents, normal
-    double scale = 1;
-    int degree = 1;
-    double constant = 0;  // p(0, 0); zero where it passes through the vertex
-    VectorXd coefficient;
-    Vector3d normal;  // of the patch at the vertex
-
-    Vector3d local(const Vector3d& x) const { return frame * (x - origin) / scale; }
-
-    // p and its gradient.
-    std::pair<double, Vector2d> value(const Vector2d& x) const {
-        VectorXd m(monomials(degree));
-        fill_monomials(degree, x, m);
-        Vector2d gradient(coefficient[0], coefficient[1]);
-        for (int d = 2, k = 2; d <= degree; ++d, k += d) {
-            // The monomials one degree below begin d places before; degree 0 is the number one.
-            for (int j = 0; j <= d; ++j) {
-                if (j < d) gradient[0] += coefficient[k + j] * (d - j) * m[k + j - d];
-                if (j > 0) gradient[1] += coefficient[k + j] * j * m[k + j - 1 - d];
-            }
-        }
-        return {constant + coefficient.dot(m), gradient};
-    }
+    PolynomialGraph graph;  // from the vertex: far from the origin of space its points keep their digits
+    Vector3d vertex, normal;
 
     // The t for which x + t direction is on the graph, nearest to t = 0; NaN if there is none within `reach`.
     double meet(const Vector3d& x, const Vector3d& direction, double reach) const {
-        const Vector3d start = local(x), step = frame * direction / scale;
         double t = 0;
         for (int iteration = 0; iteration < 30; ++iteration) {
-            const Vector3d y = start + t * step;
-            const auto [p, gradient] = value(y.head<2>());
-            const double change = (p - y[2]) / (step[2] - gradient.dot(step.head<2>()));
+            const Vector3d y = x - vertex + t * direction;
+            const SurfacePoint<double> p = graph.at(y);
+            const double change = (p.x - y).dot(p.normal) / direction.dot(p.normal);
             t += change;
             if (!(std::abs(t) <= reach)) return NAN;
             if (std::abs(change) < 1e-14 * reach) return t;
@@ -140,41 +103,35 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
 // The patch of the highest degree up to the wanted one that the points determine well.
 Patch fit_patch(const TriangleMesh& mesh, int v, const Vector3d& normal, const std::vector<int>& points,
                 const Locality& locality) {
-    Patch patch;
-    patch.origin = mesh.points[v];
     const Vector3d tangent = normal.unitOrthogonal();
-    patch.frame << tangent.transpose(), normal.cross(tangent).transpose(), normal.transpose();
-    double reach = 0;
-    for (const int w : points) reach = std::max(reach, (mesh.points[w] - patch.origin).norm());
-    patch.scale = reach;
+    PolynomialGraph graph{1, Vector3d::Zero(), tangent, normal.cross(tangent), normal, 0, {}};
+    graph.coefficient.setZero();
+    for (const int w : points) graph.scale = std::max(graph.scale, (mesh.points[w] - mesh.points[v]).norm());
     const int count = int(points.size());
-    int degree = locality.degree;
-    for (; degree > 1; --degree) {
-        const int n = monomials(degree);
-        if (count < n + n / 4) continue;
-        MatrixXd a = MatrixXd::Zero(count + 1, n + 1);
-        VectorXd b = VectorXd::Zero(count + 1), m(n);
-        for (int i = 0; i < count; ++i) {
-            const Vector3d x = patch.local(mesh.points[points[i]]);
-            const double weight = std::exp(-locality.decay * x.head<2>().squaredNorm());
-            fill_monomials(degree, x.head<2>(), m);
-            a.row(i).head(n) = weight * m.transpose();
-            a(i, n) = locality.free ? weight : 0;
-            b[i] = weight * x[2];
+    for (int degree = locality.degree; degree > 1; --degree) {
+        const int n = graph_coefficients(degree);
+        if (count < n - 1 + (n - 1) / 4) continue;
+        MatrixXd a = MatrixXd::Zero(count + 1, n);
+        VectorXd b = VectorXd::Zero(count + 1);
+        for (int row = 0; row < count; ++row) {
+            const Vector3d d = (mesh.points[points[row]] - mesh.points[v]) / graph.scale;
+            const double x = d.dot(graph.e1), y = d.dot(graph.e2);
+            const double weight = std::exp(-locality.decay * (x * x + y * y));
+            double power = weight;  // weight x^i y^j
+            for (int i = 0, column = 0; i <= degree; ++i, power *= x)
+                for (double j = 0, term = power; i + j <= degree; ++j, term *= y) a(row, column++) = term;
+            if (!locality.free) a(row, 0) = 0;
+            b[row] = weight * d.dot(normal);
         }
-        a(count, n) = 1;  // the vertex itself
+        a(count, 0) = 1;  // the vertex itself
         const Eigen::ColPivHouseholderQR<MatrixXd> qr(a);
         const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
         if (diagonal.minCoeff() < 1e-4 * diagonal.maxCoeff()) continue;
-        const VectorXd solution = qr.solve(b);
-        patch.coefficient = solution.head(n);
-        patch.constant = solution[n];
+        graph.degree = degree;
+        graph.coefficient.head(n) = qr.solve(b);
         break;
     }
-    patch.degree = degree;
-    if (degree == 1) patch.coefficient = Vector2d::Zero();
-    patch.normal = patch.frame.transpose() * Vector3d(-patch.coefficient[0], -patch.coefficient[1], 1).normalized();
-    return patch;
+    return {graph, mesh.points[v], graph.at(graph.origin).normal};
 }
 
 std::vector<Patch> fit_patches(const TriangleMesh& mesh, const Locality& locality) {
@@ -198,11 +155,10 @@ double mean_edge(const TriangleMesh& mesh) {
     return sum / (3 * double(mesh.triangles.size()));
 }
 
-[[noreturn]] void fail(const ImportedMesh& imported, std::size_t triangle, const std::string& message) {
-    throw MeshError(fmt::format(
-        "{}: {}: {}; the mesh is too coarse or too rough there for a smooth surface{}", imported.names.file,
-        triangle_name(imported, triangle), message,
-        imported.names.triangle_centre.empty() ? ": shape.remesh = NUMBER makes one of so many new triangles" : ""));
+[[noreturn]] void fail(const ImportedMesh& in, std::size_t triangle, const std::string& message) {
+    refuse(in, fmt::format("{}: {}; the mesh is too coarse or too rough there for a smooth surface{}",
+                           triangle_name(in, triangle), message,
+                           in.is_new ? "" : ": shape.remesh = NUMBER makes one of so many new triangles"));
 }
 
 // The place of the node at `barycentric` of a flat triangle; NaN when a patch is not met.
@@ -225,28 +181,20 @@ Vector3d curved_point(const TriangleMesh& mesh, const std::vector<Patch>& patche
 
 CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, const std::vector<Patch>& patches,
                        int k) {
-    CurvedMesh out{.order = k, .nodes = mesh.points, .cells = {}, .period = 0, .shifts = {}};
+    CurvedMesh out = flat_mesh(mesh, k);
+    std::vector<bool> placed(out.nodes.size());
     const auto indices = lattice(k);
-    std::map<std::array<int, 3>, int> edge_nodes;  // (low vertex, high vertex, how far from the low one)
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const auto& corner = mesh.triangles[t];
-        out.cells.insert(out.cells.end(), corner.begin(), corner.end());
-        for (int a = 3; a < int(indices.size()); ++a) {
-            const bool on_edge = a < 3 * k;
-            int number = int(out.nodes.size());
-            if (on_edge) {
-                const int edge = (a - 3) / (k - 1), i = corner[edge], j = corner[(edge + 1) % 3];
-                const int from_low = indices[a][i < j ? (edge + 1) % 3 : edge];
-                number = edge_nodes.try_emplace({std::min(i, j), std::max(i, j), from_low}, number).first->second;
-            }
-            out.cells.push_back(number);
-            if (number < int(out.nodes.size())) continue;
+    for (int t = 0; t < out.triangles(); ++t)
+        for (int a = 3; a < out.nodes_per_cell(); ++a) {
+            const int node = out.node(t, a);
+            if (placed[node]) continue;
+            placed[node] = true;
             const Vector3d barycentric = Vector3d(indices[a][0], indices[a][1], indices[a][2]) / k;
-            out.nodes.push_back(curved_point(mesh, patches, corner, barycentric));
-            if (!out.nodes.back().allFinite())
-                fail(imported, t, "the polynomials fitted at its vertices do not reach a common point above it");
+            out.nodes[node] = curved_point(mesh, patches, mesh.triangles[t], barycentric);
+            if (!out.nodes[node].allFinite())
+                fail(imported, std::size_t(t),
+                     "the polynomials fitted at its vertices do not reach a common point above it");
         }
-    }
     return out;
 }
 
@@ -254,60 +202,43 @@ CurvedMesh place_nodes(const ImportedMesh& imported, const TriangleMesh& mesh, c
 void check_surface(const ImportedMesh& imported, const TriangleMesh& mesh, const CurvedMesh& surface) {
     const TriangleMesh parts = node_triangles(surface);
     const std::size_t each = std::size_t(surface.order * surface.order);
-    const auto normal = [](const TriangleMesh& m, std::size_t t) {
-        const auto& [a, b, c] = m.triangles[t];
-        return Vector3d((m.points[b] - m.points[a]).cross(m.points[c] - m.points[a]));
-    };
-    for (std::size_t t = 0; t < parts.triangles.size(); ++t) {
-        if (!(normal(parts, t).dot(normal(mesh, t / each)) > 0)) fail(imported, t / each, "the fitted element folds");
-    }
-    if (const auto pair = first_intersection(parts)) {
+    for (std::size_t t = 0; t < parts.triangles.size(); ++t)
+        if (!(area_vector(parts, parts.triangles[t]).dot(area_vector(mesh, mesh.triangles[t / each])) > 0))
+            fail(imported, t / each, "the fitted element folds");
+    if (const auto pair = first_intersection(parts))
         fail(imported, pair->first / each,
              "the fitted element intersects that of " + triangle_name(imported, pair->second / each));
-    }
 }
 
 // How far each vertex is from the least-squares polynomial about it.
 std::vector<Vector3d> to_smooth(const TriangleMesh& mesh) {
     std::vector<Vector3d> out;
-    for (const Patch& patch : fit_patches(mesh, smoothing)) {
-        out.push_back(patch.scale * patch.constant * patch.frame.row(2).transpose());
-    }
+    for (const auto& [graph, vertex, normal] : fit_patches(mesh, smoothing))
+        out.push_back(graph.scale * graph.coefficient[0] * graph.normal);
     return out;
 }
 
-double root_mean_square(const std::vector<Vector3d>& vectors) {
-    double sum = 0;
-    for (const Vector3d& x : vectors) sum += x.squaredNorm();
-    return std::sqrt(sum / double(vectors.size()));
-}
-
-// Smooths `times` times and reports how far the vertices moved.
-TriangleMesh smoothed(const TriangleMesh& original, int times, FitReport& report) {
-    TriangleMesh mesh = original;
+// Smoothed `times` times.
+TriangleMesh smoothed(TriangleMesh mesh, int times, FitReport& report) {
     std::vector<Vector3d> change = to_smooth(mesh);
-    report.roughness = root_mean_square(change) / mean_edge(mesh);
-    if (times == 0 && report.roughness > 0.01) {
+    double squares = 0;
+    for (const Vector3d& x : change) squares += x.squaredNorm();
+    report.roughness = std::sqrt(squares / double(change.size())) / mean_edge(mesh);
+    if (times == 0 && report.roughness > 0.01)
         report.notes.push_back(
             fmt::format("The vertices are {:.2g} of an edge (root mean square) off the smooth surface "
                         "through their neighbours: the mesh is coarse, or it is noisy; shape.remesh makes a smooth one "
                         "of new triangles.",
                         report.roughness));
-    }
     for (int i = 0; i < times; ++i) {
         if (i > 0) change = to_smooth(mesh);
         for (std::size_t v = 0; v < change.size(); ++v) mesh.points[v] += change[v];
     }
-    for (std::size_t v = 0; v < change.size(); ++v) {
-        change[v] = mesh.points[v] - original.points[v];
-        report.moved_max = std::max(report.moved_max, change[v].norm());
-    }
-    report.moved_rms = root_mean_square(change);
     return mesh;
 }
 
 void count_reduced(const std::vector<Patch>& patches, int degree, FitReport& report) {
-    for (const Patch& patch : patches) report.reduced += patch.degree < degree;
+    for (const Patch& patch : patches) report.reduced += patch.graph.degree < degree;
     if (report.reduced == 0) return;
     report.notes.push_back(
         fmt::format("At {} of {} vertices the neighbourhood does not determine a polynomial of degree {}; a lower "
@@ -317,32 +248,7 @@ void count_reduced(const std::vector<Patch>& patches, int degree, FitReport& rep
 
 }  // namespace
 
-TriangleMesh node_triangles(const CurvedMesh& surface) {
-    const auto indices = lattice(surface.order);
-    const int k = surface.order;
-    std::map<std::array<int, 3>, int> number;
-    for (int a = 0; a < int(indices.size()); ++a) number[indices[a]] = a;
-    TriangleMesh out;
-    out.points = surface.nodes;
-    for (int cell = 0; cell < surface.triangles(); ++cell) {
-        const auto node = [&](int i, int j) { return surface.node(cell, number.at({k - i - j, i, j})); };
-        for (int i = 0; i < k; ++i) {
-            for (int j = 0; i + j < k; ++j) {
-                out.triangles.push_back({node(i, j), node(i + 1, j), node(i, j + 1)});
-                if (i + j < k - 1) out.triangles.push_back({node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
-            }
-        }
-    }
-    return out;
-}
-
 Fit fit_surface(const ImportedMesh& imported, const FitOptions& options) {
-    if (options.order < 2 || options.order > 4) {
-        throw std::invalid_argument(fmt::format("fit_surface: order must be 2, 3 or 4, not {}", options.order));
-    }
-    if (options.smoothing < 0 || options.smoothing > 100) {
-        throw std::invalid_argument(fmt::format("fit_surface: smoothing must be 0 to 100, not {}", options.smoothing));
-    }
     const int degree = options.order + 1;
     Fit fit;
     const TriangleMesh mesh = smoothed(imported.mesh, options.smoothing, fit.report);

@@ -12,9 +12,7 @@ struct FitOptions {
 };
 
 struct FitReport {
-    double roughness = 0;  // of the vertices as given: how far one smoothing moves them, rms, over the mean edge
-    double moved_rms = 0;  // of the vertices, by all smoothing passes, in the units of the mesh
-    double moved_max = 0;
+    double roughness = 0;     // of the vertices as given: how far one smoothing moves them, rms, over the mean edge
     std::size_t reduced = 0;  // vertices whose neighbourhood does not determine a polynomial of the full degree
     std::vector<std::string> notes;
 };
@@ -38,10 +36,7 @@ struct Fit {
 // One pass changes a smooth surface by O(h^4).
 //
 // Throws MeshError naming the triangle where no such surface exists: no intersection in reach, an element that folds,
-// or elements that intersect where their flat triangles do not. std::invalid_argument for a bad order or smoothing.
+// or elements that intersect where their flat triangles do not. std::invalid_argument for a bad order.
 Fit fit_surface(const ImportedMesh& imported, const FitOptions& options);
-
-// The flat triangles between the nodes of the curved ones, order^2 in each, those of a cell together.
-TriangleMesh node_triangles(const CurvedMesh& surface);
 
 }  // namespace tubule::surface3d

@@ -23,27 +23,35 @@ struct Place {
     std::size_t line = 0, column = 0, byte = 0;
 };
 
-// Names of the elements of a mesh in messages. Triangles are named by number and place, vertices by number
-// and coordinates, both counted as the file does (OBJ from 1, the others from 0).
-struct MeshNames {
-    std::string file = "mesh";
-    std::int64_t first = 0;                                    // number of the first vertex and triangle
-    std::vector<std::int64_t> vertex_number, triangle_number;  // empty: as in memory
-    std::vector<Place> triangle_place;                         // empty: without
-    std::vector<Eigen::Vector3d> triangle_centre;  // of triangles that are not the file's: they are named by these
-
-    // Writes the numbers of this many elements down if they are those in memory.
-    void number_vertices(std::size_t count);
-    void number_triangles(std::size_t count);
+// Messages name triangles by number and place, vertices by number and coordinates, both counted as the file does (OBJ
+// from 1, the others from 0).
+struct TriangleSource {
+    std::int64_t number = 0;
+    Place place = {};  // byte 0 of line 0: none
 };
 struct ImportedMesh {
     TriangleMesh mesh;
-    MeshNames names;
-    std::vector<std::string> notes;  // what was changed, in full sentences
+    std::string file = "mesh";
+    std::vector<std::int64_t> vertex_number;
+    std::vector<TriangleSource> source;  // of each triangle
+    bool is_new = false;                 // the triangles are not the file's: messages name them by coordinates
+    std::vector<std::string> notes;      // what was changed, in full sentences
 };
-std::string triangle_name(const ImportedMesh& mesh, std::size_t triangle);
-std::string vertex_name(const ImportedMesh& mesh, int vertex);
-[[noreturn]] void refuse(const ImportedMesh& mesh, const std::string& message);  // a MeshError that names the file
+// A mesh in memory, numbered from `first`.
+ImportedMesh imported(TriangleMesh mesh, const std::string& file = "mesh", std::int64_t first = 0);
+
+std::string triangle_name(const ImportedMesh& in, std::size_t triangle);
+std::string vertex_name(const ImportedMesh& in, int vertex);
+[[noreturn]] void refuse(const ImportedMesh& in, const std::string& message);  // a MeshError that names the file
+
+// Drop the triangles, or the vertices (of which no triangle has any), that are not to be kept. Return how many.
+std::size_t keep_triangles(ImportedMesh& in, const std::vector<bool>& keep);
+std::size_t keep_vertices(ImportedMesh& in, const std::vector<bool>& keep);
+
+// Whether a triangle has a vertex twice.
+inline bool has_vertex_twice(const std::array<int, 3>& t) {
+    return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
 
 // The triangles of a file; the extension gives the format (.obj .off .ply .stl, in either case). Polygons become
 // triangles. Vertices at the same place become one; so do those nearer than `weld` (in the units of the file), and

@@ -5,7 +5,6 @@
 #include <array>
 
 #include "surface3d/import/import_formats.hpp"
-#include "surface3d/import/import_text.hpp"
 
 namespace tubule::surface3d {
 

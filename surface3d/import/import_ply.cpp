@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "surface3d/import/import_formats.hpp"
-#include "surface3d/import/import_text.hpp"
 
 namespace tubule::surface3d {
 
@@ -119,8 +118,7 @@ public:
         }
         if (data_.size() - position_ < type.size) fail({0, 0, data_.size()}, "the file ends; expected " + what);
         std::array<char, sizeof(double)> raw;
-        const auto end = std::copy_n(data_.data() + position_, type.size, raw.begin());
-        if (swap_) std::reverse(raw.begin(), end);
+        for (std::size_t i = 0; i < type.size; ++i) raw[swap_ ? type.size - 1 - i : i] = data_[position_ + i];
         const Value value{type.value(raw.data()), {0, 0, position_}};
         position_ += type.size;
         return value;
@@ -135,9 +133,7 @@ public:
         }
     }
 
-    [[noreturn]] void fail(const Place& place, const std::string& message) const {
-        throw MeshError(at(name_, place) + message);
-    }
+    [[noreturn]] void fail(const Place& place, const std::string& message) const { refuse_at(name_, place, message); }
 
 private:
     const std::string& name_;
@@ -147,31 +143,28 @@ private:
     bool ascii_, swap_;
 };
 
-void read_vertex(Body& body, const Element& element, const std::string& what, FileMesh& mesh) {
-    Eigen::Vector3d& point = mesh.points.emplace_back();
-    for (const Property& property : element.properties) {
-        const Value value = body.next(property.first(), what);
-        for (double i = 0; property.count && i < value.value; ++i) body.next(*property.type, what);
-        if (property.count || property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
-        if (!std::isfinite(value.value)) body.fail(value.place, "a coordinate is not a finite number");
-        point[property.name[0] - 'x'] = value.value;
-    }
+bool is_coordinate(const Property& p) {
+    return !p.count && (p.name == "x" || p.name == "y" || p.name == "z");
 }
 
 bool is_corner_list(const Property& p) {
     return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
 }
 
-void read_face(Body& body, const Element& element, const std::string& what, FileMesh& mesh) {
+void read_element(Body& body, const Element& element, const std::string& what, FileMesh& mesh) {
+    const bool vertex = element.name == "vertex", face = element.name == "face";
+    if (vertex) mesh.points.emplace_back();
     for (const Property& property : element.properties) {
-        const Value count = body.next(property.first(), what);
-        if (!property.count) continue;
-        const bool corners = is_corner_list(property);
-        if (corners && count.value < 3) {
-            body.fail(count.place, fmt::format("a face needs three vertices, this one has {}", count.value));
+        const Value first = body.next(property.first(), what);
+        if (vertex && is_coordinate(property)) {
+            if (!std::isfinite(first.value)) body.fail(first.place, "a coordinate is not a finite number");
+            mesh.points.back()[property.name[0] - 'x'] = first.value;
         }
+        const bool corners = face && is_corner_list(property);
+        if (corners && first.value < 3)
+            body.fail(first.place, fmt::format("a face needs three vertices, this one has {}", first.value));
         if (corners) mesh.faces.emplace_back();
-        for (double i = 0; i < count.value; ++i) {
+        for (double i = 0; property.count && i < first.value; ++i) {
             const Value value = body.next(*property.type, what);
             if (corners) mesh.faces.back().push_back({std::int64_t(value.value), value.place});
         }
@@ -187,7 +180,7 @@ void check_header(const TextReader& reader, const Header& header) {
         vertex_elements += element.name == "vertex";
         face_elements += element.name == "face";
         for (const Property& p : element.properties) {
-            if (element.name == "vertex" && !p.count) coordinates += p.name == "x" || p.name == "y" || p.name == "z";
+            coordinates += element.name == "vertex" && is_coordinate(p);
             if (element.name == "face" && is_corner_list(p)) {
                 if (p.type->is_real) reader.fail_line("the vertex indices of faces must have an integer type");
                 ++corner_lists;
@@ -211,22 +204,9 @@ FileMesh read_ply(const std::string& name, std::string_view data) {
     if (header.format == "ascii") text.next_line();
     Body body(name, data, text, header.format);
     FileMesh mesh;
-    for (const Element& element : header.elements) {
-        const bool vertex = element.name == "vertex", face = element.name == "face";
-        for (std::int64_t i = 0; i < element.count; ++i) {
-            const std::string what = fmt::format("{} {} of {}", element.name, i, element.count);
-            if (vertex) {
-                read_vertex(body, element, what, mesh);
-            } else if (face) {
-                read_face(body, element, what, mesh);
-            } else {
-                for (const Property& property : element.properties) {
-                    const Value value = body.next(property.first(), what);
-                    for (double j = 0; property.count && j < value.value; ++j) body.next(*property.type, what);
-                }
-            }
-        }
-    }
+    for (const Element& element : header.elements)
+        for (std::int64_t i = 0; i < element.count; ++i)
+            read_element(body, element, fmt::format("{} {} of {}", element.name, i, element.count), mesh);
     body.expect_end();
     return mesh;
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "surface3d/import/import_formats.hpp"
-#include "surface3d/import/import_text.hpp"
 
 namespace tubule::surface3d {
 
@@ -34,9 +33,7 @@ FileMesh read_binary(const std::string& name, std::string_view data) {
             for (std::size_t d = 0; d < 3; ++d) {
                 const std::size_t byte = begin + 12 * corner + 4 * d;
                 point[d] = std::bit_cast<float>(little_u32(data, byte));
-                if (!std::isfinite(point[d])) {
-                    throw MeshError(at(name, {0, 0, byte}) + "a coordinate is not a finite number");
-                }
+                if (!std::isfinite(point[d])) refuse_at(name, {0, 0, byte}, "a coordinate is not a finite number");
             }
             add_corner(mesh, point, {0, 0, begin});
         }
@@ -92,13 +89,12 @@ FileMesh read_stl(const std::string& name, std::string_view data) {
     const std::size_t begin = std::min(data.find_first_not_of(" \t\r\n"), data.size());
     const bool text = is_keyword(data.substr(begin, 5), "solid") && data.substr(0, 1000).find('\0') == data.npos;
     if (text) return read_ascii(name, data);
-    if (!has_header) {
-        throw MeshError(at(name, {0, 0, data.size()}) +
-                        "not an STL file: it neither begins with 'solid' nor has the 84-byte header of binary STL");
-    }
-    throw MeshError(at(name, {0, 0, 80}) +
-                    fmt::format("the header declares {} facets, which need {} bytes, but the file has {}", facets,
-                                stl_header + stl_facet * facets, data.size()));
+    if (!has_header)
+        refuse_at(name, {0, 0, data.size()},
+                  "not an STL file: it neither begins with 'solid' nor has the 84-byte header of binary STL");
+    refuse_at(name, {0, 0, 80},
+              fmt::format("the header declares {} facets, which need {} bytes, but the file has {}", facets,
+                          stl_header + stl_facet * facets, data.size()));
 }
 
 }  // namespace tubule::surface3d

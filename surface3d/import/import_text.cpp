@@ -1,10 +1,10 @@
-#include "surface3d/import/import_text.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+
+#include "surface3d/import/import_formats.hpp"
 
 namespace tubule::surface3d {
 
@@ -28,9 +28,9 @@ bool is_space(char c) {
 
 }  // namespace
 
-std::string at(const std::string& name, const Place& place) {
-    if (place.line == 0) return fmt::format("{}: byte {}: ", name, place.byte);
-    return fmt::format("{}:{}:{}: ", name, place.line, place.column);
+void refuse_at(const std::string& name, const Place& place, const std::string& message) {
+    throw MeshError(place.line == 0 ? fmt::format("{}: byte {}: {}", name, place.byte, message)
+                                    : fmt::format("{}:{}:{}: {}", name, place.line, place.column, message));
 }
 
 TextReader::TextReader(std::string name, std::string_view text, char comment)
@@ -94,7 +94,7 @@ void TextReader::fail(const Word& word, const std::string& message) const {
     for (char& c : printable) {
         if (c < ' ' || c > '~') c = '?';
     }
-    throw MeshError(at(name_, word.place) + printable);
+    refuse_at(name_, word.place, printable);
 }
 
 void TextReader::fail_line(const std::string& message) const {
@@ -102,7 +102,7 @@ void TextReader::fail_line(const std::string& message) const {
 }
 
 void TextReader::fail_end(const std::string& what) const {
-    throw MeshError(at(name_, {line_ + 1, 1, text_.size()}) + "the file ends; expected " + what + "; is it complete?");
+    refuse_at(name_, {line_ + 1, 1, text_.size()}, "the file ends; expected " + what + "; is it complete?");
 }
 
 bool is_keyword(std::string_view word, std::string_view lower) {

@@ -21,10 +21,6 @@ double half_cotangent(const TriangleMesh& mesh, const std::array<int, 3>& t, int
     return u.dot(v) / (2 * u.cross(v).norm());
 }
 
-Vector3d area_vector(const TriangleMesh& mesh, const std::array<int, 3>& t) {
-    return (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]) / 2;
-}
-
 // Linear elements: the stiffness matrix, and a third of the area of the triangles at each vertex.
 struct Laplacian {
     Sparse stiffness;
@@ -49,11 +45,6 @@ Laplacian laplacian(const TriangleMesh& mesh) {
     return out;
 }
 
-Sparse with_diagonal(Sparse matrix, const Eigen::VectorXd& added) {
-    for (Eigen::Index i = 0; i < added.size(); ++i) matrix.coeffRef(i, i) += added[i];
-    return matrix;
-}
-
 Columns normal_columns(const TriangleMesh& mesh) {
     Columns n = Columns::Zero(Eigen::Index(mesh.points.size()), 3);
     for (const auto& t : mesh.triangles)
@@ -68,7 +59,7 @@ Columns filtered(const Laplacian& of, double halved, const Columns& fields) {
     const double lambda = halved / (2 * std::numbers::pi);
     const Sparse half = of.area.cwiseSqrt().cwiseInverse().asDiagonal() * of.stiffness;
     SparseCholesky solver;
-    solver.factor(with_diagonal(std::pow(lambda, 4) * Sparse(half.transpose() * half), of.area));
+    solver.factor(std::pow(lambda, 4) * Sparse(half.transpose() * half) + Sparse(of.area.asDiagonal()));
     return solver.solve(Columns(of.area.asDiagonal() * fields));
 }
 
@@ -111,7 +102,7 @@ TriangleMesh smoothed(const TriangleMesh& mesh, double halved) {
     // Where waves of the length are concerned this holds the points by less than 3 percent, farther ones fast.
     const Eigen::VectorXd hold = of.area / (halved * halved);
     SparseCholesky solver;
-    solver.factor(with_diagonal(of.stiffness, hold));
+    solver.factor(of.stiffness + Sparse(hold.asDiagonal()));
     const Columns normal = filtered(of, halved, normal_columns(mesh));
     return points.moved(mesh, solver.solve(Columns(projected_edges(mesh, normal) + hold.asDiagonal() * points.x)));
 }
@@ -131,6 +122,14 @@ TriangleMesh with_volume(const TriangleMesh& mesh, double volume) {
             out.points[i] = mesh.points[i] + moved * normal.row(Eigen::Index(i)).transpose();
     }
     return out;
+}
+
+Vector3d area_vector(const TriangleMesh& mesh, const std::array<int, 3>& t) {
+    return (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]) / 2;
+}
+
+double kink_between(const Vector3d& a, const Vector3d& b) {
+    return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
 double mesh_area(const TriangleMesh& mesh) {

@@ -22,6 +22,11 @@ TriangleMesh unfolded(const TriangleMesh& mesh, double halved);
 // The points moved along the normals, all equally far, until the mesh bounds this volume.
 TriangleMesh with_volume(const TriangleMesh& mesh, double volume);
 
+// Half the cross product of two sides: normal, as long as the area.
+Eigen::Vector3d area_vector(const TriangleMesh& mesh, const std::array<int, 3>& triangle);
+// The angle between two such normals, in degrees.
+double kink_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 double mesh_area(const TriangleMesh& mesh);
 double mesh_volume(const TriangleMesh& mesh);  // of a closed mesh, > 0 if it faces outward
 // The edge length of `triangles` equilateral triangles of this total area.

@@ -1,5 +1,6 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -77,6 +78,47 @@ TriangleMesh corner_triangles(const CurvedMesh& mesh) {
         if (mesh.period > 0) corners.shifts.push_back(shifts);
     }
     return corners;
+}
+
+namespace {
+
+// The triangles between neighbouring nodes of a cell, counter-clockwise.
+std::vector<std::array<int, 3>> lattice_triangles(int order) {
+    const auto nodes = lattice(order);
+    const auto at = [&](int j, int l) {
+        return static_cast<int>(std::find(nodes.begin(), nodes.end(), std::array<int, 3>{order - j - l, j, l}) -
+                                nodes.begin());
+    };
+    std::vector<std::array<int, 3>> out;
+    for (int j = 0; j < order; ++j)
+        for (int l = 0; j + l < order; ++l) {
+            out.push_back({at(j, l), at(j + 1, l), at(j, l + 1)});
+            if (j + l + 1 < order) out.push_back({at(j + 1, l), at(j + 1, l + 1), at(j, l + 1)});
+        }
+    return out;
+}
+
+}  // namespace
+
+TriangleMesh node_triangles(const CurvedMesh& mesh, int images) {
+    TriangleMesh flat;
+    std::map<std::array<int, 2>, int> number;  // of a node, in the period where a cell sees it
+    const auto small = lattice_triangles(mesh.order);
+    for (int image = 0; image < images; ++image)
+        for (int cell = 0; cell < mesh.triangles(); ++cell)
+            for (const auto& corners : small) {
+                std::array<int, 3> triangle;
+                for (int c = 0; c < 3; ++c) {
+                    const int seen = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
+                    const auto [found, is_new] = number.try_emplace({mesh.node(cell, corners[c]), seen + image},
+                                                                    static_cast<int>(flat.points.size()));
+                    const Eigen::Vector3d up = image * mesh.period * Eigen::Vector3d::UnitZ();
+                    if (is_new) flat.points.push_back(mesh.position(cell, corners[c]) + up);
+                    triangle[c] = found->second;
+                }
+                flat.triangles.push_back(triangle);
+            }
+    return flat;
 }
 
 CurvedMesh with_order(const CurvedMesh& mesh, int order) {

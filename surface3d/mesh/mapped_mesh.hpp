@@ -14,6 +14,10 @@ CurvedMesh flat_mesh(const TriangleMesh& base, int order);
 // The flat triangles between the vertices, cell by cell; vertices are numbered as the cells come to them.
 TriangleMesh corner_triangles(const CurvedMesh& mesh);
 
+// The flat triangles between the nodes, order^2 in each cell, those of a cell together; of a tube, which is cut open,
+// `images` periods.
+TriangleMesh node_triangles(const CurvedMesh& mesh, int images = 1);
+
 // The interpolant of another order of the same triangles.
 CurvedMesh with_order(const CurvedMesh& mesh, int order);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 
 #include "common/solve/parallel.hpp"
@@ -317,15 +316,6 @@ std::variant<Remeshed, StopReport> place(const Work& w, const PatchRecovery& rec
     return out;
 }
 
-// A vertex that has itself or another vertex twice as its neighbour, as on a tube of fewer than three rings.
-bool joins_twice(const TriangleMesh& mesh) {
-    std::set<std::array<int, 2>> edges;
-    for (const auto& t : mesh.triangles)
-        for (int c = 0; c < 3; ++c)
-            if (t[c] == t[(c + 1) % 3] || !edges.insert({t[c], t[(c + 1) % 3]}).second) return true;
-    return false;
-}
-
 void check(const CurvedMesh& mesh, const Eigen::MatrixXd& fields, const RemeshOptions& o) {
     if (fields.rows() > 0 && fields.cols() != mesh.size())
         throw std::invalid_argument(
@@ -345,9 +335,12 @@ std::variant<Remeshed, StopReport> remesh(const CurvedMesh& mesh, const Eigen::M
     if (!(before.worst > 0))
         return lost(Stop::mesh_lost, fmt::format("triangle {} folds", before.worst_cell), before.where,
                     "remesh earlier");
-    if (joins_twice(corner_triangles(mesh)))
+    try {
+        HalfEdges{corner_triangles(mesh)};
+    } catch (const std::invalid_argument&) {
         return StopReport{Stop::mesh_lost, 0, "a tube with fewer than three rings of triangles cannot be remeshed",
                           "use more elements"};
+    }
     const PatchRecovery recovery(mesh);
     const CurvatureField curvature = recovery.nodal(mesh);
     const MeshSizes sizes = mesh_sizes(mesh, curvature.H, curvature.K, options);

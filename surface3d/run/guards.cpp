@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <string>
 
 #include "common/geometry/profile_point.hpp"
 #include "common/run/energy_checks.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/self_intersection.hpp"
 
 namespace tubule::surface3d {
@@ -42,22 +41,6 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
 
 namespace {
 
-// The triangles between neighbouring nodes of a cell, counter-clockwise.
-std::vector<std::array<int, 3>> lattice_triangles(int order) {
-    const auto nodes = lattice(order);
-    const auto at = [&](int j, int l) {
-        return static_cast<int>(std::find(nodes.begin(), nodes.end(), std::array<int, 3>{order - j - l, j, l}) -
-                                nodes.begin());
-    };
-    std::vector<std::array<int, 3>> out;
-    for (int j = 0; j < order; ++j)
-        for (int l = 0; j + l < order; ++l) {
-            out.push_back({at(j, l), at(j + 1, l), at(j, l + 1)});
-            if (j + l + 1 < order) out.push_back({at(j + 1, l), at(j + 1, l + 1), at(j, l + 1)});
-        }
-    return out;
-}
-
 // The number of periods of a tube among which are all triangles that may meet.
 int images(const CurvedMesh& mesh) {
     if (mesh.period == 0) return 1;
@@ -70,32 +53,10 @@ int images(const CurvedMesh& mesh) {
     return 1 + static_cast<int>((high - low) / mesh.period);
 }
 
-// The flat triangles between the nodes; of a tube, which is cut open, `images` periods.
-TriangleMesh flattened(const CurvedMesh& mesh, int images) {
-    TriangleMesh flat;
-    std::map<std::array<int, 2>, int> number;  // of a node, in the period where a cell sees it
-    const auto small = lattice_triangles(mesh.order);
-    for (int image = 0; image < images; ++image)
-        for (int cell = 0; cell < mesh.triangles(); ++cell)
-            for (const auto& corners : small) {
-                std::array<int, 3> triangle;
-                for (int c = 0; c < 3; ++c) {
-                    const int seen = mesh.period > 0 ? mesh.shifts[cell * mesh.nodes_per_cell() + corners[c]] : 0;
-                    const auto [found, is_new] = number.try_emplace({mesh.node(cell, corners[c]), seen + image},
-                                                                    static_cast<int>(flat.points.size()));
-                    const Eigen::Vector3d up = image * mesh.period * Eigen::Vector3d::UnitZ();
-                    if (is_new) flat.points.push_back(mesh.position(cell, corners[c]) + up);
-                    triangle[c] = found->second;
-                }
-                flat.triangles.push_back(triangle);
-            }
-    return flat;
-}
-
 }  // namespace
 
 std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
-    const TriangleMesh flat = flattened(mesh, images(mesh));
+    const TriangleMesh flat = node_triangles(mesh, images(mesh));
     const auto pair = first_intersection(flat);
     if (!pair) return std::nullopt;
     const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);

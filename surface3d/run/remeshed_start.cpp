@@ -16,7 +16,6 @@
 #include "surface3d/fem/projection.hpp"
 #include "surface3d/import/import_cgal.hpp"
 #include "surface3d/import/import_fit.hpp"
-#include "surface3d/import/import_repair.hpp"
 #include "surface3d/import/mesh_distance.hpp"
 #include "surface3d/import/mesh_smoothing.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
@@ -64,8 +63,8 @@ struct Body {
 TriangleMesh filled(const ImportedMesh& file, std::vector<std::string>& notes) {
     const cgal::FilledHoles filled = cgal::fill_holes(file.mesh);
     if (filled.left > 0)
-        throw MeshError(fmt::format("{}: {} of {} holes cannot be filled; shape.wrap = LENGTH may help",
-                                    file.names.file, filled.left, filled.left + filled.holes));
+        throw MeshError(fmt::format("{}: {} of {} holes cannot be filled; shape.wrap = LENGTH may help", file.file,
+                                    filled.left, filled.left + filled.holes));
     if (filled.holes > 0)
         notes.push_back(fmt::format("{} holes were filled; the longest border, at {}, measures {:.3g}.", filled.holes,
                                     place(filled.at), filled.longest));
@@ -83,13 +82,12 @@ void check_effort_of_wrapping(const ImportedMesh& file, double gap) {
 }
 
 Body body_of(ImportedMesh& file, const MeshFile& shape) {
-    Body body{file.names.file, {}, 0, {}};
+    Body body{file.file, {}, 0, {}};
     if (shape.wrap) {
         check_effort_of_wrapping(file, *shape.wrap);
         const double offset = wrap_offset * *shape.wrap;
-        ImportedMesh around;
-        around.names.file = file.names.file;
-        around.mesh = cgal::wrap(file.mesh, *shape.wrap / 2, offset);
+        ImportedMesh around = imported(cgal::wrap(file.mesh, *shape.wrap / 2, offset), file.file);
+        around.is_new = true;
         repair_mesh(around, false);
         body.volume = mesh_volume(around.mesh) - offset * mesh_area(around.mesh);
         body.mesh = std::move(around.mesh);
@@ -117,19 +115,15 @@ Body body_of(ImportedMesh& file, const MeshFile& shape) {
 // The creased edges of a mesh, as triangles without area.
 TriangleMesh creases_of(const TriangleMesh& mesh, double& sharpest) {
     std::map<std::pair<int, int>, std::size_t> left;
-    std::vector<Vector3d> normal;
     TriangleMesh out;
     out.points = mesh.points;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const auto& c = mesh.triangles[t];
-        const auto& x = mesh.points;
-        normal.push_back((x[c[1]] - x[c[0]]).cross(x[c[2]] - x[c[0]]));
         for (int i = 0; i < 3; ++i) {
             const auto other = left.find({c[(i + 1) % 3], c[i]});
             left[{c[i], c[(i + 1) % 3]}] = t;
             if (other == left.end()) continue;
-            const Vector3d& n = normal[other->second];
-            const double kink = std::atan2(n.cross(normal[t]).norm(), n.dot(normal[t])) * 180 / EIGEN_PI;
+            const double kink = kink_between(area_vector(mesh, mesh.triangles[other->second]), area_vector(mesh, c));
             sharpest = std::max(sharpest, kink);
             if (kink > crease) out.triangles.push_back({c[i], c[(i + 1) % 3], c[(i + 1) % 3]});
         }
@@ -185,10 +179,8 @@ void check_crossing(const Body& body, const TriangleMesh& smooth, double length,
 
 // The curved surface through the vertices of a mesh that is not the file's.
 CurvedMesh curved(const std::string& name, const TriangleMesh& mesh, int order) {
-    ImportedMesh made;
-    made.mesh = mesh, made.names.file = name;
-    for (const auto& [a, b, c] : mesh.triangles)
-        made.names.triangle_centre.push_back((mesh.points[a] + mesh.points[b] + mesh.points[c]) / 3);
+    ImportedMesh made = imported(mesh, name);
+    made.is_new = true;
     close_mesh(made);
     return fit_surface(made, {.order = order}).surface;
 }
@@ -211,16 +203,7 @@ std::optional<double> angle_for(const CurvedMesh& surface, int triangles) {
 
 CurvedMesh with_volume(CurvedMesh mesh, double volume) {
     const SurfaceSpace space(mesh);
-    std::vector<QuadraturePoint> points;
-    for (const auto& [i, j, l] : lattice(mesh.order)) points.push_back({1.0 * j / mesh.order, 1.0 * l / mesh.order, 0});
-    const Tabulation at_nodes(mesh.order, points);
-    VectorField normal = VectorField::Zero(3, mesh.size());
-    for (int cell = 0; cell < mesh.triangles(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        for (int a = 0; a < mesh.nodes_per_cell(); ++a)
-            normal.col(mesh.node(cell, a)) += tangent_point(X, at_nodes, a).normal;
-    }
-    normal.colwise().normalize();
+    const VectorField normal = PatchRecovery(mesh).nodal(mesh).normal;
     for (int step = 0; step < 4; ++step) {
         const Extent now = extent(space, mesh);
         for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] += (volume - now.volume) / now.area * normal.col(i);
@@ -237,10 +220,7 @@ std::optional<std::string> why_unusable(const CurvedMesh& surface) {
     const MeshTurn turn = mesh_turn(surface, mesh_quality(surface), fields.H, fields.K);
     if (turn.angle > sharpest_start)
         return fmt::format("the normal turns by {:.2g} radians from node to node at {}", turn.angle, place(turn.where));
-    const TriangleMesh parts = node_triangles(surface);
-    if (const auto pair = first_intersection(parts))
-        return fmt::format("parts of the surface intersect at {}",
-                           place(parts.points[parts.triangles[pair->first][0]]));
+    if (const auto met = find_self_intersection(surface)) return met->message;
     return std::nullopt;
 }
 
@@ -290,9 +270,9 @@ std::string distance_note(const TriangleMesh& file, const TriangleMesh& surface,
         all.add(sample);
         if (creases.triangles.empty() || to_crease(sample.at) > length / 2) smooth.add(sample);
     }
-    std::string note =
-        fmt::format("The start is at most {:.3g} from the file, {} of its size {:.4g}, at {}; {} rms.", all.distance,
-                    percent(all.distance), size, place(all.at), percent(std::sqrt(all.squares / all.area)));
+    std::string note = fmt::format(
+        "The initial shape is at most {:.3g} from the file, {} of its size {:.4g}, at {}; {} rms.", all.distance,
+        percent(all.distance), size, place(all.at), percent(std::sqrt(all.squares / all.area)));
     if (!creases.triangles.empty())
         note += fmt::format(
             " The file has {} creases (edges kinked by more than {:g} degrees, up to {:.0f}), which are "

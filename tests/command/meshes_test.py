@@ -123,7 +123,7 @@ class MeshesTest(ProgramTest):
         self.assertAlmostEqual(rows["energy"][-1] / 58.98, 1, delta=0.1)
         count = int(re.search(r"(\d+) new triangles instead of", words).group(1))
         self.assertAlmostEqual(count, 300, delta=15)
-        self.assertIn("The start is at most", said["warnings"])
+        self.assertIn("The initial shape is at most", said["warnings"])
         stated = float(re.search(r"([\d.]+) percent of its size", words).group(1))
         self.assertLess(stated, 3)
 
@@ -153,7 +153,7 @@ class MeshesTest(ProgramTest):
     def test_holes_are_filled_when_asked(self):
         points, triangles = sphere(24)
         self.off("open.off", points, triangles[points[triangles].mean(axis=1)[:, 2] < 0.95])
-        self.assertIn("shape.fill_holes = true closes holes", self.refusal("open.off"))
+        self.assertIn("shape.fill_holes = true, with shape.remesh, closes holes", self.refusal("open.off"))
         rows, _, words = self.run_mesh("open.off", "remesh = 300\nfill_holes = true")
         self.assertRegex(words, r"1 holes were filled; the longest border, at \(.*\), measures 1\.")
         self.assertAlmostEqual(rows["volume"][-1] / (4 / 3 * np.pi), 1, delta=0.03)

@@ -349,7 +349,7 @@ TEST(Weld, EqualPlacesBecomeOneVertexInEveryFormat) {
     const ImportedMesh mesh =
         read("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv -0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\nf 4 6 5\n");
     EXPECT_EQ(mesh.mesh.triangles, (Triangles{{0, 1, 2}, {0, 3, 1}}));
-    EXPECT_EQ(mesh.names.vertex_number, (std::vector<std::int64_t>{1, 2, 3, 6}));
+    EXPECT_EQ(mesh.vertex_number, (std::vector<std::int64_t>{1, 2, 3, 6}));
 }
 
 // The bumpy scan as STL with every corner off by its own 1e-5: 3 * 9680 vertices, until welded.
@@ -374,7 +374,7 @@ TEST(Weld, CollapsedTrianglesAreDroppedWithANote) {
     const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0.001 0\nf 1 2 4\nf 4 2 3\nf 1 4 3\n";
     const ImportedMesh mesh = read("a.obj", text, 0.01);
     EXPECT_EQ(mesh.mesh.triangles, (Triangles{{0, 1, 2}}));
-    EXPECT_EQ(mesh.names.triangle_place[0].line, 6u);
+    EXPECT_EQ(mesh.source[0].place.line, 6u);
     ASSERT_EQ(mesh.notes.size(), 1u);
     EXPECT_EQ(mesh.notes[0], "2 triangles collapsed when vertices were welded, and were dropped.");
 }

@@ -1,6 +1,4 @@
 // What is repaired of a mesh, and what is refused, each time for one defect put into a sound mesh.
-#include "surface3d/import/import_repair.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +75,8 @@ TEST(RepairMesh, DropsSpecksButNoSecondSurface) {
               "one membrane: keep one of them in the file");
 }
 
-const std::string wrapping = "shape.wrap = LENGTH puts one surface around everything, closing gaps of that length";
+const std::string wrapping =
+    "shape.wrap = LENGTH, with shape.remesh, puts one surface around everything, closing gaps of that length";
 
 // The second ball is moved so that its vertex 0 lies where the first has vertex 4, and these become one.
 TEST(RepairMesh, RefusesVesiclesThatTouchInAVertex) {
@@ -132,7 +131,8 @@ TEST(RepairMesh, KeepsHolesOnlyWhereTheyMayBe) {
     const std::string message = refusal(mesh);
     EXPECT_EQ(message.find("mesh: the mesh is open: the edge from vertex "), 0u) << message;
     EXPECT_NE(message.find("belongs to no other triangle (3 such edges); if the surface is closed there, shape.weld "
-                           "joins vertices that are near each other; shape.fill_holes = true closes holes"),
+                           "joins vertices that are near each other; shape.fill_holes = true, with shape.remesh, "
+                           "closes holes"),
               std::string::npos)
         << message;
     EXPECT_EQ(repaired(mesh, true).mesh.triangles.size(), 179u);

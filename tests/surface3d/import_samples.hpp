@@ -15,13 +15,6 @@ namespace tubule::surface3d::samples {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
 
-// As if read from a file.
-inline ImportedMesh imported(const TriangleMesh& mesh) {
-    ImportedMesh out;
-    out.mesh = mesh;
-    return out;
-}
-
 // A surface F(x) = 0, star-shaped about the origin, F < 0 inside:
 // F = |x/axes|^2 + bump sin(3x + 1) sin(3y + 2) sin(3z) - 1.
 struct Surface {
