@@ -40,7 +40,7 @@ energy = 1e-4
 end = 0.7
 stationary = 1e-6
 """
-FEW = ("--elements", "60")
+FEW = ("--elements", "40")
 X = (2 * math.pi / LENGTH) ** 2  # q^2 of the wave
 
 
@@ -132,7 +132,7 @@ class Ranks(ProgramTest):
 
     def command(self, ranks, folder):
         return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "confirm", "scan.hdf",
-                "--elements", "40", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
+                "--elements", "20", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
 
     def figures(self, text):
         return [{key: value for key, value in row.items() if key != "file"} for row in csv.DictReader(io.StringIO(text))]

@@ -4,15 +4,17 @@ what cannot fit into memory is refused before it is tried. Argument: the program
 
 The times are those that the user asked for, with generous room for slow machines; without these limits each of the runs
 takes many times longer."""
+import os
 import resource
 import signal
 import subprocess
 import time
 import unittest
+from pathlib import Path
 
 from program import CAPSULE, QUICK, ProgramTest, about
 
-LIMIT, ROOM = 1, 12  # seconds: what is asked, and when it must have ended on any machine
+LIMIT, ROOM = 0.2, 12  # seconds: what is asked, and when it must have ended on any machine
 
 SURFACE = QUICK.replace('tier = "axisym"', 'tier = "surface3d"')
 # Its meridian is found by a search at every point, and its rim asks for many small elements.
@@ -118,11 +120,14 @@ class TimeLimit(ProgramTest):
 
 
 class CtrlC(ProgramTest):
-    def ends_when_interrupted(self, *command, after=1.0, words="interrupted"):
-        process = self.start(*command)
-        self.addCleanup(process.kill)
-        time.sleep(after)
-        self.assertIsNone(process.poll(), "ended before it was interrupted")
+    def computing(self, *arguments, seconds=0.3, **options):
+        """A process that has used so many seconds of processor time."""
+        process, stat = self.start(*arguments, **options), lambda: Path(f"/proc/{process.pid}/stat").read_text()
+        self.wait(process, lambda: int(stat().rsplit(")")[1].split()[11]) / os.sysconf("SC_CLK_TCK") > seconds)
+        return process
+
+    def ends_when_interrupted(self, *command, words="interrupted", **options):
+        process = self.computing(*command, **options)
         process.send_signal(signal.SIGINT)
         begin = time.monotonic()
         out, err = process.communicate()
@@ -147,21 +152,18 @@ class CtrlC(ProgramTest):
     def test_in_values_that_extend_a_scan(self):
         case = self.write("scanned.toml", QUICK)
         self.tubule("scan", case, "--over", "energy.k20=0.5,0.6", "-o", "scan.hdf", "--quiet")
-        self.ends_when_interrupted("scan", "scan.hdf", "--extend", "--over", "energy.k20=1:2:500000", after=3)
+        self.ends_when_interrupted("scan", "scan.hdf", "--extend", "--over", "energy.k20=1:2:500000", seconds=1)
 
     def test_one_that_is_ignored_from_the_beginning_stays_ignored(self):
         # As a shell does for background jobs of a script.
-        with self.start("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=3",
-                        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as process:  # fmt: skip
-            time.sleep(1)
+        with self.computing("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=2", seconds=0.1,
+                            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as process:  # fmt: skip
             process.send_signal(signal.SIGINT)
             out, err = process.communicate()
         self.assertEqual(process.returncode, 5, out + err)
 
     def test_a_second_one_ends_at_once_and_leaves_a_file_that_opens(self):
-        process = self.start("run", self.write("pancake.toml", PANCAKE))
-        self.addCleanup(process.kill)
-        time.sleep(1)
+        process = self.computing("run", self.write("pancake.toml", PANCAKE))
         for _ in range(2):
             process.send_signal(signal.SIGINT)
             time.sleep(0.05)
@@ -185,7 +187,7 @@ class Memory(ProgramTest):
         # OpenBLAS asks for 128 MB, forever if there are none; its threads do so before the program begins.
         case = self.write("small.toml", FEW)
         self.assertEqual(self.with_memory(140, "--version")[0], 0)
-        for mib in range(100, 400, 30):
+        for mib in range(100, 401, 60):
             with self.subTest(mib=mib):
                 status, words = self.with_memory(mib, "run", case, "--quiet", "--overwrite")
                 self.assertIn(status, (0, 4), words)
@@ -226,10 +228,10 @@ class Cost(ProgramTest):
             process.communicate()
             self.assertEqual(process.returncode, 130)
 
-    def test_of_a_million_waves_is_small(self):
+    def test_of_many_waves_is_small(self):
         began = time.monotonic()
-        out, _ = self.tubule("stability", self.case, "--waves", "10000", "--modes", "100", "--csv")
-        self.assertEqual(out.count("\n"), 101 * 10001)  # a header, but no n = 0 of m = 1, a shift
+        out, _ = self.tubule("stability", self.case, "--waves", "10000", "--modes", "10", "--csv")
+        self.assertEqual(out.count("\n"), 11 * 10001)  # a header, but no n = 0 of m = 1, a shift
         self.assertLess(time.monotonic() - began, 60)
 
 

@@ -1,15 +1,19 @@
 """What the tests of the command share: running it, in a folder of its own, and reading its results."""
+import contextlib
 import csv
 import io
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
 import h5py
 
 PROGRAM = sys.argv[1]
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests/support"))
 
 # A wavy tube without symmetry that is solved in a moment: 0.02 s.
 QUICK = """tier = "axisym"
@@ -38,11 +42,11 @@ end = 0.2
 output = [0.01, 0.05]
 """
 
-# The same with 10000 steps and more, a second or so, and 400 frames. Explicit settings: it never begins again.
+# The same with thousands of steps, half a second or so, and 400 frames. Explicit settings: it never begins again.
 SLOW = QUICK.replace("[0.01, 0.05]", str([i / 2000 for i in range(1, 400)]) + "\nmax_order = 2") + """
 [discretisation]
 elements = 40
-time_tolerance = 1e-12
+time_tolerance = 1e-11
 """
 
 # A tube that pearls, pinches or relaxes, as its amplitude and k42 have it: the case of scans.
@@ -110,6 +114,22 @@ def series(result):
         return {name: data[:] for name, data in file["series"].items()}
 
 
+def rows_of(result):
+    """How many rows a result has so far."""
+    if not result.exists():
+        return 0
+    with h5py.File(result) as file:
+        return len(file["series/time"]) if "series/time" in file else 0
+
+
+def finished_points(result):
+    """How many points of a scan are known so far."""
+    if not result.exists():
+        return 0
+    with h5py.File(result) as file:
+        return int((file["points/outcome"][()] != 0).sum())
+
+
 def about(result):
     with h5py.File(result) as file:
         return dict(file["about"].attrs)
@@ -142,6 +162,22 @@ class ProgramTest(unittest.TestCase):
             out, err = process.communicate()
         self.assertEqual(process.returncode, status, f"tubule {arguments}\n{out}{err}")
         return out, err
+
+    def plot(self, *arguments, status=0):
+        """What `tubule plot` does, in a fork that need not import its libraries; what it printed on stdout, on stderr."""
+        import scripts
+
+        with contextlib.chdir(self.folder):
+            done = scripts.run_script(ROOT / "tools/python/tubule/drawing", "plot", *arguments)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done.stdout, done.stderr
+
+    def wait(self, process, ready):
+        """Until ready(), which only reads files: a process started at each look takes more time than the run."""
+        self.addCleanup(process.kill)
+        while not ready():
+            self.assertIsNone(process.poll(), "it ended before it could be disturbed")
+            time.sleep(0.01)
 
     def refused(self, *arguments):
         """The message with which the program refuses the arguments; no file may change."""

@@ -56,7 +56,7 @@ class Slurm(ProgramTest):
 
     def test_a_chart(self):
         self.environment["TUBULE_COMMAND"] = "chart"
-        self.write("case.toml", SLOW.replace("elements = 40", "elements = 8").replace("1e-12", "1e-4"))
+        self.write("case.toml", SLOW.replace("elements = 40", "elements = 8").replace("1e-11", "1e-4"))
         with self.job("case.toml", "--vary", "accuracy.energy=1e-2,1e-3,1e-4") as job:
             _, err = job.communicate()
         self.assertEqual(job.returncode, 0, err)

@@ -266,13 +266,11 @@ TEST(Alignment, FindsMovedCopies) {
     const CurvedMesh ellipsoid = mapped_mesh(icosphere(2), 3, on(Ellipsoid{1, 0.8, 1.3})),
                      threefold = mapped_mesh(icosphere(4), 2, on(Sphere{.radius = 1, .modes = {{0.3, 3, 3}}})),
                      torus = mapped_mesh(torus_grid({1, 0.4}, 16, 8), 3, on(Torus{1, 0.4}));
-    for (const double angle : {0.3, 3.0}) {
-        SCOPED_TRACE(angle);
-        expect_none_left(surface(ellipsoid), surface(moved(ellipsoid, some_motion(angle))), 0.1);
-        expect_none_left(surface(threefold), surface(moved(threefold, some_motion(angle))), 0.1);
-        // Only the triangles, which are off by up to 1e-3, tell one turn of it from another.
-        expect_left(surface(torus), surface(moved(torus, some_motion(angle))), 0.1, 2e-3);
-    }
+    const double angle = 3;
+    expect_none_left(surface(ellipsoid), surface(moved(ellipsoid, some_motion(angle))), 0.1);
+    expect_none_left(surface(threefold), surface(moved(threefold, some_motion(angle))), 0.1);
+    // Only the triangles, which are off by up to 1e-3, tell one turn of it from another.
+    expect_left(surface(torus), surface(moved(torus, some_motion(angle))), 0.1, 2e-3);
 }
 
 TEST(Alignment, SlidesAndTurnsTubes) {

@@ -3,6 +3,7 @@
 
 samples_test.py TUBULE PACKAGES. What is in them: README.md.
 """
+import contextlib
 import shutil
 import subprocess
 import sys
@@ -13,8 +14,11 @@ from pathlib import Path
 TUBULE = Path(sys.argv[1]).resolve()
 sys.path.insert(0, sys.argv[2])
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+import scripts
 import tubule
 
+DRAWING = Path(__file__).resolve().parents[2] / "tools/python/tubule/drawing"
 HERE = Path(__file__).parent
 RUNS = {"graph": "axisym", "curve": "axisym", "surface": "surface3d"}
 
@@ -30,7 +34,11 @@ class Samples(unittest.TestCase):
             shutil.copy(HERE / f"{name}.hdf", self.folder)
 
     def tubule(self, *arguments, status=0):
-        done = subprocess.run([TUBULE, *arguments], cwd=self.folder, capture_output=True, text=True)
+        if arguments[0] in ("plot", "view"):
+            with contextlib.chdir(self.folder):
+                done = scripts.run_script(DRAWING, *arguments)
+        else:
+            done = subprocess.run([TUBULE, *arguments], cwd=self.folder, capture_output=True, text=True)
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done
 
