@@ -421,15 +421,6 @@ class Check(ProgramTest):
         steps = about(self.folder / "surface.hdf")["steps"]
         self.assertTrue(0.5 < int(found[1]) / steps < 2, f"{words}, but {steps} steps")
 
-    def test_finer_runs_are_told(self):
-        """A capsule as a fluid is rough; an accuracy of 1e-2 takes one run."""
-        rough = self.write("rough.toml", ROUGH)
-        told = "; the motion is rough: finer runs may follow, each at least twice as long\n"
-        words = self.tubule("check", rough)[1]
-        self.assertRegex(words, r"expected: about \d+ triangles of order 4; about \d+ steps, [^,]+, \d+ MB" + told + "$")
-        expected = json.loads(self.tubule("check", "--json", rough, "--set", "accuracy.energy=1e-2")[0])["cases"][0]["expected"]
-        self.assertFalse(expected["finer_runs"])
-
     def test_all_bad_cases_are_told(self):
         one = self.write("one.toml", QUICK.replace("kind", "knid"))
         two = self.write("two.toml", QUICK.replace("0.5", '"much"'))
@@ -475,7 +466,8 @@ class Others(ProgramTest):
             for example in examples if command != "confirm" else ():
                 if "--movie" not in example:  # plot_motion makes one
                     with self.subTest(example=example):
-                        self.tubule(*shlex.split(example)[1:], *(["--quick"] if command == "check" else []))
+                        words = shlex.split(example)[1:]
+                        (self.plot(*words[1:]) if command == "plot" else self.tubule(*words, *["--quick"] * (command == "check")))
 
     def test_threads_that_the_environment_asks_for(self):
         """As many would not fit into memory."""

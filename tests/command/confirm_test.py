@@ -128,7 +128,7 @@ class Ranks(ProgramTest):
     def setUp(self):
         super().setUp()
         self.write("case.toml", CASE)
-        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.05", "-o", "scan.hdf")
+        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.02", "-o", "scan.hdf")
 
     def command(self, ranks, folder):
         return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "confirm", "scan.hdf",

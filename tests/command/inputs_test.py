@@ -21,7 +21,7 @@ energy = 1e-2
 end = 1e-3
 """
 AXISYM = 'tier = "axisym"\n[energy]\nk20 = 1.0\n[shape]\n{}' + MODEL
-SURFACE = 'tier = "surface3d"\n[energy]\nk20 = 1.0\n[shape]\n{}' + MODEL.replace("1e-2", "0.1\nestimate = false")
+SURFACE = 'tier = "surface3d"\n[energy]\nk20 = 1.0\n[shape]\n{}' + MODEL.replace("1e-2", "0.1\nestimate = false\n[discretisation]\norder = 2")
 MANY = 1000  # comments: more bytes than a result keeps
 
 

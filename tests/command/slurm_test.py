@@ -30,7 +30,7 @@ class Slurm(ProgramTest):
         queue = self.write("scontrol", '#!/bin/sh\necho "$@" >> queued\n')
         queue.chmod(queue.stat().st_mode | stat.S_IXUSR)
         self.environment = {
-            **os.environ, "TUBULE": PROGRAM, "TUBULE_MPIRUN": f"{MPIRUN} --allow-run-as-root --oversubscribe -n 3",
+            **os.environ, "TUBULE": PROGRAM, "TUBULE_MPIRUN": f"{MPIRUN} --allow-run-as-root --oversubscribe -n 2",
             "SLURM_JOB_ID": "17", "PATH": f"{self.folder}:{os.environ['PATH']}"}  # fmt: skip
 
     def job(self, *arguments):
@@ -52,7 +52,7 @@ class Slurm(ProgramTest):
             out, err = job.communicate()
         self.assertEqual(job.returncode, 0, err)
         self.assertIn(f"{8 - known} run now", out)
-        self.assertEqual(about(self.folder / "map.hdf")["workers"], 3)
+        self.assertEqual(about(self.folder / "map.hdf")["workers"], 2)
 
     def test_a_chart(self):
         self.environment["TUBULE_COMMAND"] = "chart"

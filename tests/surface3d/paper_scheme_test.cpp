@@ -120,7 +120,7 @@ TEST(PaperScheme, SmoothingLosesEnergy) {
     EXPECT_NEAR(energy(0.1 * std::pow(longest_edge(mesh), 2)), 7.9, 0.4);
 }
 
-TEST(PaperScheme, StepsAreLimitedByTheExplicitGaussianCurvature) {
+TEST(PaperSchemeStudy, StepsAreLimitedByTheExplicitGaussianCurvature) {
     // A prototype was stable at 2e-2 and unstable at 3e-2; without K it found no limit.
     EXPECT_EQ(growth_by_the_paper(2, 0.12, 2e-2, 25), 1);
     EXPECT_GT(growth_by_the_paper(2, 0.12, 4.2e-2, 12), 10);

@@ -201,12 +201,12 @@ class Pages(InFolder):
                       "what dissipation is", "what identity_defect is", "what kinetic_energy is", "normal velocity..."),
              ("what energy_error is", "curvature")),  # all of the error is zero
             ((file, "--kind", "surface", "--colour", "H,K,p", "--times", "0,2"), (*bars, "t\u2081 = 2"), ("velocity", "|u")),
-            ((file, "--kind", "surface", "--colour", "u_n", "--times", "1"), ["t\u2080 = 1"], []),
-            ((file, "--kind", "surface"), ["normal velocity u\u2099 / max |u\u2099| of the run..."], []),
-            ((file, "--kind", "surface", "--scale", "shape"), ["normal velocity u\u2099 / max |u\u2099| of the shape..."], []),
+            ((file, "--kind", "surface", "--times", "1"), ["t\u2080 = 1", "normal velocity u\u2099 / max |u\u2099| of the run..."], []),
+            ((file, "--kind", "surface", "--colour", "u_n", "--times", "1", "--scale", "shape"),
+             ["normal velocity u\u2099 / max |u\u2099| of the shape..."], []),
             ((file, "--kind", "cuts", "--plane", "x=-0.25"), ["cut x = \u22120.25"], []),
             ((file, "--kind", "balance"), ["what dissipation is"], ["(a)"]),
-            (others, ["(d)"], []),
+            ((*others, "--times", "1"), ["(d)"], []),
         ):  # fmt: skip
             with self.subTest(arguments=arguments[1:]):
                 texts = self.drawn(*arguments)

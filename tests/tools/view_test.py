@@ -21,7 +21,8 @@ import matplotlib.image
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools/python/tubule"))
+sys.path[:0] = [str(ROOT / "tools/python/tubule"), str(ROOT / "tests/support")]
+import scripts  # noqa: E402
 from drawing import view  # noqa: E402
 
 TUBULE = sys.argv[1]
@@ -42,8 +43,8 @@ def made(folder, command):
     name = f"{command[0]}-{Path(command[1]).stem}"
     result, page = folder / f"{name}.hdf", folder / f"{name}.html"
     subprocess.run([TUBULE, *command, "--quiet", "-o", result], cwd=ROOT, check=True, capture_output=True)
-    done = subprocess.run([TUBULE, "view", result, "-o", page], check=True, capture_output=True, text=True)
-    assert done.stdout == f"{page}\n" and not done.stderr, done
+    done = scripts.run_script(ROOT / "tools/python/tubule/drawing", "view", result, "-o", page)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{page}\n", ""), done
     return result, page
 
 
