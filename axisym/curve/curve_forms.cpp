@@ -14,8 +14,8 @@ namespace tubule::axisym {
 namespace {
 
 namespace stdx = std::experimental;
-constexpr int lanes = ProfileSpace::lanes;
-constexpr int wide = ProfileSpace::max_width;
+constexpr int lanes = SplineSpace::lanes;
+constexpr int wide = SplineSpace::max_width;
 using Local = CurveLocal;
 
 // d log g/ds
@@ -82,7 +82,7 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
     : space_(space), bending_(bending), images_(space.images()) {
     const int w = space.splines().width(), n = space.splines().elements();
     const auto dof = [&](int e, int a) {  // -1: absent
-        const Field& field = a < w ? space.r() : space.z();
+        const SplineSpace& field = a < w ? space.r() : space.z();
         return field.signs(e)[a % w] == 0 ? -1 : field.dofs(e)[a % w] + (a < w ? 0 : space.r().size());
     };
     std::vector<Eigen::Triplet<double>> entries;
@@ -116,7 +116,7 @@ template <int P>
 [[gnu::flatten]] bool CurveForms::gradient_kernel(const Weights& weights, const VaryingH0& H0, const double* x,
                                                   double* out) const {
     const auto kernel = [&]<Added added, bool varies>() -> bool {
-        const ProfileSpace& splines = space_.splines();
+        const SplineSpace& splines = space_.splines();
         Pack smallest{std::numeric_limits<double>::infinity()}, rise{0.0};
         for (int e = 0; e < splines.elements(); ++e) {
             Pack sums[2][2] = {{Pack(0.0), Pack(0.0)}, {Pack(0.0), Pack(0.0)}};  // [field][half of the splines]
@@ -139,7 +139,7 @@ template <int P>
                         }
             }
             for (int field = 0; field < 2; ++field) {
-                const Field& f = field == 0 ? space_.r() : space_.z();
+                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
                 double* to = field == 0 ? out : out + space_.r().size();
                 alignas(32) double local[wide];
                 store(sums[field][0], local);
@@ -158,7 +158,7 @@ template <int P>
                                                  double* values) const {
     const auto kernel = [&]<Added added, bool varies>() -> void {
         constexpr int w = P + 1;
-        const ProfileSpace& splines = space_.splines();
+        const SplineSpace& splines = space_.splines();
         for (int e = 0; e < splines.elements(); ++e) {
             alignas(32) Pack local[2][2][w][2];  // [field of column][field of row][column][half of the rows]
             std::fill_n(&local[0][0][0][0], 8 * w, Pack(0.0));
@@ -255,7 +255,7 @@ void CurveForms::add_hessian(const Weights& weights, const double* x, double* va
 // The second derivatives with one in the rise, by the number of the other coefficient.
 template <class Add>
 void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const Add& add) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
@@ -265,7 +265,7 @@ void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const
             const int z1 = first_variable[1];
             add(space_.shape_size(), stdx::reduce(weight * density.dd[packed<5>(z1, z1)]));
             for (int field = 0; field < 2; ++field) {
-                const Field& f = field == 0 ? space_.r() : space_.z();
+                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
                 for (int d = first_derivative[field]; d < 3; ++d) {
                     const Pack c =
                         weight * density.dd[packed<5>(z1, first_variable[field] + d - first_derivative[field])];
@@ -278,7 +278,7 @@ void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const
 }
 
 double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     Pack sum{0.0};
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
@@ -310,14 +310,14 @@ std::array<Jet<Pack, 5, Order>, 2> sliding_rows(const Bending& bending, const Va
 }  // namespace
 
 void CurveForms::add_sliding(const double* x, double* out) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
             const Pack weight = images_ * load(basis.weight);
             const auto rows = sliding_rows<1>(bending_, fixed_H0(), e * splines.groups() + g, Local(space_, e, g, x));
             for (int field = 0; field < 2; ++field) {
-                const Field& f = field == 0 ? space_.r() : space_.z();
+                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
                 double* to = field == 0 ? out : out + space_.r().size();
                 for (int a = 0; a < splines.width(); ++a)
                     to[f.dofs(e)[a]] +=
@@ -327,7 +327,7 @@ void CurveForms::add_sliding(const double* x, double* out) const {
 }
 
 void CurveForms::add_sliding_slopes(const double* x, double* values) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const int w = splines.width();
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
@@ -374,7 +374,7 @@ double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const
 }
 
 Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const int w = splines.width(), rise = space_.shape_size();
     Eigen::SparseMatrix<double> out = pattern_;
     const auto add_rise = [&](int i, double value) {  // of a free period, whose displacement is s e_z
@@ -407,7 +407,7 @@ Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
 }
 
 bool CurveForms::admissible(const Eigen::VectorXd& x) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(space_, e, g, x.data());
@@ -417,7 +417,7 @@ bool CurveForms::admissible(const Eigen::VectorXd& x) const {
 }
 
 FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     DensityDomain domain(bending_);
     if (!domain.restricted()) return {};
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
@@ -432,7 +432,7 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
 }
 
 CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const int n = splines.elements();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     CurveObservation o;
@@ -480,7 +480,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
 }
 
 std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const int n = splines.elements(), p = splines.degree();
     const auto& breaks = splines.breaks();
     const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
@@ -510,7 +510,7 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
 }
 
 double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     double magnitude = 0;
     for (int e = 0; e < splines.elements(); ++e)

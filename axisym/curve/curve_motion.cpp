@@ -18,8 +18,8 @@ struct PointNumbers {
 namespace {
 
 namespace stdx = std::experimental;
-constexpr int lanes = ProfileSpace::lanes;
-constexpr int wide = ProfileSpace::max_width;
+constexpr int lanes = SplineSpace::lanes;
+constexpr int wide = SplineSpace::max_width;
 
 enum FieldName { curve_r, curve_z, velocity_r, velocity_z, swirl, pressure, n_fields };
 
@@ -118,7 +118,7 @@ struct CurveMotion::Local {
             rates[part] = Pack(0.0);
             const auto& [field, offset] = m.parts_[part];
             if (offset < 0) continue;
-            const auto& b = field->splines().basis(e, g);
+            const auto& b = field->basis(e, g);
             const int *dofs = field->dofs(e), slot = first_slot(part);
             const double* signs = field->signs(e);
             for (int a = 0; a < m.width(part); ++a) {
@@ -160,10 +160,8 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
       gauge_(law.lagrangian ? 0 : gauge),
       area0_(area),
       volume0_(volume),
-      pressure_splines_(space.splines().cell(), space.splines().breaks(), space.splines().degree() - 1,
-                        std::min(space.splines().smoothness(), space.splines().degree() - 2)),
-      swirl_(space.splines(), space.r_parity()),
-      pressure_(pressure_splines_, space.scalar_parity()) {
+      pressure_(space.splines().cell(), space.splines().breaks(), space.splines().degree() - 1,
+                std::min(space.splines().smoothness(), space.splines().degree() - 2)) {
     int size = 0;
     const auto add = [&](bool present, int length) {
         if (!present) return -1;
@@ -175,7 +173,7 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.rise = add(space.free_period(), 1);
     at_.u_r = add(law.inextensible, space.r().size());
     at_.u_z = add(law.inextensible, space.z().size());
-    at_.swirl = add(law.inextensible && law.swirls, swirl_.size());
+    at_.swirl = add(law.inextensible && law.swirls, space.r().size());
     at_.p = add(law.inextensible, pressure_.size());
     at_.tension = add(law.keeps_area, 1);
     at_.supply = add(law.reservoir, 1);
@@ -190,8 +188,8 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     for (const int number :
          {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume, at_.drift, at_.shift})
         if (number >= 0) numbers_.push_back(number);
-    parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},  {&space.r(), at_.u_r},
-              {&space.z(), at_.u_z}, {&swirl_, at_.swirl}, {&pressure_, at_.p}};
+    parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},     {&space.r(), at_.u_r},
+              {&space.z(), at_.u_z}, {&space.r(), at_.swirl}, {&pressure_, at_.p}};
     set_pattern();
 }
 
@@ -279,7 +277,7 @@ Eigen::VectorXd CurveMotion::stretched(const double* y) const {
 
 bool CurveMotion::residual(double t, const double* y, const double* rate, double* F) const {
     std::fill_n(F, at_.size, 0.0);
-    const ProfileSpace& splines = space().splines();
+    const SplineSpace& splines = space().splines();
     const double images = space().images();
     const PointNumbers numbers = point_numbers(t, y);
     Pack smallest{std::numeric_limits<double>::infinity()}, area{0.0}, volume{0.0}, sums[n_rows];
@@ -297,8 +295,8 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
             for (int row = 0; row < n_test_rows; ++row) {
                 const int part = row_field[row], offset = parts_[part].offset;
                 if (offset < 0) continue;
-                const Field& field = *parts_[part].field;
-                const auto& tests = field.splines().basis(e, g);
+                const SplineSpace& field = *parts_[part].field;
+                const auto& tests = field.basis(e, g);
                 alignas(32) double c[lanes];
                 store(weight * rows[row], c);
                 for (int a = 0; a < width(part); ++a) {
@@ -365,7 +363,7 @@ void CurveMotion::jacobian(double t, const double* y, const double* rate, double
 // What point_law() has.
 void CurveMotion::add_law(double t, const double* y, const double* rate, double cj, double* values) const {
     using J = Jet<Pack, n_slots, 1>;
-    const ProfileSpace& splines = space().splines();
+    const SplineSpace& splines = space().splines();
     const double images = space().images();
     const PointNumbers numbers = point_numbers(t, y);
     Eigen::MatrixXd local(local_size_, local_size_);
@@ -383,11 +381,11 @@ void CurveMotion::add_law(double t, const double* y, const double* rate, double 
             for (int row = 0; row < n_test_rows; ++row) {
                 const int test = row_field[row];
                 if (parts_[test].offset < 0) continue;
-                const auto& tests = parts_[test].field->splines().basis(e, g);
+                const auto& tests = parts_[test].field->basis(e, g);
                 for (int slot = 0; slot < n_slots; ++slot) {
                     const int trial = slot_field[slot];
                     if (parts_[trial].offset < 0) continue;
-                    const auto& trials = parts_[trial].field->splines().basis(e, g);
+                    const auto& trials = parts_[trial].field->basis(e, g);
                     alignas(32) double c[lanes];
                     store(weight * rows[row].d[slot], c);
                     if (c[0] == 0 && c[1] == 0 && c[2] == 0 && c[3] == 0) continue;
@@ -442,7 +440,7 @@ void CurveMotion::add_test_column(int number, int e, int g, const Rows& rows, do
     for (int row = 0; row < n_test_rows; ++row) {
         const auto& [field, offset] = parts_[row_field[row]];
         if (offset < 0) continue;
-        const auto& basis = field->splines().basis(e, g);
+        const auto& basis = field->basis(e, g);
         for (int a = 0; a < width(row_field[row]); ++a)
             column[offset + field->dofs(e)[a]] +=
                 field->signs(e)[a] * stdx::reduce(rows[row] * load(basis.by_point[row_derivative[row]][a]));
@@ -458,7 +456,7 @@ void CurveMotion::add_row(int number, int e, int g, const Packs& weight, const P
     for (int slot = 0; slot < n_slots; ++slot) {
         const auto& [field, offset] = parts_[slot_field[slot]];
         if (offset < 0) continue;
-        const auto& basis = field->splines().basis(e, g);
+        const auto& basis = field->basis(e, g);
         alignas(32) double c[lanes];
         store(weight * in_slots[slot], c);
         for (int q = 0; q < lanes; ++q)
@@ -473,7 +471,7 @@ template <class Packs>
 void CurveMotion::add_column(int number, int part, int e, int g, const Packs& factor, double* values) const {
     const auto& [field, offset] = parts_[part];
     if (offset < 0) return;
-    const auto& basis = field->splines().basis(e, g);
+    const auto& basis = field->basis(e, g);
     double* column = values + pattern_.outerIndexPtr()[number];
     alignas(32) double c[lanes];
     store(factor, c);
@@ -553,7 +551,7 @@ void CurveMotion::add_stretch(double t, const double* y, double cj, double* valu
 }
 
 CurveMotion::Balance CurveMotion::balance(double t, const double* y, const double* rate) const {
-    const ProfileSpace& splines = space().splines();
+    const SplineSpace& splines = space().splines();
     const double images = space().images();
     const PointNumbers numbers = point_numbers(t, y);
     Balance out;

@@ -65,7 +65,7 @@ public:
     const MotionLayout& layout() const { return at_; }
     // Before anything else where H0 varies: see CurveForms. The parametrisation must be material.
     void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
-    const Field& pressures() const { return pressure_; }
+    const SplineSpace& pressures() const { return pressure_; }
 
     // F(t, y, rate). False where r <= 0 at a quadrature point: try a smaller step.
     bool residual(double t, const double* y, const double* rate, double* F) const;
@@ -121,16 +121,15 @@ private:
 
     // A field of unknowns: where it stands, and which of the pointwise slots it fills.
     struct Part {
-        const Field* field;
+        const SplineSpace* field;
         int offset;
     };
-    int width(int part) const { return parts_[part].field->splines().width(); }
+    int width(int part) const { return parts_[part].field->width(); }
 
     CurveForms forms_;
     CurveLaw law_;
     double gauge_, area0_, volume0_;
-    ProfileSpace pressure_splines_;
-    Field swirl_, pressure_;
+    SplineSpace pressure_;
     MotionLayout at_;
     std::vector<Part> parts_;  // in the order of the pointwise fields; absent ones have offset -1
     Eigen::SparseMatrix<double> pattern_;

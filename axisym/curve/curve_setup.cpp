@@ -219,7 +219,7 @@ void set_velocity(const CurveSetup& setup, Eigen::VectorXd& y) {
         const double found = value_at(functions, cell ? -std::cos(pi * s) : s)[component];
         return cell && (component == 0) ? found * std::sin(pi * s) : found;
     };
-    const auto project = [&](const Field& field, int offset, const BlendedCurve& functions, int component) {
+    const auto project = [&](const SplineSpace& field, int offset, const BlendedCurve& functions, int component) {
         y.segment(offset, field.size()) = field.project([&](double s) { return value(functions, s, component); });
     };
     project(space.r(), at.u_r, start.velocity.meridional, 0);

@@ -60,11 +60,11 @@ Snapshot measure(const CurveMotion& motion, double t, const double* y, const dou
 
 double mode_amplitude(const CurveSpace& space, const double* y, int n) {
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
-    const ProfileSpace& splines = space.splines();
+    const SplineSpace& splines = space.splines();
     double re = 0, im = 0;
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g)
-            for (int q = 0; q < ProfileSpace::lanes; ++q) {
+            for (int q = 0; q < SplineSpace::lanes; ++q) {
                 const auto& basis = splines.basis(e, g);
                 const CurvePoint p = space.evaluate(x, basis.z[q]);
                 const double angle = 2 * pi * n * p.z / space.length(y), part = basis.weight[q] * p.r * p.z1;

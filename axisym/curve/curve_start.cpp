@@ -78,23 +78,23 @@ Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::V
 }
 
 // Coefficients of the spline with these values at the breaks; odd degree and simple knots make that a regular system.
-Eigen::VectorXd interpolate(const Field& field, Parity parity, const std::vector<double>& values) {
-    const ProfileSpace& splines = field.splines();
+Eigen::VectorXd interpolate(const SplineSpace& splines, const std::vector<double>& values) {
     const int n = splines.elements(), w = splines.width();
     const bool mirror = splines.cell().mirror;
-    const int first = mirror && parity.start < 0 ? 1 : 0, last = !mirror || parity.end < 0 ? n - 1 : n;
+    const int first = mirror && splines.parity().start < 0 ? 1 : 0,
+              last = !mirror || splines.parity().end < 0 ? n - 1 : n;
     std::vector<Eigen::Triplet<double>> entries;
-    Eigen::VectorXd load(field.size());
-    double basis[ProfileSpace::max_width];
+    Eigen::VectorXd load(splines.size());
+    double basis[SplineSpace::max_width];
     for (int i = first; i <= last; ++i) {
         const int e = std::min(i, n - 1);
         splines.splines(e, splines.breaks()[i], 0, basis);
         for (int a = 0; a < w; ++a)
-            if (field.signs(e)[a] != 0 && basis[a] != 0)
-                entries.emplace_back(i - first, field.dofs(e)[a], field.signs(e)[a] * basis[a]);
+            if (splines.signs(e)[a] != 0 && basis[a] != 0)
+                entries.emplace_back(i - first, splines.dofs(e)[a], splines.signs(e)[a] * basis[a]);
         load[i - first] = values[i];
     }
-    Eigen::SparseMatrix<double> matrix(field.size(), field.size());
+    Eigen::SparseMatrix<double> matrix(splines.size(), splines.size());
     matrix.setFromTriplets(entries.begin(), entries.end());
     SparseLu lu;
     lu.factor(matrix);
@@ -104,7 +104,7 @@ Eigen::VectorXd interpolate(const Field& field, Parity parity, const std::vector
 }  // namespace
 
 Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x) {
-    const ProfileSpace& s = space.splines();
+    const SplineSpace& s = space.splines();
     return spline_meridian(
         std::make_shared<CurveSpace>(space.topology(), s.breaks(), s.degree(), s.smoothness(), space.length(x.data())),
         x.head(space.shape_size()));
@@ -147,7 +147,7 @@ Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology top
     std::vector<double> r(n + 1), z(n + 1);
     for (int i = 0; i <= n; ++i) r[i] = points[i][0], z[i] = points[i][1] - space->rise() * chord[i];
     Eigen::VectorXd x(space->size());
-    x << interpolate(space->r(), space->r_parity(), r), interpolate(space->z(), space->z_parity(), z);
+    x << interpolate(space->r(), r), interpolate(space->z(), z);
     return spline_meridian(space, x);
 }
 

@@ -25,7 +25,7 @@ void limit_growth(ElementDensity& density, int elements) {
 
 }  // namespace
 
-void MeshNeed::add(const ProfileSpace& space, const std::vector<double>& defect) {
+void MeshNeed::add(const SplineSpace& space, const std::vector<double>& defect) {
     lost = std::max(lost, std::accumulate(defect.begin(), defect.end(), 0.0));
     wanted.resize(parts, 0);
     const std::vector<double>& breaks = space.breaks();

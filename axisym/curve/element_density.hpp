@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 
 namespace tubule::axisym {
 
@@ -13,7 +13,7 @@ using ElementDensity = std::vector<double>;
 // The mesh that the states of a run required.
 struct MeshNeed {
     // `defect`: the energy lost in each element of the space, which falls with the power 2 (degree - 1) of its size.
-    void add(const ProfileSpace& space, const std::vector<double>& defect);
+    void add(const SplineSpace& space, const std::vector<double>& defect);
     // Half of the elements stay equal. Empty if nothing was added, or nothing is lost.
     ElementDensity density() const;
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "axisym/curve/varying_H0.hpp"
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 
 namespace tubule::axisym {
 namespace {

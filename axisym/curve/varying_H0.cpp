@@ -11,7 +11,7 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr int lanes = ProfileSpace::lanes;
+constexpr int lanes = SplineSpace::lanes;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ namespace {
 // Sums of a value at all points up to each of them; and, transposed, of what follows each.
 class RunningSums {
 public:
-    explicit RunningSums(const ProfileSpace& splines)
+    explicit RunningSums(const SplineSpace& splines)
         : points_(lanes * splines.groups()), elements_(splines.elements()), within_(partial_sums(points_)) {}
 
     template <class Values>  // one row a point
@@ -98,7 +98,7 @@ void require_one_period(const CurveSpace& space, const Formula& formula, const E
 
 VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::VectorXd& x) {
     using J = Jet<double, 1, 1>;
-    const ProfileSpace& splines = space.splines();
+    const SplineSpace& splines = space.splines();
     const int points = splines.elements() * splines.groups() * lanes;
     Eigen::VectorXd areas(points);
     std::vector<CurvePoint> curve;
@@ -107,7 +107,7 @@ VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::V
             for (int g = 0; g < splines.groups(); ++g)
                 for (int q = 0; q < lanes; ++q, ++i) visit(i, splines.basis(e, g), q);
     };
-    each([&](int i, const ProfileSpace::Basis& basis, int q) {
+    each([&](int i, const SplineSpace::Basis& basis, int q) {
         curve.push_back(space.evaluate(x, basis.z[q]));
         areas[i] = basis.weight[q] * area_density(curve.back());
     });
@@ -116,7 +116,7 @@ VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::V
     VaryingH0 out;
     out.value.resize(points / lanes), out.slope.resize(points / lanes);
     if (!space.closed() && space.images() == 1) require_one_period(space, formula, x);
-    each([&](int i, const ProfileSpace::Basis&, int q) {
+    each([&](int i, const SplineSpace::Basis&, int q) {
         const CurvePoint& p = curve[i];
         J area(below(i, 0) / whole), r(p.r), z(p.z);
         area.d[0] = area_density(p) / whole, r.d[0] = p.r1, z.d[0] = p.z1;
@@ -150,7 +150,7 @@ std::vector<double> area_below(const CurveSpace& space, const Eigen::VectorXd& x
 H0ByArea::H0ByArea(const CurveSpace& space, const Bending& bending, const double* x)
     : space_(space), bending_(bending), x_(x) {
     using J = Jet<double, 1, 2>;
-    const ProfileSpace& splines = space.splines();
+    const SplineSpace& splines = space.splines();
     const int packs = splines.elements() * splines.groups(), points = packs * lanes;
     std::vector<ProfilePoint<Pack>> at;
     Eigen::VectorXd areas(points);
@@ -186,14 +186,14 @@ H0ByArea::H0ByArea(const CurveSpace& space, const Bending& bending, const double
 }
 
 Eigen::MatrixXd H0ByArea::hessian_beyond() const {
-    const ProfileSpace& splines = space_.splines();
+    const SplineSpace& splines = space_.splines();
     const int n = space_.size(), points = static_cast<int>(weight_.size());
     Eigen::MatrixXd areas = Eigen::MatrixXd::Zero(points, n), pushes = areas;
     // The row of a point from a jet in (r, r', r'', z', z'').
     const auto add = [&](Eigen::MatrixXd& to, int k, double factor, const auto& jet) {
         const int e = k / lanes / splines.groups(), g = k / lanes % splines.groups(), q = k % lanes;
         for (int field = 0; field < 2; ++field) {
-            const Field& f = field == 0 ? space_.r() : space_.z();
+            const SplineSpace& f = field == 0 ? space_.r() : space_.z();
             for (int d = first_derivative[field]; d < 3; ++d) {
                 const double c = factor * jet.d[first_variable[field] + d - first_derivative[field]][q];
                 for (int a = 0; a < splines.width(); ++a)

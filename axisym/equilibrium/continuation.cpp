@@ -291,7 +291,7 @@ private:
         system_->forms().observe(x, &defect);
         const double allowed = std::max(settings_.shapes.accuracy, 1e-11) * system_->forms().reference_energy(x);
         if (lost(defect) <= allowed) return true;
-        const ProfileSpace& splines = system_->space().splines();
+        const SplineSpace& splines = system_->space().splines();
         std::vector<double> breaks = adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(),
                                                     settings_.shapes.max_elements + 1);
         if (static_cast<int>(breaks.size()) - 1 > settings_.shapes.max_elements) return false;

@@ -14,7 +14,7 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr int lanes = ProfileSpace::lanes;
+constexpr int lanes = SplineSpace::lanes;
 using J = Jet<Pack, 6, 2>;
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -77,7 +77,7 @@ J functional_density(const Bending& bending, double sigma, double lambda, const 
 ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium& shape)
     : problem_(problem), shape_(shape) {
     const CurveSpace& space = *shape.space;
-    const ProfileSpace& splines = space.splines();
+    const SplineSpace& splines = space.splines();
     // Displacements go along a spline field n that is the normal up to the error of a projection. Only their normal
     // part matters at a stationary shape, and two derivatives of n are at hand.
     const auto normal = [&](double s) {
@@ -118,8 +118,8 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
 
 // (force, phi) = -first variation by phi, for all phi of a scalar field.
 void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_variation) {
-    const ProfileSpace& splines = shape_.space->splines();
-    const Field field(splines, shape_.space->scalar_parity());
+    const SplineSpace& splines = shape_.space->splines();
+    const SplineSpace field(splines, Parity{});
     const int n = field.size(), width = splines.width(), per_element = splines.groups() * lanes;
     Matrix mass = Matrix::Zero(n, n);
     Vector load = Vector::Zero(n);
@@ -226,15 +226,14 @@ struct ModeStability::Forms {
           rigid{area, area} {}
 };
 
-ModeStability::Forms ModeStability::assemble(int m, const Field& field) const {
-    const ProfileSpace& splines = field.splines();
-    const int width = splines.width(), per_element = splines.groups() * lanes;
+ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) const {
+    const int width = field.width(), per_element = field.groups() * lanes;
     const double m2 = m * m;
     Forms forms(field.size());
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
         const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto& b = field.basis(e, static_cast<int>(k) % per_element / lanes);
         const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
         const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
         Eigen::Matrix3d C;
@@ -273,27 +272,26 @@ ModeStability::Forms ModeStability::assemble(int m, const Field& field) const {
 
 // A basis of the functions that begin with the power m of the distance at a pole. Parity does it for m = 0 and 1; of
 // the others the even ones must vanish, the odd ones be flat.
-Matrix ModeStability::regular(int m, const Field& field) const {
-    const ProfileSpace& splines = field.splines();
+Matrix ModeStability::regular(int m, const SplineSpace& field) const {
     Matrix at_poles(field.size(), 0);
     const auto require = [&](int e, double s) {
-        double values[3 * ProfileSpace::max_width];
-        splines.splines(e, s, 2, values);
+        double values[3 * SplineSpace::max_width];
+        field.splines(e, s, 2, values);
         Vector functional = Vector::Zero(field.size());
-        for (int a = 0; a < splines.width(); ++a)
-            functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * splines.width() + a];
+        for (int a = 0; a < field.width(); ++a)
+            functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * field.width() + a];
         append(at_poles, functional.normalized());
     };
     if (shape_.space->closed() && m >= 2) {
         require(0, 0);
-        if (shape_.space->topology() == Topology::cell) require(splines.elements() - 1, 1);
+        if (shape_.space->topology() == Topology::cell) require(field.elements() - 1, 1);
     }
     return complement(at_poles);
 }
 
 // The dissipation of w nu with the best tangential velocity, as a quadratic form in w. That velocity is grad chi + nu x
 // grad psi, w and chi going with cos(m theta), psi with sin: inextensibility is Lap chi = H w, and psi is free.
-Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parity, const Field& field,
+Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                        const Forms& forms) const {
     if (!law.inextensible) return law.friction * forms.mass;
     const bool constants = m == 0 && mirror(parity) >= 0;
@@ -308,15 +306,14 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
                         : shape_.space->closed() ? parity.start
                                                  : -parity.start,
                         mirror(parity) == 0 ? parity.end : -parity.end};
-    const Field psi(field.splines(), turned);
-    const ProfileSpace& splines = field.splines();
-    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = splines.width(),
-              per_element = splines.groups() * lanes;
+    const SplineSpace psi(field, turned);
+    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = field.width(),
+              per_element = field.groups() * lanes;
     Matrix sigma = Matrix::Zero(3 * static_cast<Eigen::Index>(points_.size()), 2 * n + swirls);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
         const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const auto& b = field.basis(e, static_cast<int>(k) % per_element / lanes);
         const double root = std::sqrt(p.weight * p.r * p.g), sqrt2 = std::sqrt(2.0), rate = p.slope / p.r, mr = m / p.r;
         const auto add = [&](int column, double factor, double ss, double tt, double st) {
             const Eigen::Index row = 3 * static_cast<Eigen::Index>(k);
@@ -381,7 +378,7 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
 
 void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const {
     check_pause();
-    const Field field(shape_.space->splines(), parity);
+    const SplineSpace field(shape_.space->splines(), parity);
     Forms forms = assemble(m, field);
     check_pause();
     const Matrix M = dissipation_form(m, law, parity, field, forms), basis = regular(m, field);

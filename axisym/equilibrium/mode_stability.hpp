@@ -50,9 +50,9 @@ private:
     void set_force(const std::vector<std::array<double, 3>>& first_variation);
     std::vector<Parity> parities(int m) const;
     int mirror(Parity parity) const;
-    Forms assemble(int m, const Field& field) const;
-    Eigen::MatrixXd regular(int m, const Field& field) const;
-    Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const Field& field,
+    Forms assemble(int m, const SplineSpace& field) const;
+    Eigen::MatrixXd regular(int m, const SplineSpace& field) const;
+    Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                      const Forms& forms) const;
     Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
                                       const Eigen::MatrixXd& M) const;

@@ -29,7 +29,7 @@ std::vector<TermCheck> check_terms(const Problem& c) {
     const Tube& tube = std::get<Tube>(c.shape);
     const Cell cell = cell_of(tube, c.discretisation.symmetry);
     const int order = c.discretisation.order;
-    const ProfileSpace space(cell, uniform_breaks(cell, 12), order, c.discretisation.smoothness.value_or(order - 1));
+    const SplineSpace space(cell, uniform_breaks(cell, 12), order, c.discretisation.smoothness.value_or(order - 1));
     const Forms forms(space, c.energy);
     return check_terms(forms, space.project([&](double z) { return radius_at(tube, z); }));
 }

@@ -19,7 +19,7 @@ public:
     explicit ErrorTransport(const Forms& coarse);
     ErrorTransport(ErrorTransport&&) = delete;
 
-    const ProfileSpace& space() const { return fine_space_; }
+    const SplineSpace& space() const { return fine_space_; }
 
     // Errors (exact minus computed) as coefficients: of space and time in space(), and the part of time in the space of
     // the run.
@@ -50,7 +50,7 @@ public:
 
 private:
     const Forms& coarse_;
-    ProfileSpace fine_space_;
+    SplineSpace fine_space_;
     Forms fine_;
     Eigen::SparseMatrix<double> prolongation_;
     // On the fine mesh and on that of the run.

@@ -16,14 +16,14 @@ namespace tubule::axisym {
 namespace {
 
 namespace stdx = std::experimental;
-constexpr int lanes = ProfileSpace::lanes;
-constexpr int wide = ProfileSpace::max_width;
+constexpr int lanes = SplineSpace::lanes;
+constexpr int wide = SplineSpace::max_width;
 
 // Coefficients of an element, gathered into r, r', r'' at its quadrature points.
 template <int P>
 struct Local {
     Pack r{0.0}, r1{0.0}, r2{0.0};
-    Local(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
+    Local(const SplineSpace::Basis& b, const int* dofs, const double* x) {
         for (int a = 0; a <= P; ++a) {
             const double c = x[dofs[a]];
             r += c * load(b.by_point[0][a]);
@@ -34,7 +34,7 @@ struct Local {
 };
 
 template <int P>
-Pack gather(const ProfileSpace::Basis& b, const int* dofs, const double* x) {
+Pack gather(const SplineSpace::Basis& b, const int* dofs, const double* x) {
     Pack value{0.0};
     for (int a = 0; a <= P; ++a) value += x[dofs[a]] * load(b.by_point[0][a]);
     return value;
@@ -54,7 +54,7 @@ Jet<Pack, 3, Order> energy_density(const Bending& bending, const Loads& loads, c
 
 }  // namespace
 
-Forms::Forms(const ProfileSpace& space, const Bending& bending, const Loads& loads)
+Forms::Forms(const SplineSpace& space, const Bending& bending, const Loads& loads)
     : space_(space), bending_(bending), loads_(loads), images_(space.cell().images()) {
     const int w = space.width(), degree = space.degree();
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");

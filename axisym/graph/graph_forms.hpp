@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 #include "common/energy/bending.hpp"
 #include "common/model/model.hpp"
 
@@ -31,9 +31,9 @@ struct Observation {
 class Forms {
 public:
     // The loads are the same at all times; a force means nothing to a graph, whose period is fixed.
-    Forms(const ProfileSpace& space, const Bending& bending, const Loads& loads = {});
+    Forms(const SplineSpace& space, const Bending& bending, const Loads& loads = {});
 
-    const ProfileSpace& space() const { return space_; }
+    const SplineSpace& space() const { return space_; }
     const Bending& bending() const { return bending_; }
     const Loads& loads() const { return loads_; }
 
@@ -84,7 +84,7 @@ private:
     template <int P>
     double axial_force_kernel(const double* x) const;
 
-    const ProfileSpace& space_;
+    const SplineSpace& space_;
     Bending bending_;
     Loads loads_;
     double images_;  // cells in the whole period

@@ -39,7 +39,7 @@ void restart_fields(Fields&& f, State& s) {
 
 }  // namespace
 
-Record graph_record(double time, const ProfileSpace& space, const GraphRestart& s, const Eigen::VectorXd& rate,
+Record graph_record(double time, const SplineSpace& space, const GraphRestart& s, const Eigen::VectorXd& rate,
                     double energy) {
     const Cell& cell = space.cell();
     const auto spline = space.unfold(s.coefficients, 0);

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule::axisym {
@@ -22,7 +22,7 @@ struct GraphRestart {
 
 // Numbers degree, length, energy; arrays knots, coefficients (the spline over the period [0, length]), sampled
 // z, r, H, K, u_n (normal velocity); and the restart state under names that begin with restart_.
-Record graph_record(double time, const ProfileSpace& space, const GraphRestart& state, const Eigen::VectorXd& rate,
+Record graph_record(double time, const SplineSpace& space, const GraphRestart& state, const Eigen::VectorXd& rate,
                     double energy);
 
 // Throws as RecordReader.

@@ -17,9 +17,9 @@ namespace {
 constexpr double start_margin = 1.0 / 4;  // initial defect / defect at which to remesh
 constexpr int fewest_elements = 3;
 
-ProfileSpace space_of(const Cell& cell, std::vector<double> breaks, const Problem& c) {
+SplineSpace space_of(const Cell& cell, std::vector<double> breaks, const Problem& c) {
     const int order = c.discretisation.order;
-    return ProfileSpace(cell, std::move(breaks), order, c.discretisation.smoothness.value_or(order - 1));
+    return SplineSpace(cell, std::move(breaks), order, c.discretisation.smoothness.value_or(order - 1));
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ FirstMesh first_mesh(const Problem& c, const GraphSettings& settings, const Cell
                                  : std::max(fewest_elements, 8 * most_waves / cell.images());
     FirstMesh out{uniform_breaks(cell, first)};
     for (int pass = 0;; ++pass) {
-        const ProfileSpace space = space_of(cell, out.breaks, c);
+        const SplineSpace space = space_of(cell, out.breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(start);
         const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());

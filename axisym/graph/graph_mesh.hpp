@@ -21,7 +21,7 @@ std::vector<int> tracked_graph_modes(const Problem& c);
 struct GraphMesh {
     GraphMesh(const Cell& cell, std::vector<double> breaks, const Problem& c);
 
-    ProfileSpace space;
+    SplineSpace space;
     Forms forms;
     ErrorTransport transport;
     std::vector<std::array<Eigen::VectorXd, 2>> modes;  // functionals of those that are tracked

@@ -86,7 +86,7 @@ struct Density {
 };
 
 // The defect of an element of size h is c h^(2p-1). Equal shares mean h ~ c^(-1/(2p-1)).
-Density wanted_density(const ProfileSpace& space, const std::vector<double>& defect, double target, int fewest) {
+Density wanted_density(const SplineSpace& space, const std::vector<double>& defect, double target, int fewest) {
     constexpr double growth = 0.35;  // of the element size per distance
     const int exponent = 2 * space.degree() - 1;
     Density d;
@@ -120,7 +120,7 @@ Density wanted_density(const ProfileSpace& space, const std::vector<double>& def
 
 }  // namespace
 
-std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
                                    int fewest, int most) {
     const Density d = wanted_density(space, defect, target, fewest);
     const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(d.integral()), most)));
@@ -137,7 +137,7 @@ std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<
     return breaks;
 }
 
-std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
                                    int most) {
     const Density d = wanted_density(space, defect, target, 1);
     std::vector<double> breaks{space.cell().z0};

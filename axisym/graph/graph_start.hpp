@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 #include "common/case/problem.hpp"
 
 namespace tubule::axisym {
@@ -17,12 +17,12 @@ Cell cell_of(const Tube& tube, bool symmetry);
 // Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by the
 // present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the same
 // grading at most `most`.
-std::vector<double> adapted_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
                                    int fewest, int most);
 
 // The same by division of the present elements: the new space contains the old one. Ends early, before the end of the
 // cell, where there would be more than `most`.
-std::vector<double> refined_breaks(const ProfileSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
                                    int most);
 
 // The defect of each element that the flow from x will soon develop: the largest over x itself and single

@@ -4,11 +4,11 @@
 #include <experimental/simd>
 #include <type_traits>
 
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 
 namespace tubule::axisym {
 
-using Pack = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, ProfileSpace::lanes>>;
+using Pack = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, SplineSpace::lanes>>;
 
 inline Pack load(const double* p) {
     return Pack(p, std::experimental::vector_aligned);

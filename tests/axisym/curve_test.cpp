@@ -38,15 +38,14 @@ Vector rough(const CurveSpace& space, double size = 0.02) {
 
 using test::message_of;
 
-TEST(Field, parityAtTheEnds) {
+TEST(SplineSpace, parityAtTheEnds) {
     // Definition: an odd function and its second derivative vanish, an even one's first derivative does. Sizes for odd
     // degrees and simple knots: n + 1 even ones, one less for each odd end; even degrees have n, whatever the parity.
     for (int degree = 2; degree <= 7; ++degree)
         for (int smoothness = 1; smoothness < degree; ++smoothness)
             for (const Parity parity : {Parity{1, 1}, Parity{1, -1}, Parity{-1, 1}, Parity{-1, -1}}) {
                 const int n = 6, m = degree - smoothness;
-                const ProfileSpace splines({0, 1, true, 1}, uneven_breaks(n), degree, smoothness);
-                const Field field(splines, parity);
+                const SplineSpace field({0, 1, true, 1}, uneven_breaks(n), degree, smoothness, parity);
                 if (m == 1) {
                     const int absent = (parity.start < 0) + (parity.end < 0);
                     EXPECT_EQ(field.size(), n + (degree % 2 == 1 ? 1 - absent : 0));
@@ -266,7 +265,7 @@ TEST(CurveForms, tubesAgreeWithTheirGraphs) {
     const Tube tube{1, 2, {{0.3, 1, 0, 0.4}, {0.05, 3, 0, 0}}};
     const Bending law = bending(0.2, -2, 0.03, 0.06);
     const Cell cell{0, 2, false, 1};
-    const ProfileSpace space(cell, uniform_breaks(cell, 80), 7, 6);
+    const SplineSpace space(cell, uniform_breaks(cell, 80), 7, 6);
     const Vector x = space.project([&](double z) { return radius_at(tube, z); }), rest = Vector::Zero(x.size());
     const Observation graph = Forms(space, law).observe(x.data(), rest.data());
     const auto curve = observe(meridian(tube), law, 160);

@@ -21,7 +21,7 @@ std::vector<double> sizes(const std::vector<double>& breaks) {
 // What is lost per length falls with the power 2 (p - 1) of the size: a million times as much in one of ten elements,
 // quintic ones, asks for elements smaller by 10^(6/8) there.
 TEST(MeshNeed, putsSmallElementsWhereMuchIsLost) {
-    const ProfileSpace space(Cell{0, 1, false, 1}, equal_breaks(10), 5, 4);
+    const SplineSpace space(Cell{0, 1, false, 1}, equal_breaks(10), 5, 4);
     std::vector<double> defect(10, 1e-12);
     MeshNeed need;
     need.add(space, defect);

@@ -132,15 +132,15 @@ double inf_sup(const CurveSpace& space, const Vector& x) {
     const Eigen::MatrixXd all = J;
     const int n = space.shape_size(), m = motion.pressures().size();
     const Eigen::MatrixXd norm = all.block(at.u_r, at.u_r, n, n), B = all.block(at.p, at.u_r, m, n);
-    const Field& field = motion.pressures();
+    const SplineSpace& field = motion.pressures();
     Eigen::MatrixXd mass = Eigen::MatrixXd::Zero(m, m);
-    for (int e = 0; e < field.splines().elements(); ++e)
-        for (int q = 0; q < ProfileSpace::lanes; ++q) {
-            const auto& b = field.splines().basis(e, 0);
+    for (int e = 0; e < field.elements(); ++e)
+        for (int q = 0; q < SplineSpace::lanes; ++q) {
+            const auto& b = field.basis(e, 0);
             const CurvePoint p = space.evaluate(x, b.z[q]);
             const double dS = space.images() * b.weight[q] * 2 * pi * p.r * std::hypot(p.r1, p.z1);
-            for (int i = 0; i < field.splines().width(); ++i)
-                for (int j = 0; j < field.splines().width(); ++j)
+            for (int i = 0; i < field.width(); ++i)
+                for (int j = 0; j < field.width(); ++j)
                     mass(field.dofs(e)[i], field.dofs(e)[j]) +=
                         dS * field.signs(e)[i] * field.signs(e)[j] * b.by_spline[q][0][i] * b.by_spline[q][0][j];
         }

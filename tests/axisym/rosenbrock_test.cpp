@@ -160,7 +160,7 @@ TEST(BandLu, solves) {
     for (const bool mirror : {true, false})
         for (const int elements : {2, 3, 9, 40}) {
             const Cell cell{0, 1, mirror, 1};
-            const ProfileSpace space(cell, uniform_breaks(cell, elements), 5, 4);
+            const SplineSpace space(cell, uniform_breaks(cell, elements), 5, 4);
             Eigen::SparseMatrix<double> A = Forms(space, bending(1, 0)).pattern();
             for (int k = 0; k < A.nonZeros(); ++k) A.valuePtr()[k] = normal(engine);
             const Eigen::VectorXd b = Eigen::VectorXd::Random(A.cols());

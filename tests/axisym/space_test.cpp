@@ -6,7 +6,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_start.hpp"
-#include "axisym/splines/profile_space.hpp"
+#include "axisym/splines/spline_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/support/random_vector.hpp"
@@ -43,10 +43,10 @@ Vector rough(int n, unsigned seed = 2) {
 
 const Cell periodic{-0.3, 1.7, false, 1}, mirrored{-0.3, 0.7, true, 1};
 
-TEST(ProfileSpace, refusesWhatIsNoSpace) {
+TEST(SplineSpace, refusesWhatIsNoSpace) {
     const auto message = [](std::vector<double> breaks, int degree, int smoothness) -> std::string {
         try {
-            ProfileSpace(Cell{0, 1, false, 1}, std::move(breaks), degree, smoothness);
+            SplineSpace(Cell{0, 1, false, 1}, std::move(breaks), degree, smoothness);
         } catch (const std::invalid_argument& e) {
             return e.what();
         }
@@ -61,23 +61,23 @@ TEST(ProfileSpace, refusesWhatIsNoSpace) {
         EXPECT_EQ(message(breaks, 5, 4), "breaks must increase and define at least two elements") << breaks.size();
 }
 
-TEST(ProfileSpace, hasTheDimensionOfItsPiecewisePolynomials) {
+TEST(SplineSpace, hasTheDimensionOfItsPiecewisePolynomials) {
     // Theorem: n elements of degree p with C^s at the knots have n (p - s) periodic splines; the even ones about both
     // ends of a mirrored cell are half of those of the doubled cell, plus one half for each end where a spline of
     // odd degree is symmetric about the knot itself ((p - s) odd).
     for (const Kind& k : kinds) {
         const int n = 6, m = k.degree - k.smoothness;
-        const ProfileSpace whole(periodic, uneven(periodic, n), k.degree, k.smoothness);
+        const SplineSpace whole(periodic, uneven(periodic, n), k.degree, k.smoothness);
         EXPECT_EQ(whole.size(), n * m) << text(k);
-        const ProfileSpace half(mirrored, uneven(mirrored, n), k.degree, k.smoothness);
+        const SplineSpace half(mirrored, uneven(mirrored, n), k.degree, k.smoothness);
         EXPECT_EQ(half.size(), m % 2 == 1 ? n * m + 1 : n * m + (k.smoothness % 2 == 0 ? 1 : 0)) << text(k);
     }
 }
 
-TEST(ProfileSpace, basisSumsToOneAndDerivativesToZero) {
+TEST(SplineSpace, basisSumsToOneAndDerivativesToZero) {
     for (const Kind& k : kinds)
         for (const Cell& cell : {periodic, mirrored}) {
-            const ProfileSpace space(cell, uneven(cell, 7), k.degree, k.smoothness);
+            const SplineSpace space(cell, uneven(cell, 7), k.degree, k.smoothness);
             const Vector one = Vector::Ones(space.size());
             for (int e = 0; e < space.elements(); ++e) {
                 const double h = space.breaks()[e + 1] - space.breaks()[e];
@@ -92,11 +92,11 @@ TEST(ProfileSpace, basisSumsToOneAndDerivativesToZero) {
         }
 }
 
-TEST(ProfileSpace, derivativesAreThoseOfTheValue) {
+TEST(SplineSpace, derivativesAreThoseOfTheValue) {
     // Taylor's theorem, exact for polynomials: the value of a spline within an element is interpolated at degree + 1
     // points; the derivatives of the interpolant (divided differences in long double) are those expected.
     for (const Kind& k : kinds) {
-        const ProfileSpace space(periodic, uneven(periodic, 5), k.degree, k.smoothness);
+        const SplineSpace space(periodic, uneven(periodic, 5), k.degree, k.smoothness);
         const Vector x = rough(space.size());
         for (int e = 0; e < space.elements(); ++e) {
             const double a = space.breaks()[e], h = space.breaks()[e + 1] - a;
@@ -125,16 +125,16 @@ TEST(ProfileSpace, derivativesAreThoseOfTheValue) {
     }
 }
 
-TEST(ProfileSpace, tabulatedBasisIsTheEvaluatedOne) {
+TEST(SplineSpace, tabulatedBasisIsTheEvaluatedOne) {
     // Expected: evaluate(), from other code, at the Gauss points; the weights integrate 1 to the length of the cell.
     for (const Kind& k : kinds) {
-        const ProfileSpace space(mirrored, uneven(mirrored, 4), k.degree, k.smoothness);
+        const SplineSpace space(mirrored, uneven(mirrored, 4), k.degree, k.smoothness);
         const Vector x = rough(space.size());
         double length = 0;
         for (int e = 0; e < space.elements(); ++e)
             for (int g = 0; g < space.groups(); ++g) {
                 const auto& b = space.basis(e, g);
-                for (int q = 0; q < ProfileSpace::lanes; ++q) {
+                for (int q = 0; q < SplineSpace::lanes; ++q) {
                     length += b.weight[q];
                     const auto expected = space.evaluate(x.data(), e, b.z[q]);
                     for (int d = 0; d < 3; ++d) {
@@ -151,11 +151,11 @@ TEST(ProfileSpace, tabulatedBasisIsTheEvaluatedOne) {
     }
 }
 
-TEST(ProfileSpace, isAsSmoothAsItSaysAndNoSmoother) {
+TEST(SplineSpace, isAsSmoothAsItSaysAndNoSmoother) {
     // From the two sides of a knot: value and slope always agree, the second derivative if smoothness >= 2.
     for (const Kind& k : kinds)
         for (const Cell& cell : {periodic, mirrored}) {
-            const ProfileSpace space(cell, uneven(cell, 5), k.degree, k.smoothness);
+            const SplineSpace space(cell, uneven(cell, 5), k.degree, k.smoothness);
             const Vector x = rough(space.size());
             double jump[3] = {0, 0, 0};
             for (int e = 0; e < space.elements(); ++e) {
@@ -179,7 +179,7 @@ TEST(ProfileSpace, isAsSmoothAsItSaysAndNoSmoother) {
 }
 
 // Largest difference of two splines on a fine grid.
-double distance(const ProfileSpace& a, const Vector& x, const ProfileSpace& b, const Vector& y) {
+double distance(const SplineSpace& a, const Vector& x, const SplineSpace& b, const Vector& y) {
     double largest = 0;
     for (int i = 0; i <= 997; ++i) {
         const double z = a.cell().z0 + a.cell().length() * i / 997;
@@ -199,12 +199,12 @@ std::vector<double> halved(const std::vector<double>& breaks) {
     return out;
 }
 
-TEST(ProfileSpace, nestedSpacesHoldEachOther) {
+TEST(SplineSpace, nestedSpacesHoldEachOther) {
     // Theorem: inserting knots keeps the spline. Projection, prolongation and its matrix all reproduce it.
     for (const Kind& k : kinds)
         for (const Cell& cell : {periodic, mirrored}) {
-            const ProfileSpace coarse(cell, uneven(cell, 5), k.degree, k.smoothness);
-            const ProfileSpace fine(cell, halved(coarse.breaks()), k.degree, k.smoothness);
+            const SplineSpace coarse(cell, uneven(cell, 5), k.degree, k.smoothness);
+            const SplineSpace fine(cell, halved(coarse.breaks()), k.degree, k.smoothness);
             const Vector x = rough(coarse.size());
             const Vector again =
                 coarse.project([&](double z) { return coarse.value(x.data(), coarse.element_at(z), z); });
@@ -214,11 +214,11 @@ TEST(ProfileSpace, nestedSpacesHoldEachOther) {
         }
 }
 
-TEST(ProfileSpace, hermiteSpacesHoldWhatIsLocal) {
+TEST(SplineSpace, hermiteSpacesHoldWhatIsLocal) {
     // With smoothness s = (p - 1)/2 a spline of degree p is free to vanish outside of the two elements at a knot
     // and to be 1 there: the Hermite interpolant, in closed form.
     for (const Kind& k : {Kind{3, 1}, Kind{5, 2}, Kind{7, 3}}) {
-        const ProfileSpace space(periodic, uneven(periodic, 6), k.degree, k.smoothness);
+        const SplineSpace space(periodic, uneven(periodic, 6), k.degree, k.smoothness);
         const double a = space.breaks()[2], b = space.breaks()[4], knot = space.breaks()[3];
         const auto local = [&](double z) {  // step of degree 2s + 1 = p, flat to order s at both ends
             const int s = k.smoothness;
@@ -242,14 +242,14 @@ TEST(ProfileSpace, hermiteSpacesHoldWhatIsLocal) {
     }
 }
 
-TEST(ProfileSpace, approximatesWithFullOrder) {
+TEST(SplineSpace, approximatesWithFullOrder) {
     // Theorem: the error of the best spline of degree p falls like h^(p+1) for smooth functions.
     const auto f = [](double z) { return 1 + 0.3 * std::sin(pi * z) + 0.1 * std::cos(2 * pi * z + 0.4); };
     for (const Kind& k : kinds) {
         double error[2];
         const int n[2] = {10, 20};
         for (int i = 0; i < 2; ++i) {
-            const ProfileSpace space(periodic, uniform_breaks(periodic, n[i]), k.degree, k.smoothness);
+            const SplineSpace space(periodic, uniform_breaks(periodic, n[i]), k.degree, k.smoothness);
             const Vector x = space.project(f);
             double sum = 0;
             for (int j = 0; j < 1000; ++j) {
@@ -277,11 +277,11 @@ double cox_de_boor(const std::vector<double>& t, const std::vector<double>& c, i
     return sum;
 }
 
-TEST(ProfileSpace, unfoldsToTheWholePeriod) {
+TEST(SplineSpace, unfoldsToTheWholePeriod) {
     // Expected: value() at the image of z in the cell; the unfolded spline is evaluated by the textbook recurrence.
     for (const Kind& k : kinds)
         for (const Cell& cell : {periodic, mirrored, Cell{0.2, 0.7, false, 3}, Cell{0.2, 0.5, true, 2}}) {
-            const ProfileSpace space(cell, uneven(cell, 5), k.degree, k.smoothness);
+            const SplineSpace space(cell, uneven(cell, 5), k.degree, k.smoothness);
             const Vector x = rough(space.size());
             for (double start : {0.0, -0.3, 0.45}) {
                 const auto [knots, coefficients] = space.unfold(x, start);
@@ -302,10 +302,10 @@ TEST(ProfileSpace, unfoldsToTheWholePeriod) {
         }
 }
 
-TEST(ProfileSpace, findsExtremaWhereTheyAre) {
+TEST(SplineSpace, findsExtremaWhereTheyAre) {
     // Expected: the minimum of 1 - 0.5 cos(2 pi (z - 0.5)) at z = 0.5, found from a distance.
     const Cell cell{0, 1, false, 1};
-    const ProfileSpace space(cell, uneven(cell, 12), 7, 6);
+    const SplineSpace space(cell, uneven(cell, 12), 7, 6);
     const Vector x = space.project([](double z) { return 1 - 0.5 * std::cos(2 * pi * (z - 0.5)); });
     EXPECT_NEAR(space.extremum_near(x.data(), 0.47), 0.5, 1e-6);
 }
@@ -333,7 +333,7 @@ TEST(Symmetry, mirrorCellIsThePeriodicOne) {
         const auto breaks = uneven(half, 6);
         auto all = breaks;
         for (int i = 5; i >= 0; --i) all.push_back(2 - breaks[i]);
-        const ProfileSpace a(half, breaks, k.degree, k.smoothness), b(whole, all, k.degree, k.smoothness);
+        const SplineSpace a(half, breaks, k.degree, k.smoothness), b(whole, all, k.degree, k.smoothness);
         const auto profile = [](double z) { return 1 + 0.4 * std::cos(pi * z) - 0.1 * std::cos(2 * pi * z); };
         const auto direction = [](double z) { return 0.3 - std::cos(pi * z) + 0.2 * std::cos(3 * pi * z); };
         const Vector x = a.project(profile), y = b.project(profile), v = a.project(direction), w = b.project(direction);

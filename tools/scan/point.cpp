@@ -92,7 +92,7 @@ Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
     if (kind_of(frame) != RecordKind::graph) return Rest::here;
     const axisym::GraphRestart state = axisym::graph_restart(frame);
     const int order = c.discretisation.order;
-    const axisym::ProfileSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
+    const axisym::SplineSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
     const axisym::Forms forms(space, c.energy, loads_at(motion_law(c.model), 0));
     const Eigen::MatrixXd hessian = forms.hessian(state.coefficients), mass = forms.mass(state.coefficients);
     const std::optional<Eigenpairs> modes = eigenpairs(hessian, mass);

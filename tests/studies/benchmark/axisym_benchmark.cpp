@@ -33,7 +33,7 @@ BENCHMARK_CAPTURE(figure_run, rosenbrock, Integrator::rosenbrock)->DenseRange(3,
 // The kernels, per call on one cell of 8 elements.
 struct Kernel {
     Cell cell{0.5, 1.5, true, 1};
-    ProfileSpace space;
+    SplineSpace space;
     Forms forms;
     Eigen::VectorXd x, v, out;
     std::vector<double> values;
