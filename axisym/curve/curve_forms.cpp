@@ -224,7 +224,7 @@ std::vector<double> CurveForms::H0_at(const Eigen::VectorXd& x, const std::vecto
     const Eigen::VectorXd& curve = H0_by_area() ? x : fixed_on_;
     std::vector<double> out = area_below(space_, curve, s);
     for (std::size_t i = 0; i < s.size(); ++i) {
-        const CurvePoint p = space_.evaluate(curve, s[i]);
+        const CurveSample p = space_.evaluate(curve, s[i]);
         const double variables[]{out[i], p.r, p.z};
         out[i] = evaluate(*bending_.H0_formula, variables);
     }
@@ -498,7 +498,7 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
         if (mirror && e == 0) before = Eigen::Vector2d(-r.start * after[0], -z.start * after[1]);
         if (mirror && e == n) after = Eigen::Vector2d(-r.end * before[0], -z.end * before[1]);
         const double left = size(e > 0 ? e - 1 : mirror ? 0 : n - 1), right = size(e < n ? e : mirror ? n - 1 : 0);
-        const CurvePoint at = space_.evaluate(x, breaks[e]);
+        const CurveSample at = space_.evaluate(x, breaks[e]);
         const Eigen::Vector2d normal = Eigen::Vector2d(at.z1, -at.r1).normalized();
         jump[e] = 2 * normal.dot(after - before) / (left + right);
     }

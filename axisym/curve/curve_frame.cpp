@@ -38,7 +38,7 @@ struct Sample {
 Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     const CurveSpace& space = motion.space();
     const MotionLayout& at = motion.layout();
-    const CurvePoint c = space.evaluate(state.y.head(space.size()), s);
+    const CurveSample c = space.evaluate(state.y.head(space.size()), s);
     if (const double beside = beside_pole(space, s); beside != s) {
         Sample pole = sample(motion, state, beside);
         pole.r = 0, pole.z = c.z, pole.u_t = 0, pole.u_theta = 0;
@@ -57,36 +57,17 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
-// A curve through enough points that the spline between them does not limit the accuracy.
-Meridian sampled(const WavedProfile& surface, const ResultFrame& from) {
-    int waves = 0;
-    for (const FrameMode& mode : from.modes) waves = std::max(waves, mode.l ? *mode.l : *mode.n);
-    const int n = 600 + 40 * waves;
-    const bool cell = surface.curve.kind == ProfileCurve::Kind::cell;
-    std::vector<std::array<double, 2>> points;
-    for (int i = 0; i <= n; ++i) {
-        const Eigen::Vector3d x = position(surface, Torus{2, 1}, base_point(surface.curve, double(i) / n, 0));
-        points.push_back({x[0], x[2]});
-    }
-    if (cell)
-        points.front()[0] = points.back()[0] = 0;
-    else
-        points.back() = {points[0][0], points[0][1] + surface.curve.length};
-    return meridian(points, cell ? Topology::cell : Topology::tube, surface.curve.length);
-}
-
 struct MakeMeridian {
     const Problem& c;
     template <class Exact>
-    Meridian operator()(const Exact& shape) const {
+    Curve operator()(const Exact& shape) const {
         return meridian(shape);
     }
-    Meridian operator()(const ProfileFile& file) const { return meridian(start_profile(c, file)); }
-    Meridian operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
-    Meridian operator()(const ResultFrame& from) const {
+    Curve operator()(const ProfileFile& file) const { return start_profile(c, file).curve; }
+    Curve operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
+    Curve operator()(const ResultFrame&) const {
         try {
-            const Record frame = start_frame(c).record;
-            return from.modes.empty() ? frame_meridian(frame) : sampled(disturbed_profile(c, frame), from);
+            return meridian(disturbed_curve(c, start_frame(c).record));
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
         }
@@ -135,33 +116,18 @@ CurveRestart curve_restart(const Record& record) {
     return s;
 }
 
-Meridian frame_meridian(const Record& frame) {
-    const auto profile = profile_of(frame);
-    if (const auto* spline = std::get_if<Revolution>(&profile)) return meridian(*spline);
-    const auto& [r, z, length] = std::get<ProfilePoints>(profile);
-    std::vector<std::array<double, 2>> points;
-    for (std::size_t i = 0; i < r.size(); ++i) points.push_back({r[i], z[i]});
-    const double r_max = *std::max_element(r.begin(), r.end());
-    const bool has_poles = std::abs(r.front()) < 1e-9 * r_max && std::abs(r.back()) < 1e-9 * r_max;
-    return meridian(points, has_poles ? Topology::cell : Topology::tube, length);
-}
-
-std::optional<StartVelocity> start_velocity(const Problem& c) {
+std::optional<PerturbedCurve> initial_velocity(const Problem& c) {
     if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
     const Record frame = start_frame(c).record;
-    const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
-                *around = find_array(frame, "u_theta");
-    if (!normal || !along || kind_of(frame) != RecordKind::curve)
+    PerturbedCurve out = frame_curve(frame);
+    out.velocity = frame_velocity(frame, out);
+    if (!out.velocity)
         throw complaint(c, "velocity.initial",
                         "must not be \"result\": the frame of shape.path is no profile with a velocity");
-    const auto [r, z, length] = profile_points(frame);
-    StartVelocity out{profile_curve(r, z, length), {}, around != nullptr};
-    out.velocity =
-        profile_velocity(out.curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
     return out;
 }
 
-Meridian start_meridian(const Problem& c) {
+Curve initial_curve(const Problem& c) {
     return std::visit(MakeMeridian{c}, c.shape);
 }
 

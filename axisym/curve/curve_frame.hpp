@@ -1,4 +1,4 @@
-// Profile curves as records of the result file, and as starts from it.
+// Profile curves as records of the result file, and as initial shapes from it.
 #pragma once
 
 #include "axisym/curve/curve_motion.hpp"
@@ -33,20 +33,11 @@ Record state_record(double time, const CurveRestart& state);
 // Throws as RecordReader.
 CurveRestart curve_restart(const Record& record);
 
-// The profile of a frame, of a graph or a curve, over its whole period or from pole to pole. Throws
-// std::invalid_argument for a record that has none.
-Meridian frame_meridian(const Record& frame);
+// The initial shape of a case. Throws CaseError for a result without a frame of this tier.
+Curve initial_curve(const Problem& c);
 
-// Where a case begins. Throws CaseError for a result without a frame of this tier.
-Meridian start_meridian(const Problem& c);
-
-// The velocity of the frame that a case begins with, by the fraction of the arc length, where the case asks for it.
-// Throws CaseError where the frame has none.
-struct StartVelocity {
-    ProfileCurve curve;
-    ProfileVelocity velocity;
-    bool swirls = false;
-};
-std::optional<StartVelocity> start_velocity(const Problem& c);
+// The curve of the frame that a case begins with, with its velocity, where the case asks for that. Throws CaseError
+// where the frame has none.
+std::optional<PerturbedCurve> initial_velocity(const Problem& c);
 
 }  // namespace tubule::axisym

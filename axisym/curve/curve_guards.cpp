@@ -47,7 +47,7 @@ std::span<const CurveGuard> curve_guards() {
 std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen::VectorXd& x, const Snapshot& s,
                                            double time) {
     if (const auto crossing = self_intersection(space, x)) {
-        const CurvePoint p = space.evaluate(x, (*crossing)[0]);
+        const CurveSample p = space.evaluate(x, (*crossing)[0]);
         return StopReport{
             Stop::self_intersection, time,
             fmt::format("the profile intersects itself or crosses the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),

@@ -25,7 +25,7 @@ double minimum(F&& f, double low, double high) {
 
 ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x) {
     const auto at = [&](double s) { return space.evaluate(x, s); };
-    const CurvePoint south = at(0), north = at(1), middle = at(space.images() == 2 ? 1 : 0.5);
+    const CurveSample south = at(0), north = at(1), middle = at(space.images() == 2 ? 1 : 0.5);
     ShapeMeasures m;
     m.height = space.closed() ? space.images() * (north.z - south.z) : space.length(x.data());
     m.r_middle = middle.r;
@@ -36,7 +36,7 @@ ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x) {
         const double s = static_cast<double>(i) / n;
         if (at(s).r > at(static_cast<double>(widest) / n).r) widest = i;
         if (space.topology() == Topology::cell) {
-            const CurvePoint a = at(s), b = at(1 - s);
+            const CurveSample a = at(s), b = at(1 - s);
             m.asymmetry = std::max({m.asymmetry, std::abs(a.r - b.r), std::abs(a.z + b.z - 2 * middle.z)});
         }
     }
@@ -55,7 +55,7 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
     const int n = static_cast<int>(s.size());
     std::vector<Eigen::Vector2d> p;
     for (double t : s) {
-        const CurvePoint at = space.evaluate(x, t);
+        const CurveSample at = space.evaluate(x, t);
         p.emplace_back(at.r, at.z);
     }
     const int first = space.closed() ? 1 : 0, last = space.topology() == Topology::cell ? n - 2 : n - 1;
@@ -88,8 +88,7 @@ struct Sampled {
     ArcLength arc;
     std::vector<Eigen::Vector2d> points;
     int images;
-    explicit Sampled(const Meridian& m)
-        : arc(m), images(m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1) {
+    explicit Sampled(const Curve& m) : arc(m), images(m.images()) {
         constexpr int samples = 400;
         for (int i = 0; i <= samples; ++i) points.push_back(at(static_cast<double>(i) / samples));
     }
@@ -127,7 +126,7 @@ struct Sampled {
 
 }  // namespace
 
-double hausdorff_distance(const Meridian& a, const Meridian& b) {
+double hausdorff_distance(const Curve& a, const Curve& b) {
     const Sampled A(a), B(b);
     return std::max(A.farthest_from(B), B.farthest_from(A));
 }

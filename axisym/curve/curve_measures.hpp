@@ -26,6 +26,6 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
 
 // The Hausdorff distance of two surfaces of revolution with a common axis: that of their profiles. To about 1e-9 of
 // their size for curves that are smooth between seams.
-double hausdorff_distance(const Meridian& a, const Meridian& b);
+double hausdorff_distance(const Curve& a, const Curve& b);
 
 }  // namespace tubule::axisym

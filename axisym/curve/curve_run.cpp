@@ -45,7 +45,7 @@ public:
           restart_(restart),
           start_(beginning_of(c)),
           settings_(restart ? curve_restart(*restart).settings
-                            : settings_for(c, start_, first_settings(c, start_.images()))) {}
+                            : settings_for(c, start_, first_settings(c, start_.meridian.images()))) {}
 
     RunSummary& next() override {
         const Record* restart = std::exchange(restart_, nullptr);

@@ -59,7 +59,7 @@ std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& sett
     return settings.density.empty() ? equal_breaks(settings.elements) : breaks_of(settings.density, settings.elements);
 }
 
-std::unique_ptr<CurveSpace> space_of(const Problem& c, const Meridian& meridian, const std::vector<double>& breaks) {
+std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, const std::vector<double>& breaks) {
     const int degree = c.discretisation.order;
     return std::make_unique<CurveSpace>(meridian.topology, breaks, degree,
                                         c.discretisation.smoothness.value_or(degree - 1), meridian.length,
@@ -87,8 +87,8 @@ CurveLaw law_of(const Problem& c) {
 }
 
 Beginning beginning_of(const Problem& c) {
-    Meridian whole = start_meridian(c);
-    std::optional<StartVelocity> velocity = start_velocity(c);
+    Curve whole = initial_curve(c);
+    std::optional<PerturbedCurve> velocity = initial_velocity(c);
     if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() &&
         (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
@@ -111,10 +111,6 @@ double Beginning::free_energy(const MotionLaw& law) const {
     return bending.energy + loads_at(law, 0).energy(area, volume, meridian.length);
 }
 
-int Beginning::images() const {
-    return meridian.topology == Topology::half_cell || meridian.topology == Topology::half_tube ? 2 : 1;
-}
-
 CurveSetup::CurveSetup(const Problem& of, const Beginning& from, const CurveSettings& with)
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
@@ -125,7 +121,7 @@ CurveSetup::CurveSetup(const Problem& of, const Beginning& from, const CurveSett
     const FormulaDomain::Margin domain = forms.observe(x).domain;
     require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
-    law.swirls = law.swirls || (start.velocity && start.velocity->swirls);
+    law.swirls = law.swirls || (start.velocity && start.velocity->velocity->swirls);
     const double energy = start.free_energy(law);
     magnitude = std::max(std::abs(energy), std::max(std::abs(start.bending.energy), start.bending.magnitude) +
                                                load_scale(law, start.area, start.volume, start.meridian.length));
@@ -211,20 +207,16 @@ namespace {
 
 // The velocity of the frame that the run begins with; parameters are fractions of the arc length there and here.
 void set_velocity(const CurveSetup& setup, Eigen::VectorXd& y) {
-    const StartVelocity& start = *setup.start.velocity;
-    const CurveSpace& space = *setup.space;
+    const PerturbedCurve& curve = *setup.start.velocity;
     const MotionLayout& at = setup.motion->layout();
-    const auto value = [&](const BlendedCurve& functions, double s, int component) {
-        const bool cell = start.curve.kind == ProfileCurve::Kind::cell;
-        const double found = value_at(functions, cell ? -std::cos(pi * s) : s)[component];
-        return cell && (component == 0) ? found * std::sin(pi * s) : found;
+    const auto project = [&](const SplineSpace& field, int offset, int component) {
+        y.segment(offset, field.size()) = field.project([&](double s) {
+            return velocity(curve, Torus{2, 1}, base_point(curve, s, 0))[component];
+        });
     };
-    const auto project = [&](const SplineSpace& field, int offset, const BlendedCurve& functions, int component) {
-        y.segment(offset, field.size()) = field.project([&](double s) { return value(functions, s, component); });
-    };
-    project(space.r(), at.u_r, start.velocity.meridional, 0);
-    project(space.z(), at.u_z, start.velocity.meridional, 1);
-    if (at.swirl >= 0) project(space.r(), at.swirl, start.velocity.around, 0);
+    project(setup.space->r(), at.u_r, 0);
+    project(setup.space->z(), at.u_z, 2);
+    if (at.swirl >= 0) project(setup.space->r(), at.swirl, 1);
 }
 
 }  // namespace

@@ -18,14 +18,13 @@ CurveLaw law_of(const Problem& c);
 
 // The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct Beginning {
-    Meridian meridian;
+    Curve meridian;
     double area = 0, volume = 0;
     ShapeEnergy bending;
-    std::optional<StartVelocity> velocity = {};
-    std::string note = {};  // for the user
+    std::optional<PerturbedCurve> velocity = {};  // the curve of a frame with its velocity
+    std::string note = {};                        // for the user
 
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
-    int images() const;                              // of the meridian in the whole shape
 };
 Beginning beginning_of(const Problem& c);
 

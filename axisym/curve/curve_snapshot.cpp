@@ -11,11 +11,11 @@ namespace tubule::axisym {
 namespace {
 
 // Newton's method for r' = 0 between these parameters, from a point nearby, as long as radii decrease.
-CurvePoint minimum_near(const CurveSpace& space, const Eigen::VectorXd& x, double s, double low, double high) {
-    CurvePoint best = space.evaluate(x, s);
+CurveSample minimum_near(const CurveSpace& space, const Eigen::VectorXd& x, double s, double low, double high) {
+    CurveSample best = space.evaluate(x, s);
     for (int i = 0; i < 4 && best.r2 > 0; ++i) {
         s = std::clamp(s - best.r1 / best.r2, low, high);
-        const CurvePoint next = space.evaluate(x, s);
+        const CurveSample next = space.evaluate(x, s);
         if (!(next.r < best.r)) break;
         best = next;
     }
@@ -41,7 +41,7 @@ Neck narrowest(const CurveSpace& space, const double* y) {
         if (r[i] <= before && r[i] <= after && (lowest < 0 || r[i] < r[lowest])) lowest = i;
     }
     if (lowest < 0) return {0, std::numeric_limits<double>::infinity()};
-    const CurvePoint p =
+    const CurveSample p =
         minimum_near(space, x, s_at[lowest], s_at[std::max(lowest - 1, 0)], s_at[std::min(lowest + 1, n - 1)]);
     return {p.z, p.r};
 }
@@ -66,7 +66,7 @@ double mode_amplitude(const CurveSpace& space, const double* y, int n) {
         for (int g = 0; g < splines.groups(); ++g)
             for (int q = 0; q < SplineSpace::lanes; ++q) {
                 const auto& basis = splines.basis(e, g);
-                const CurvePoint p = space.evaluate(x, basis.z[q]);
+                const CurveSample p = space.evaluate(x, basis.z[q]);
                 const double angle = 2 * pi * n * p.z / space.length(y), part = basis.weight[q] * p.r * p.z1;
                 re += part * std::cos(angle), im += part * std::sin(angle);
             }

@@ -6,11 +6,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "common/solve/sparse.hpp"
-
 namespace tubule::axisym {
 
-Meridian spheroid(double reduced_volume, bool prolate) {
+Curve spheroid(double reduced_volume, bool prolate) {
     if (!(reduced_volume > 0 && reduced_volume < 1))
         throw std::invalid_argument(fmt::format("a spheroid cannot have a reduced volume of {}", reduced_volume));
     // Area of the spheroid with a = 1, c = q.
@@ -27,13 +25,13 @@ Meridian spheroid(double reduced_volume, bool prolate) {
     return meridian(Ellipsoid{a, a, a * q});
 }
 
-Meridian bowl(double thickness, double opening) {
+Curve bowl(double thickness, double opening) {
     if (!(thickness > 0 && thickness < 1 && opening > 0 && opening < pi))
         throw std::invalid_argument("a bowl needs a thickness between 0 and 1 and an opening between 0 and pi");
     const double inner = 1 - thickness, rim = thickness / 2, middle = 1 - rim;
     const double total = opening + pi * rim + inner * opening;
     const double first = opening / total, second = (opening + pi * rim) / total;
-    Meridian m;
+    Curve m;
     m.seams = {first, second};
     m.at = [=](double t) {
         const double s = t * total;
@@ -51,8 +49,8 @@ Meridian bowl(double thickness, double opening) {
     return m;
 }
 
-Meridian scaled(const Meridian& meridian, double factor) {
-    Meridian m = meridian;
+Curve scaled(const Curve& meridian, double factor) {
+    Curve m = meridian;
     m.length *= factor;
     m.at = [at = meridian.at, factor](double t) {
         auto p = at(t);
@@ -62,100 +60,21 @@ Meridian scaled(const Meridian& meridian, double factor) {
     return m;
 }
 
-namespace {
-
-Meridian spline_meridian(std::shared_ptr<const CurveSpace> space, const Eigen::VectorXd& x) {
-    Meridian m;
-    m.topology = space->topology();
-    m.length = space->length(x.data());
-    if (space->splines().smoothness() < 3)
-        m.seams.assign(space->splines().breaks().begin() + 1, space->splines().breaks().end() - 1);
-    m.at = [space, x](double t) {
-        const CurvePoint p = space->evaluate(x, t);
-        return std::array{p.r, p.r1, p.z, p.z1};
-    };
+Curve meridian(const CurveSpace& space, const Eigen::VectorXd& x) {
+    Curve m{space.topology(), space.length(x.data()), [space, x](double t) {
+                const CurveSample p = space.evaluate(x, t);
+                return std::array{p.r, p.r1, p.z, p.z1};
+            }};
+    const std::vector<double>& breaks = space.splines().breaks();
+    if (space.splines().smoothness() < 3) m.seams.assign(breaks.begin() + 1, breaks.end() - 1);
     return m;
 }
 
-// Coefficients of the spline with these values at the breaks; odd degree and simple knots make that a regular system.
-Eigen::VectorXd interpolate(const SplineSpace& splines, const std::vector<double>& values) {
-    const int n = splines.elements(), w = splines.width();
-    const bool mirror = splines.cell().mirror;
-    const int first = mirror && splines.parity().start < 0 ? 1 : 0,
-              last = !mirror || splines.parity().end < 0 ? n - 1 : n;
-    std::vector<Eigen::Triplet<double>> entries;
-    Eigen::VectorXd load(splines.size());
-    double basis[SplineSpace::max_width];
-    for (int i = first; i <= last; ++i) {
-        const int e = std::min(i, n - 1);
-        splines.splines(e, splines.breaks()[i], 0, basis);
-        for (int a = 0; a < w; ++a)
-            if (splines.signs(e)[a] != 0 && basis[a] != 0)
-                entries.emplace_back(i - first, splines.dofs(e)[a], splines.signs(e)[a] * basis[a]);
-        load[i - first] = values[i];
-    }
-    Eigen::SparseMatrix<double> matrix(splines.size(), splines.size());
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    SparseLu lu;
-    lu.factor(matrix);
-    return lu.solve(load);
-}
-
-}  // namespace
-
-Meridian meridian(const CurveSpace& space, const Eigen::VectorXd& x) {
-    const SplineSpace& s = space.splines();
-    return spline_meridian(
-        std::make_shared<CurveSpace>(space.topology(), s.breaks(), s.degree(), s.smoothness(), space.length(x.data())),
-        x.head(space.shape_size()));
-}
-
-Meridian meridian(const std::vector<std::array<double, 2>>& points, Topology topology, double length) {
-    const int n = static_cast<int>(points.size()) - 1;
-    if (n < 6) throw std::invalid_argument(fmt::format("a curve needs at least 7 points, not {}", n + 1));
-    std::vector<double> chord{0};
-    for (int i = 1; i <= n; ++i) {
-        const double step = std::hypot(points[i][0] - points[i - 1][0], points[i][1] - points[i - 1][1]);
-        if (!(step > 0))
-            throw std::invalid_argument(
-                fmt::format("points {} and {} of the curve coincide or are not finite", i - 1, i));
-        chord.push_back(chord.back() + step);
-    }
-    const double total = chord.back(), tolerance = 1e-9 * total;
-    for (double& c : chord) c /= total;
-    const auto require = [&](bool met, const char* what) {
-        if (!met) throw std::invalid_argument(what);
-    };
-    const bool closed = topology == Topology::cell || topology == Topology::half_cell;
-    for (int i = closed ? 1 : 0; i < (topology == Topology::cell ? n : n + 1); ++i)
-        if (!(points[i][0] > 0))
-            throw std::invalid_argument(
-                fmt::format("point {} of the curve has radius {}; it must be positive", i, points[i][0]));
-    if (closed) require(std::abs(points[0][0]) < tolerance, "the first point of a closed curve must have r = 0");
-    if (topology == Topology::cell)
-        require(std::abs(points[n][0]) < tolerance, "the last point of a closed curve must have r = 0");
-    if (topology == Topology::half_cell)
-        require(std::abs(points[n][1]) < tolerance, "the last point of a half cell must have z = 0");
-    if (topology == Topology::tube)
-        require(std::abs(points[n][0] - points[0][0]) < tolerance &&
-                    std::abs(points[n][1] - points[0][1] - length) < tolerance,
-                "the last point of a period must be the first one moved up by the length");
-    if (topology == Topology::half_tube)
-        require(std::abs(points[0][1]) < tolerance && std::abs(points[n][1] - length / 2) < tolerance,
-                "half a period must run from z = 0 to half the length");
-    const auto space = std::make_shared<CurveSpace>(topology, chord, 5, 4, length);
-    std::vector<double> r(n + 1), z(n + 1);
-    for (int i = 0; i <= n; ++i) r[i] = points[i][0], z[i] = points[i][1] - space->rise() * chord[i];
-    Eigen::VectorXd x(space->size());
-    x << interpolate(space->r(), r), interpolate(space->z(), z);
-    return spline_meridian(space, x);
-}
-
-Meridian half(const Meridian& whole) {
+Curve half(const Curve& whole) {
     const bool cell = whole.topology == Topology::cell;
     if (!cell && whole.topology != Topology::tube) throw std::invalid_argument("the curve is already one half");
     const double shift = whole.at(cell ? 0.5 : 0)[2];
-    Meridian out = whole;
+    Curve out = whole;
     out.topology = cell ? Topology::half_cell : Topology::half_tube;
     out.seams.clear();
     for (double t : whole.seams)
@@ -183,7 +102,7 @@ const GaussRule& panel_rule() {
 
 }  // namespace
 
-ArcLength::ArcLength(Meridian meridian) : meridian_(std::move(meridian)) {
+ArcLength::ArcLength(Curve meridian) : meridian_(std::move(meridian)) {
     constexpr int panels = 200;  // 8 points on each: lengths to rounding for anything resolved by 100 elements
     std::vector<double> edges{0};
     edges.insert(edges.end(), meridian_.seams.begin(), meridian_.seams.end());
@@ -248,7 +167,7 @@ Eigen::VectorXd fit(const CurveSpace& space, const ArcLength& curve) {
     return space.project([&](double s) { return curve.point(s); });
 }
 
-Eigen::VectorXd fit(const CurveSpace& space, const Meridian& meridian) {
+Eigen::VectorXd fit(const CurveSpace& space, const Curve& meridian) {
     return fit(space, ArcLength(meridian));
 }
 

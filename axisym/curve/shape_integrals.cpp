@@ -17,13 +17,9 @@ const GaussRule& rule() {
     return rule;
 }
 
-int images(const Meridian& m) {
-    return m.topology == Topology::half_cell || m.topology == Topology::half_tube ? 2 : 1;
-}
-
 // Calls visit(from, width) for about this number of panels, none of which contains a seam.
 template <class Visit>
-void each_panel(const Meridian& m, int panels, const Visit& visit) {
+void each_panel(const Curve& m, int panels, const Visit& visit) {
     std::vector<double> edges{0};
     edges.insert(edges.end(), m.seams.begin(), m.seams.end());
     edges.push_back(1);
@@ -53,7 +49,7 @@ Eigen::MatrixXd differentiation() {
 
 using PanelValues = Eigen::Matrix<double, points, 4>;  // r, r', z, z' at the points of a panel
 
-ShapeEnergy energy_on_panels(const Meridian& m, const Bending& bending, int panels, double area) {
+ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels, double area) {
     static const Eigen::MatrixXd D = differentiation(), within = partial_sums(points);
     ShapeEnergy sum;
     sum.energy_term.resize(count_terms(bending));
@@ -71,8 +67,8 @@ ShapeEnergy energy_on_panels(const Meridian& m, const Bending& bending, int pane
             const double variables[]{label[i], at(i, 0), at(i, 2)};
             const double H0 = bending.H0_varies() ? evaluate(*bending.H0_formula, variables) : bending.H0;
             for_each_value_at(bending, H0, p.H, p.K,
-                              [&](std::size_t k, double value) { sum.energy_term[k] += images(m) * value * dA[i]; });
-            sum.magnitude += images(m) * magnitude(bending, H0, p.H, p.K) * dA[i];
+                              [&](std::size_t k, double value) { sum.energy_term[k] += m.images() * value * dA[i]; });
+            sum.magnitude += m.images() * magnitude(bending, H0, p.H, p.K) * dA[i];
         }
         below += dA.sum();
     });
@@ -82,7 +78,7 @@ ShapeEnergy energy_on_panels(const Meridian& m, const Bending& bending, int pane
 
 }  // namespace
 
-std::array<double, 2> area_and_volume(const Meridian& m) {
+std::array<double, 2> area_and_volume(const Curve& m) {
     double area = 0, volume = 0;
     each_panel(m, 64, [&](double from, double width) {
         for (int i = 0; i < points; ++i) {
@@ -91,10 +87,10 @@ std::array<double, 2> area_and_volume(const Meridian& m) {
             volume += width * rule().weights[i] * pi * r * r * z1;
         }
     });
-    return {images(m) * area, images(m) * volume};
+    return {m.images() * area, m.images() * volume};
 }
 
-ShapeEnergy bending_energy(const Meridian& m, const Bending& bending) {
+ShapeEnergy bending_energy(const Curve& m, const Bending& bending) {
     constexpr int first = 32, most = 1024;
     constexpr double enough = 1e-11;
     const double area = area_and_volume(m)[0];

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "common/energy/bending.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule::axisym {
 
 // Area and volume of the whole cell or period.
-std::array<double, 2> area_and_volume(const Meridian& meridian);
+std::array<double, 2> area_and_volume(const Curve& meridian);
 
 struct ShapeEnergy {
     double energy = 0, magnitude = 0;  // the bending energy; the size of its terms, theory.md (11.1)
@@ -18,6 +18,6 @@ struct ShapeEnergy {
 };
 // To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not
 // defined on the shape.
-ShapeEnergy bending_energy(const Meridian& meridian, const Bending& bending);
+ShapeEnergy bending_energy(const Curve& meridian, const Bending& bending);
 
 }  // namespace tubule::axisym

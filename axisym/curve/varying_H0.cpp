@@ -68,7 +68,7 @@ private:
 };
 
 // Area of the surface per parameter.
-double area_density(const CurvePoint& p) {
+double area_density(const CurveSample& p) {
     return 2 * pi * p.r * std::hypot(p.r1, p.z1);
 }
 
@@ -86,7 +86,7 @@ void require_number(double value, double area) {
 
 void require_one_period(const CurveSpace& space, const Formula& formula, const Eigen::VectorXd& x) {
     constexpr double rounding = 1e-6;
-    const CurvePoint first = space.evaluate(x, 0), last = space.evaluate(x, 1);
+    const CurveSample first = space.evaluate(x, 0), last = space.evaluate(x, 1);
     const double from = value_of(formula, 0.0, first.r, first.z), to = value_of(formula, 1.0, last.r, last.z);
     if (std::abs(to - from) > rounding * (1 + std::abs(from)))
         throw std::invalid_argument(fmt::format(
@@ -101,7 +101,7 @@ VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::V
     const SplineSpace& splines = space.splines();
     const int points = splines.elements() * splines.groups() * lanes;
     Eigen::VectorXd areas(points);
-    std::vector<CurvePoint> curve;
+    std::vector<CurveSample> curve;
     const auto each = [&](auto&& visit) {
         for (int e = 0, i = 0; e < splines.elements(); ++e)
             for (int g = 0; g < splines.groups(); ++g)
@@ -117,7 +117,7 @@ VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::V
     out.value.resize(points / lanes), out.slope.resize(points / lanes);
     if (!space.closed() && space.images() == 1) require_one_period(space, formula, x);
     each([&](int i, const SplineSpace::Basis&, int q) {
-        const CurvePoint& p = curve[i];
+        const CurveSample& p = curve[i];
         J area(below(i, 0) / whole), r(p.r), z(p.z);
         area.d[0] = area_density(p) / whole, r.d[0] = p.r1, z.d[0] = p.z1;
         const J H0 = value_of(formula, area, r, z);

@@ -235,7 +235,7 @@ private:
     bool met_itself(const CurveSpace& space, const Eigen::VectorXd& x, double parameter) {
         const auto where = self_intersection(space, x);
         if (!where) return false;
-        const CurvePoint p = space.evaluate(x, (*where)[0]);
+        const CurveSample p = space.evaluate(x, (*where)[0]);
         branch_.message = fmt::format(
             "at parameter {:.6g} the shape intersects itself or crosses the axis at "
             "r = {:.4g}, z = {:.4g}",

@@ -518,7 +518,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
         if (out.estimated_error <= settings.accuracy) {
             if (const auto where = self_intersection(*space, x)) {
-                const CurvePoint p = space->evaluate(x, (*where)[0]);
+                const CurveSample p = space->evaluate(x, (*where)[0]);
                 return end(Stop::self_intersection,
                            fmt::format("the stationary shape intersects itself or crosses the axis at r = {:.4g}, "
                                        "z = {:.4g}",
@@ -558,7 +558,7 @@ int negative_directions(const StationaryProblem& problem, const Equilibrium& sha
     return static_cast<int>((system.variation(unknowns(shape)).eigenvalues.array() < 0).count());
 }
 
-Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& start,
                              const EquilibriumSettings& settings) {
     if (start.topology == Topology::tube)
         throw std::invalid_argument(

@@ -103,7 +103,7 @@ struct Equilibrium {
 
 // From a curve. A problem without constraints is that of a free membrane. Throws std::invalid_argument
 // for constraints that contradict each other or cannot be met, and for a period that is not half a tube.
-Equilibrium find_equilibrium(const StationaryProblem& problem, const Meridian& start,
+Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& start,
                              const EquilibriumSettings& settings = {});
 // From an equilibrium of a nearby problem: its mesh and its parametrisation.
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium& nearby,

@@ -25,7 +25,7 @@ namespace {
 
 // The table [equilibrium], resolved for this start.
 struct Task {
-    Meridian start;
+    Curve start;
     StationaryProblem problem;
     SetParameter set;  // of a branch
     BranchSettings branch;
@@ -86,15 +86,15 @@ double start_of(int parameter, const StationaryProblem& p) {
 }
 
 // The first shape of a family, of this reduced volume and about this area.
-Meridian start_of(Family family, double reduced, double area) {
+Curve start_of(Family family, double reduced, double area) {
     // Spheres have no family: nearly all of them are found from a little below.
     const double v = std::min(reduced, largest_of_family);
-    const Meridian shape = family == Family::stomatocyte ? bowl(0.3, 2.3) : spheroid(v, family == Family::prolate);
+    const Curve shape = family == Family::stomatocyte ? bowl(0.3, 2.3) : spheroid(v, family == Family::prolate);
     return scaled(shape, std::sqrt(area / area_and_volume(shape)[0]));
 }
 
 // H0 of the area is a number everywhere, and the same on both sides of a plane of symmetry.
-void check_varying_H0(const Case& c, const Meridian& start) {
+void check_varying_H0(const Case& c, const Curve& start) {
     if (!c.energy.H0_varies()) return;
     constexpr int points = 256;
     const auto H0 = [&](double area) {
@@ -123,7 +123,7 @@ Task task_of(const Case& c) {
     const EquilibriumChoices& e = *c.equilibrium;
     Task task;
     try {
-        task.start = start_meridian(c);
+        task.start = initial_curve(c);
         if (task.start.topology == Topology::tube) task.start = half(task.start);
     } catch (const std::invalid_argument& error) {
         throw CaseError(fmt::format("{}: shape: {}", c.path, error.what()));
@@ -179,7 +179,7 @@ struct Sample {
 
 Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
     const double beside = beside_pole(space, s);
-    const CurvePoint at = space.evaluate(x, s), c = space.evaluate(x, beside);
+    const CurveSample at = space.evaluate(x, s), c = space.evaluate(x, beside);
     const auto p = profile_point(c.r, c.r1, c.r2, c.z1, c.z2);
     return {beside != s ? 0 : at.r, at.z, p.H, p.K};
 }
@@ -324,7 +324,7 @@ private:
     }
 
     // Moved along the axis such that the mean height over the arc length is zero.
-    static Meridian centred(Meridian m) {
+    static Curve centred(Curve m) {
         if (m.topology != Topology::cell) return m;
         const ArcLength arc(m);
         constexpr int points = 400;

@@ -81,7 +81,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     // Displacements go along a spline field n that is the normal up to the error of a projection. Only their normal
     // part matters at a stationary shape, and two derivatives of n are at hand.
     const auto normal = [&](double s) {
-        const CurvePoint p = space.evaluate(shape.x, s);
+        const CurveSample p = space.evaluate(shape.x, s);
         const double g = std::hypot(p.r1, p.z1);
         return std::array{p.z1 / g, -p.r1 / g};
     };
@@ -93,7 +93,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
             const auto& b = splines.basis(e, group);
             Pack r[3], z[3], nr[3], nz[3];
             for (int q = 0; q < lanes; ++q) {
-                const CurvePoint p = space.evaluate(shape.x, b.z[q]);
+                const CurveSample p = space.evaluate(shape.x, b.z[q]);
                 const auto u = space.r().evaluate(n_r.data(), b.z[q]), v = space.z().evaluate(n_z.data(), b.z[q]);
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];

@@ -22,14 +22,14 @@ auto integral(const F& f) {
     return sum;
 }
 
-void require_whole(const Meridian& profile) {
+void require_whole(const Curve& profile) {
     const bool tube = profile.topology == Topology::tube && profile.length > 0;
     if (!tube && profile.topology != Topology::cell)
         throw std::invalid_argument("wave amplitudes are defined on whole tubes and closed cells only");
 }
 
 // (1/L) INT r exp(-i q z) dz over a period.
-std::complex<double> tube_mode(const Meridian& profile, int n) {
+std::complex<double> tube_mode(const Curve& profile, int n) {
     return integral([&](double t) {
         const auto [r, r1, z, z1] = profile.at(t);
         return r * z1 / profile.length * std::polar(1.0, -2 * pi * n * z / profile.length);
@@ -37,7 +37,7 @@ std::complex<double> tube_mode(const Meridian& profile, int n) {
 }
 
 // Height of the middle of the volume.
-double middle(const Meridian& cell) {
+double middle(const Curve& cell) {
     const auto moment = [&](int power) {
         return integral([&](double t) {
             const auto [r, r1, z, z1] = cell.at(t);
@@ -48,7 +48,7 @@ double middle(const Meridian& cell) {
 }
 
 // INT rho Y_l^0 over all directions.
-double cell_mode(const Meridian& cell, int l) {
+double cell_mode(const Curve& cell, int l) {
     const double z0 = middle(cell);
     return integral([&](double t) {
         const auto [r, r1, z_axis, z1] = cell.at(t);
@@ -60,13 +60,13 @@ double cell_mode(const Meridian& cell, int l) {
 
 }  // namespace
 
-double mean_radius(const Meridian& profile) {
+double mean_radius(const Curve& profile) {
     require_whole(profile);
     return profile.topology == Topology::tube ? tube_mode(profile, 0).real()
                                               : cell_mode(profile, 0) / std::sqrt(4 * pi);
 }
 
-double mode_amplitude(const Meridian& profile, int n) {
+double mode_amplitude(const Curve& profile, int n) {
     require_whole(profile);
     if (profile.topology == Topology::tube) {
         if (n < 1) throw std::invalid_argument("a wave along a tube must have n >= 1");

@@ -41,7 +41,7 @@ Eigen::VectorXd multipliers_for(const Eigen::MatrixXd& columns, const Eigen::Vec
 }
 
 // The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
-Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& settings, const Meridian& shape,
+Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& settings, const Curve& shape,
                      int elements, double& unbalanced) {
     const std::optional<double> sigma = settings.sigma;
     constexpr int degree = 5;
@@ -125,7 +125,7 @@ void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, doub
     if (law.free_period) settings.force = loads.force;
 }
 
-Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
+Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Curve& shape,
                   const SpectrumSettings& settings) {
     refuse_what_has_none(law, settings);
     StationaryProblem problem{bending, {}};

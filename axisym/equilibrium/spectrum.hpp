@@ -46,7 +46,7 @@ Held held_by(const MotionLaw& law);
 // those of inextensible laws, and where a free period changes, neglect the effect of the motion itself on waves, so
 // they are an estimate. A free period has no spectrum for m = 0, and a law with inertia none at all, since the
 // displacements of the second variation have neither (std::invalid_argument). SolveError if an eigenproblem fails.
-Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Meridian& shape,
+Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Curve& shape,
                   const SpectrumSettings& settings = {});
 
 }  // namespace tubule::axisym

@@ -28,7 +28,7 @@ Parity CurveSpace::z_parity() const {
     return closed() ? Parity{1, topology_ == Topology::cell ? 1 : -1} : Parity{-1, -1};
 }
 
-CurvePoint CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {
+CurveSample CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {
     const auto [r, r1, r2] = r_.evaluate(x.data(), s);
     const auto [z, z1, z2] = z_.evaluate(x.data() + r_.size(), s);
     return {r, r1, r2, z + rise(x.data()) * s, z1 + rise(x.data()), z2};
@@ -53,7 +53,7 @@ Eigen::VectorXd CurveSpace::prolong(const CurveSpace& other, const Eigen::Vector
         throw std::invalid_argument("curves of different topology or period cannot be prolonged to each other");
     const double excess = other.rise(x.data()) - rise();  // of a free period
     Eigen::VectorXd out = project([&](double s) {
-        const CurvePoint p = other.evaluate(x, s);
+        const CurveSample p = other.evaluate(x, s);
         return std::array{p.r, p.z - excess * s};
     });
     if (free_period_) out[shape_size()] += excess;

@@ -6,13 +6,9 @@
 #include <vector>
 
 #include "axisym/splines/spline_space.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule::axisym {
-
-struct CurvePoint {
-    double r, r1, r2, z, z1, z2;  // with derivatives in s
-};
 
 // Curves run such that the outward normal is (z', -r')/|X'|: upwards on the outside. A vector of size() numbers holds
 // the coefficients of r, followed by those of z less rise s, and by the rise itself where the period is free.
@@ -45,7 +41,7 @@ public:
     Parity r_parity() const;
     Parity z_parity() const;
 
-    CurvePoint evaluate(const Eigen::VectorXd& x, double s) const;
+    CurveSample evaluate(const Eigen::VectorXd& x, double s) const;
     // The curve s -> {r, z}, by projection.
     template <class F>
     Eigen::VectorXd project(F&& f) const {

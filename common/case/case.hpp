@@ -18,12 +18,12 @@
 #include "common/shapes/ellipsoid.hpp"
 #include "common/shapes/formula_shape.hpp"
 #include "common/shapes/mesh_file.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 #include "common/shapes/profile_file.hpp"
 #include "common/shapes/result_frame.hpp"
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
-#include "common/shapes/waved_profile.hpp"
 #include "common/solve/stop.hpp"
 
 #if !defined(EIGEN_MAX_ALIGN_BYTES) || EIGEN_MAX_ALIGN_BYTES != 64
@@ -123,7 +123,7 @@ struct AutoChoices {
 
 // Where a run of tier surface3d begins instead of at the shape: not in case files, but from tier "auto".
 struct Handover {
-    WavedProfile surface;
+    PerturbedCurve curve;
     double time = 0;
     double reference_energy = 0;  // E_ref of the whole run
     double work = 0;              // that loads have done until then

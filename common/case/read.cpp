@@ -169,7 +169,7 @@ std::string shape_bytes(const Case& c, const std::string& path, std::size_t most
     return c.input && !c.input->bytes.empty() ? c.input->bytes : read_input(beside(c, path), most);
 }
 
-SmoothProfile start_profile(const Case& c, const ProfileFile& file) {
+FittedProfile start_profile(const Case& c, const ProfileFile& file) {
     const std::filesystem::path path = beside(c, file.path);
     std::error_code error;
     if (!(c.input && !c.input->bytes.empty()) && !std::filesystem::is_regular_file(path, error))

@@ -33,7 +33,7 @@ std::string input_name(const Shape& shape);
 std::filesystem::path beside(const Case& c, const std::string& path);
 std::string shape_bytes(const Case& c, const std::string& path, std::size_t most);
 // The smooth curve through the points of a file. Throws CaseError.
-SmoothProfile start_profile(const Case& c, const ProfileFile& file);
+FittedProfile start_profile(const Case& c, const ProfileFile& file);
 
 // What is wrong with a key, "shape.path" say, that only a later stage can find out, with its place or, where it is
 // absent, that of its table.

@@ -24,15 +24,6 @@ const std::vector<double>& values(const Record& frame, const char* name) {
     return found->data;
 }
 
-Revolution spline_of(const Record& frame) {
-    Revolution out{static_cast<int>(number(frame, "degree")), number(frame, "length"), values(frame, "knots"),
-                   values(frame, "coefficients")};
-    if (out.degree < 1 || out.degree > 7 || !(out.length > 0) || out.coefficients.empty() ||
-        out.knots.size() != out.coefficients.size() + static_cast<std::size_t>(out.degree) + 1)
-        refuse_frame("it is damaged: degree, length, knots and coefficients do not define a spline");
-    return out;
-}
-
 }  // namespace
 
 ProfilePoints profile_points(const Record& frame) {
@@ -46,19 +37,19 @@ ProfilePoints profile_points(const Record& frame) {
     return out;
 }
 
-ProfilePoints points_of(const Revolution& graph) {
-    constexpr int n = 1000;
-    ProfilePoints out{.r = {}, .z = {}, .length = graph.length};
-    for (int i = 0; i <= n; ++i) {
-        out.z.push_back(graph.length * i / n);
-        out.r.push_back(radius_at(graph, i < n ? out.z.back() : 0.0));
-    }
-    return out;
+PerturbedCurve frame_curve(const Record& frame) {
+    if (kind_of(frame) == RecordKind::graph)
+        return spline_curve(static_cast<int>(number(frame, "degree")), number(frame, "length"), values(frame, "knots"),
+                            values(frame, "coefficients"));
+    const auto [r, z, length] = profile_points(frame);
+    return curve_through(r, z, length);
 }
 
-std::variant<Revolution, ProfilePoints> profile_of(const Record& frame) {
-    if (kind_of(frame) == RecordKind::graph) return spline_of(frame);
-    return profile_points(frame);
+std::optional<CurveVelocity> frame_velocity(const Record& frame, const PerturbedCurve& curve) {
+    const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
+                *around = find_array(frame, "u_theta");
+    if (!normal || !along) return std::nullopt;
+    return curve_velocity(curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
 }
 
 }  // namespace tubule

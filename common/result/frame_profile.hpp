@@ -1,11 +1,11 @@
 // The profile that an axisymmetric frame holds.
 #pragma once
 
-#include <variant>
+#include <optional>
 #include <vector>
 
 #include "common/result/record.hpp"
-#include "common/shapes/revolution.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 
 namespace tubule {
 
@@ -15,11 +15,12 @@ struct ProfilePoints {
     double length = 0;
 };
 
-// All of these throw std::invalid_argument, worded to follow the name of the frame or its file, for a frame that holds
-// no profile or a damaged one.
+// Both throw std::invalid_argument, worded to follow the name of the frame or its file, for a frame that holds no
+// profile or a damaged one.
 ProfilePoints profile_points(const Record& frame);
-// The spline of a graph; of other kinds the points.
-std::variant<Revolution, ProfilePoints> profile_of(const Record& frame);
-ProfilePoints points_of(const Revolution& graph);
+// The spline of a graph; of other kinds the curve through the points.
+PerturbedCurve frame_curve(const Record& frame);
+// The velocity on that curve, where the frame has one.
+std::optional<CurveVelocity> frame_velocity(const Record& frame, const PerturbedCurve& curve);
 
 }  // namespace tubule

@@ -70,13 +70,12 @@ StartFrame start_frame(const Case& c) {
     return read_frame(c, std::get<ResultFrame>(c.shape));
 }
 
-WavedProfile disturbed_profile(const Case& c, const Record& frame) {
-    const auto profile = profile_of(frame);
-    const auto* graph = std::get_if<Revolution>(&profile);
-    const auto [r, z, length] = graph ? points_of(*graph) : std::get<ProfilePoints>(profile);
-    const WavedProfile surface{profile_curve(r, z, length), {}, {}};
+PerturbedCurve disturbed_curve(const Case& c, const Record& frame) {
+    const auto& from = std::get<ResultFrame>(c.shape);
+    const PerturbedCurve curve = frame_curve(frame);
+    if (from.modes.empty()) return curve;
     try {
-        return disturbed(surface, std::get<ResultFrame>(c.shape));
+        return disturbed(curve, from);
     } catch (const std::invalid_argument& error) {
         throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
     }

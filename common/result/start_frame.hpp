@@ -19,7 +19,7 @@ StartFrame start_frame(const Case& c);
 
 // The profile of its frame with the modes of its shape. Throws CaseError for modes that it cannot have,
 // std::invalid_argument for a frame that has no profile.
-WavedProfile disturbed_profile(const Case& c, const Record& frame);
+PerturbedCurve disturbed_curve(const Case& c, const Record& frame);
 
 // What the case reads, as it is now: with its bytes if they are few. Nothing where it reads nothing, or what cannot be
 // read.

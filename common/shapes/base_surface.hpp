@@ -2,12 +2,7 @@
 // too.
 #pragma once
 
-#include <Eigen/Core>
-#include <cmath>
-#include <functional>
-#include <vector>
-
-#include "common/geometry/profile_point.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -18,24 +13,16 @@ struct Cylinder {
     double radius = 1, length = 1;
 };
 
-// A curve (r, z)(t), 0 <= t <= 1, that sweeps a surface around the z axis, outward to the right of its direction; with
-// period 0 from pole to pole, else (r, z)(1) is (r, z)(0) moved up by the period. `fixed` are parameters that rings of
-// points must have, where the surface is less smooth. As a base: triangles in rings whose sizes follow the shape.
-struct Profile {
-    std::function<Eigen::Vector2d(double)> at;
-    double period = 0;
-    std::vector<double> fixed;
-};
-
-inline Profile profile_of(const UnitSphere&) {
-    return {
-        .at = [](double t) { return Eigen::Vector2d(std::sin(pi * t), -std::cos(pi * t)); }, .period = 0, .fixed = {}};
+// A Curve is a base, too: triangles in rings whose sizes follow the shape, with a ring at each of its seams.
+inline Curve meridian(const UnitSphere&) {
+    return curve_of(Topology::cell, 0, [](const auto& t) { return std::array{sin(pi * t), -cos(pi * t)}; });
 }
-inline Profile profile_of(const Cylinder& c) {
-    return {.at = [=](double t) { return Eigen::Vector2d(c.radius, c.length * t); }, .period = c.length, .fixed = {}};
+inline Curve meridian(const Cylinder& c) {
+    using J = Jet<double, 1, 1>;
+    return curve_of(Topology::tube, c.length, [c](const J& t) { return std::array{J(c.radius), c.length * t}; });
 }
-inline const Profile& profile_of(const Profile& profile) {
-    return profile;
+inline const Curve& meridian(const Curve& curve) {
+    return curve;
 }
 
 }  // namespace tubule

@@ -1,13 +1,12 @@
 // Shape "capsule": a cylinder of length `length` along z, closed by two half spheres of the same radius.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -27,21 +26,9 @@ Vector3<S> position(const Capsule& capsule, const Vector3<S>& p) {
     return centre + d * S(capsule.radius * inverse_sqrt(S(d.dot(d))));
 }
 
-inline Profile base(const Capsule& c) {
-    const double cap = pi / 2 * c.radius, total = 2 * cap + c.length, half = c.length / 2;
-    const auto at = [=](double t) {
-        const double s = t * total;
-        if (s <= cap)
-            return Eigen::Vector2d(c.radius * std::sin(s / c.radius), -half - c.radius * std::cos(s / c.radius));
-        if (s <= cap + c.length) return Eigen::Vector2d(c.radius, std::clamp(s - cap - half, -half, half));
-        const double angle = (total - s) / c.radius;
-        return Eigen::Vector2d(c.radius * std::sin(angle), half + c.radius * std::cos(angle));
-    };
-    return {.at = at, .period = 0, .fixed = {cap / total, (cap + c.length) / total}};
-}
-inline Meridian meridian(const Capsule& c) {
+inline Curve meridian(const Capsule& c) {
     const double total = pi * c.radius + c.length, cap = pi / 2 * c.radius / total;
-    Meridian m;
+    Curve m;
     m.seams = {cap, 1 - cap};
     m.at = [c, total, cap](double t) {
         if (t > cap && t < 1 - cap) return std::array{c.radius, 0.0, (t - 0.5) * total, total};
@@ -51,6 +38,9 @@ inline Meridian meridian(const Capsule& c) {
                           -side * (c.length / 2 + c.radius * std::cos(angle)), side * total * std::sin(angle)};
     };
     return m;
+}
+inline Curve base(const Capsule& c) {
+    return meridian(c);
 }
 
 inline double area(const Capsule& c) {

@@ -4,7 +4,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -23,7 +23,7 @@ Vector3<S> position(const Dumbbell&, const Vector3<S>& p) {
 inline UnitSphere base(const Dumbbell&) {
     return {};
 }
-inline Meridian meridian(const Dumbbell& dumbbell) {
+inline Curve meridian(const Dumbbell& dumbbell) {
     return sphere_image(dumbbell);
 }
 

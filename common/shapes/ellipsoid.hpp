@@ -6,7 +6,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -28,7 +28,7 @@ inline Asymmetry asymmetry(const Ellipsoid& e) {
     if (e.a == e.b) return {};
     return {"shape.b", fmt::format("must be a = {}, not {}: tier \"axisym\" is axisymmetric about z", e.a, e.b)};
 }
-inline Meridian meridian(const Ellipsoid& e) {
+inline Curve meridian(const Ellipsoid& e) {
     require_axisymmetric(e);
     return sphere_image(e);
 }

@@ -99,30 +99,22 @@ std::string pointed(const FormulaShape& shape) {
 
 Asymmetry asymmetry(const FormulaShape& shape) {
     if (!shape.r || !uses(shape, 1)) return {};
-    return {"shape.r", fmt::format("must not contain {}: tier \"axisym\" is axisymmetric and has no waves around the "
-                                   "axis",
+    return {"shape.r", fmt::format("must not contain {}: tier \"axisym\" is axisymmetric and has no modes m > 0",
                                    (shape.length ? FormulaShape::of_tube : FormulaShape::of_cell)[1])};
 }
 
-Meridian meridian(const FormulaShape& shape) {
+Curve meridian(const FormulaShape& shape) {
     require_axisymmetric(shape);
     using J1 = Jet<double, 1, 1>;
-    Meridian m;
-    if (shape.length) {
-        m.topology = Topology::tube;
-        m.length = *shape.length;
-        m.at = [shape, length = *shape.length](double t) {
-            const J1 r = radius_at(shape, J1(length) * J1::variable(t, 0), J1(0.0));
-            return std::array{r.v, r.d[0], length * t, length};
-        };
-    } else {
-        m.at = [shape](double t) {
-            const J1 theta = pi * (1.0 - J1::variable(t, 0)), r = radius_at(shape, theta, J1(0.0));
-            const J1 x = r * sin(theta), z = r * cos(theta);
-            return std::array{x.v, x.d[0], z.v, z.d[0]};
-        };
-    }
-    return m;
+    if (shape.length)
+        return curve_of(Topology::tube, *shape.length, [shape](const J1& t) {
+            const J1 z = *shape.length * t;
+            return std::array{radius_at(shape, z, J1(0.0)), z};
+        });
+    return curve_of(Topology::cell, 0, [shape](const J1& t) {
+        const J1 theta = pi * (1.0 - t), r = radius_at(shape, theta, J1(0.0));
+        return std::array{r * sin(theta), r * cos(theta)};
+    });
 }
 
 double mean_radius(const FormulaShape& shape) {

@@ -10,7 +10,7 @@
 
 #include "common/formula/formula.hpp"
 #include "common/geometry/surface_point.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 #include "common/shapes/tube.hpp"
 
 namespace tubule {
@@ -45,7 +45,7 @@ Vector3<S> position(const FormulaShape& shape, const Vector3<S>& p) {
     return p * S(r * inverse_sqrt(S(p.dot(p))));
 }
 Asymmetry asymmetry(const FormulaShape& shape);
-Meridian meridian(const FormulaShape& shape);
+Curve meridian(const FormulaShape& shape);
 // The average of r along the meridian theta = 0.
 double mean_radius(const FormulaShape& shape);
 // The smallest r of a tube over the meridian theta = 0, to about the distance of samples; infinite of closed surfaces.

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 #include "common/shapes/sphere.hpp"
 
 namespace tubule {

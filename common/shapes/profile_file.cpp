@@ -15,8 +15,6 @@
 namespace tubule {
 namespace {
 
-using Kind = ProfileCurve::Kind;
-
 constexpr int fewest_points = 9, most_points = 20000, most_waves = 256;
 constexpr double default_tolerance = 1e-4;  // of the largest extent, of the largest |H0|
 constexpr double at_end = 1e-6;             // of the largest extent: r = 0 at a pole, ends that are the same point
@@ -234,16 +232,16 @@ void refuse_disorder(const std::filesystem::path& path, const std::vector<Point>
                    fmt::format("is {:.3g} from the point before: points must be in order along the profile", away));
 }
 
-// What the ends say, and points that fit: from the south upwards on the outside, with both ends.
-Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points, const ProfileFile& file,
-                  double tolerance) {
+// A cell, a tube or a ring (a tube of no length) by its ends, and points that fit: from the south upwards on the
+// outside, with both ends.
+Topology put_in_order(const std::filesystem::path& path, std::vector<Point>& points, const ProfileFile& file,
+                      double tolerance) {
     const double size = extent(points), same = at_end * size;
     const auto meets = [&](const Point& a, const Point& b, double rise) {
         return std::abs(a.r - b.r) <= same && std::abs(a.z + rise - b.z) <= same;
     };
-    Kind kind = Kind::cell;
+    Topology topology = Topology::tube;
     if (file.length) {
-        kind = Kind::tube;
         if (points.back().z < points.front().z) std::ranges::reverse(points);
         const Point first = points.front();
         Point end{first.r, first.z + *file.length, first.H0, points.back().at};
@@ -257,9 +255,9 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
                                points.back().z - first.z, *file.length));
         points.push_back(end);
     } else if (std::abs(points.front().r) <= same && std::abs(points.back().r) <= same) {
+        topology = Topology::cell;
         points.front().r = points.back().r = 0;
     } else if (meets(points.front(), points.back(), 0)) {
-        kind = Kind::ring;
         points.back().r = points.front().r, points.back().z = points.front().z;
     } else {
         refuse_disorder(path, points, size);
@@ -270,7 +268,7 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
                    points.front().r, points.back().r));
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
-        const bool pole = kind == Kind::cell && (i == 0 || i + 1 == points.size());
+        const bool pole = topology == Topology::cell && (i == 0 || i + 1 == points.size());
         if (!pole && !(points[i].r > 0))
             refuse(path, points[i].at,
                    fmt::format("r = {:.6g}: the profile meets the axis within; give one half of the outline, r >= 0, "
@@ -284,18 +282,19 @@ Kind put_in_order(const std::filesystem::path& path, std::vector<Point>& points,
     for (std::size_t i = 0; i + 1 < points.size(); ++i)
         volume += std::pow(points[i].r + points[i + 1].r, 2) * (points[i + 1].z - points[i].z);
     if (volume < 0) std::ranges::reverse(points);
-    return kind;
+    return topology;
 }
 
-// The functions of s that waves up to this number are sums of, and their derivatives.
+// The functions of s that waves up to this number are sums of, and their derivatives: of a cell r = SUM a_k sin(k pi
+// s), z = SUM b_k cos(k pi s), else r and z - length s are sums of 1, cos(2 pi k s) and sin(2 pi k s).
 struct Basis {
-    Kind kind;
+    bool cell;
     int waves;
     bool odd;  // of a cell: r, else z
 
-    int size() const { return kind != Kind::cell ? 2 * waves + 1 : odd ? waves : waves + 1; }
+    int size() const { return !cell ? 2 * waves + 1 : odd ? waves : waves + 1; }
     void at(double s, double* value, double* slope) const {
-        if (kind != Kind::cell) {
+        if (!cell) {
             value[0] = 1, slope[0] = 0;
             for (int k = 1; k <= waves; ++k) {
                 const double q = 2 * pi * k, c = std::cos(q * s), sine = std::sin(q * s);
@@ -325,10 +324,31 @@ Eigen::VectorXd least_squares(const Basis& basis, const std::vector<double>& s, 
     return normal.ldlt().solve(rows.transpose() * values);
 }
 
+// A curve by the coefficients of r and z.
+struct WaveCurve {
+    bool cell = true;
+    double length = 0;
+    int waves = 0;
+    Eigen::VectorXd r, z;
+
+    // r, dr/ds, z, dz/ds
+    std::array<double, 4> operator()(double s) const {
+        thread_local std::vector<double> value, slope;
+        const auto sum = [&](const Eigen::VectorXd& c, bool odd) {
+            value.resize(c.size()), slope.resize(c.size());
+            Basis{cell, waves, odd}.at(s, value.data(), slope.data());
+            return std::array{Eigen::Map<const Eigen::VectorXd>(value.data(), c.size()).dot(c),
+                              Eigen::Map<const Eigen::VectorXd>(slope.data(), c.size()).dot(c)};
+        };
+        const auto at_r = sum(r, true), at_z = sum(z, false);
+        return {at_r[0], at_r[1], at_z[0] + length * s, at_z[1] + length};
+    }
+};
+
 // The parameter of the point of the curve nearest to one, near s.
-double nearest(const SmoothProfile& fit, const Point& p, double s, bool fixed) {
+double nearest(const WaveCurve& fit, const Point& p, double s, bool fixed) {
     for (int k = 0; k < 8 && !fixed; ++k) {
-        const auto [r, r1, z, z1] = point_at(fit, s);
+        const auto [r, r1, z, z1] = fit(s);
         const double step = ((p.r - r) * r1 + (p.z - z) * z1) / (r1 * r1 + z1 * z1);
         s = std::clamp(s + step, 0.0, 1.0);
         if (std::abs(step) < 1e-13) break;
@@ -336,12 +356,12 @@ double nearest(const SmoothProfile& fit, const Point& p, double s, bool fixed) {
     return s;
 }
 
-// Parameters become fractions of the integral of density(point) over the parameter.
-template <class Density>
-void measure_by(const Density& density, const SmoothProfile& fit, std::vector<double>& s) {
-    const int n = 16 * fit.waves + 64;
+// Parameters become fractions of the integral of density(point) over the parameter of a curve of so many waves.
+template <class Density, class At>
+void measure_by(const Density& density, const At& curve, int waves, std::vector<double>& s) {
+    const int n = 16 * waves + 64;
     std::vector<double> sum(n + 1, 0.0);
-    const auto at_parameter = [&](double at) { return density(point_at(fit, at)); };
+    const auto at_parameter = [&](double at) { return density(curve(at)); };
     for (int i = 0; i < n; ++i)  // Simpson
         sum[i + 1] =
             sum[i] +
@@ -360,45 +380,47 @@ double area_of(const std::array<double, 4>& point) {
     return point[0] * length_of(point);
 }
 
-// A fit: coefficients, the distance of the points, and their parameters s.
+// A fit: the curve, the distance of the points, and their parameters s.
 struct Fit {
-    SmoothProfile profile;
+    WaveCurve curve;
+    double distance = std::numeric_limits<double>::infinity();
     std::vector<double> s;
 };
-Fit fit_waves(Kind kind, const std::vector<Point>& points, double length, int waves, std::vector<double> s) {
-    SmoothProfile fit{.kind = kind, .length = length, .r = {}, .z = {}};
+Fit fit_waves(Topology topology, const std::vector<Point>& points, double length, int waves, std::vector<double> s) {
+    WaveCurve fit{topology == Topology::cell, length, waves, {}, {}};
     const int n = static_cast<int>(points.size());
-    fit.points = n, fit.waves = waves;
+    double distance = 0;
     for (int round = 0; round < rounds; ++round) {
         Eigen::VectorXd r(n), z(n);
         for (int i = 0; i < n; ++i) r[i] = points[i].r, z[i] = points[i].z - length * s[i];
-        fit.r = least_squares({kind, waves, true}, s, r), fit.z = least_squares({kind, waves, false}, s, z);
-        fit.distance = 0;
+        fit.r = least_squares({fit.cell, waves, true}, s, r), fit.z = least_squares({fit.cell, waves, false}, s, z);
+        distance = 0;
         for (int i = 0; i < n; ++i) {
             const bool end = i == 0 || i + 1 == n;
             s[i] = nearest(fit, points[i], s[i], end);
-            const auto at = point_at(fit, s[i]);
+            const auto at = fit(s[i]);
             const double off = std::hypot(at[0] - points[i].r, at[2] - points[i].z);
-            fit.distance = std::isfinite(off) ? std::max(fit.distance, off) : std::numeric_limits<double>::infinity();
-            if (!std::isfinite(off)) return {fit, s};  // numbers so far apart that no waves fit them
+            if (!std::isfinite(off)) return {};  // numbers so far apart that no waves fit them
+            distance = std::max(distance, off);
         }
-        if (round + 1 < rounds) measure_by(length_of, fit, s);
+        if (round + 1 < rounds) measure_by(length_of, fit, waves, s);
     }
-    return {fit, s};
+    return {fit, distance, s};
 }
 
 // More waves are not determined by this number of points, or take too long.
-int most_waves_of(Kind kind, std::size_t points) {
-    return std::min(static_cast<int>(points) / (kind == Kind::cell ? 2 : 4), most_waves);
+int most_waves_of(bool cell, std::size_t points) {
+    return std::min(static_cast<int>(points) / (cell ? 2 : 4), most_waves);
 }
 
 // H0 by the fewest waves of the area below, which are smooth at the poles, too.
-void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points, const ProfileFile& file, Fit& fit) {
+void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points, const ProfileFile& file,
+            const Fit& fit, FittedProfile& out) {
     std::vector<double> area = fit.s;
-    measure_by(area_of, fit.profile, area);
-    const Kind kind = fit.profile.kind;
+    const bool cell = fit.curve.cell;
+    measure_by(area_of, fit.curve, fit.curve.waves, area);
     std::vector<double> at = area;  // T_k(1 - 2 area) = cos(k pi at) of a cell
-    if (kind == Kind::cell)
+    if (cell)
         for (double& a : at) a = std::acos(std::clamp(1 - 2 * a, -1.0, 1.0)) / pi;
     const auto n = static_cast<Eigen::Index>(points.size());
     Eigen::VectorXd values(n);
@@ -406,10 +428,10 @@ void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points,
     const double tolerance = file.H0_tolerance.value_or(default_tolerance * values.cwiseAbs().maxCoeff());
     double best = std::numeric_limits<double>::infinity();
     Place worst = points.front().at;
-    for (int waves = 0; waves <= most_waves_of(kind, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
-        const Eigen::VectorXd c = least_squares({kind, waves, false}, at, values);
-        const Formula H0 = fitted_formula(kind == Kind::cell ? Formula::Op::polynomial : Formula::Op::waves,
-                                          {c.data(), c.data() + c.size()});
+    for (int waves = 0; waves <= most_waves_of(cell, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
+        const Eigen::VectorXd c = least_squares({cell, waves, false}, at, values);
+        const Formula H0 =
+            fitted_formula(cell ? Formula::Op::polynomial : Formula::Op::waves, {c.data(), c.data() + c.size()});
         double off = 0;
         Place here = worst;
         for (Eigen::Index i = 0; i < n; ++i)
@@ -417,7 +439,7 @@ void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points,
                 off = d, here = points[i].at;
         if (!(off < best)) continue;
         best = off, worst = here;
-        fit.profile.H0 = std::make_shared<const Formula>(H0), fit.profile.H0_distance = off;
+        out.H0 = std::make_shared<const Formula>(H0), out.H0_distance = off;
         if (off <= tolerance) return;
     }
     refuse(path, worst,
@@ -428,47 +450,37 @@ void fit_H0(const std::filesystem::path& path, const std::vector<Point>& points,
 
 }  // namespace
 
-std::array<double, 4> point_at(const SmoothProfile& profile, double s) {
-    thread_local std::vector<double> value, slope;
-    const auto sum = [&](const Eigen::VectorXd& c, bool odd) {
-        value.resize(c.size()), slope.resize(c.size());
-        Basis{profile.kind, profile.waves, odd}.at(s, value.data(), slope.data());
-        return std::array{Eigen::Map<const Eigen::VectorXd>(value.data(), c.size()).dot(c),
-                          Eigen::Map<const Eigen::VectorXd>(slope.data(), c.size()).dot(c)};
-    };
-    const auto r = sum(profile.r, true), z = sum(profile.z, false);
-    return {r[0], r[1], z[0] + profile.length * s, z[1] + profile.length};
-}
-
-SmoothProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file) {
+FittedProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file) {
     auto [points, have_H0] = read_points(path, text);
     const double tolerance = file.tolerance.value_or(default_tolerance * extent(points));
-    const Kind kind = put_in_order(path, points, file, tolerance);
+    const Topology topology = put_in_order(path, points, file, tolerance);
+    const bool cell = topology == Topology::cell;
+    const double length = file.length.value_or(0);
     std::vector<double> s{0};
     for (std::size_t i = 1; i < points.size(); ++i)
         s.push_back(s.back() + std::hypot(points[i].r - points[i - 1].r, points[i].z - points[i - 1].z));
     for (double& at : s) at /= s.back();
     s.back() = 1;
-    Fit fit;
-    SmoothProfile& best = fit.profile;
-    best.distance = std::numeric_limits<double>::infinity();
-    for (int waves = 2; waves <= most_waves_of(kind, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
-        Fit next = fit_waves(kind, points, file.length.value_or(0), waves, s);
-        if (next.profile.distance < best.distance) fit = std::move(next);
+    Fit best;
+    for (int waves = 2; waves <= most_waves_of(cell, points.size()); waves = std::max(waves + 1, waves * 6 / 5)) {
+        Fit next = fit_waves(topology, points, length, waves, s);
+        if (next.distance < best.distance) best = std::move(next);
         if (best.distance <= tolerance) break;
     }
     if (!(best.distance <= tolerance))
         refuse(path, fmt::format("no smooth curve comes within {:.3g} of all {} points: the best is {:.3g} off; set "
                                  "shape.tolerance to that, or give more points where the profile bends",
                                  tolerance, points.size(), best.distance));
-    for (int i = 1; i < points_per_wave * best.waves; ++i) {
-        const auto at = point_at(best, double(i) / (points_per_wave * best.waves));
+    const int waves = best.curve.waves;
+    for (int i = 1; i < points_per_wave * waves; ++i) {
+        const auto at = best.curve(double(i) / (points_per_wave * waves));
         if (!(at[0] > 0))
             refuse(path,
                    fmt::format("the smooth curve meets the axis at z = {:.6g}: set a smaller shape.tolerance", at[2]));
     }
-    if (have_H0) fit_H0(path, points, file, fit);
-    return best;
+    FittedProfile out{{topology, length, best.curve}, best.distance, static_cast<int>(points.size()), waves};
+    if (have_H0) fit_H0(path, points, file, best, out);
+    return out;
 }
 
 std::string place_of_H0(const std::filesystem::path& path, const std::string& text) {
@@ -478,45 +490,40 @@ std::string place_of_H0(const std::filesystem::path& path, const std::string& te
     return column ? fmt::format("{}:{}:{}", path.string(), rows.line, rows.row[*column].column) : "";
 }
 
-std::string SmoothProfile::note() const {
+std::string FittedProfile::note() const {
     const std::string fitted = fmt::format(
         "a smooth curve of {} waves is at most {:.2g} from the {} points of the profile", waves, distance, points);
     return H0 ? fmt::format("{}, a smooth H0 at most {:.2g} from its values", fitted, H0_distance) : fitted;
 }
 
-Meridian meridian(const SmoothProfile& profile) {
-    Meridian m;
-    m.topology = profile.kind == Kind::cell ? Topology::cell : Topology::tube;
-    m.length = profile.length;
-    m.at = [profile](double t) { return point_at(profile, t); };
-    return m;
-}
-
-ProfileCurve profile_curve(const SmoothProfile& profile) {
+PerturbedCurve curve_through(const FittedProfile& profile) {
     const int n = std::max(points_per_wave * profile.waves, 100);
     std::vector<double> r, z;
     for (int i = 0; i <= n; ++i) {
-        const auto at = point_at(profile, double(i) / n);
+        const auto at = profile.curve.at(double(i) / n);
         r.push_back(at[0]), z.push_back(at[2]);
     }
-    if (profile.kind == Kind::cell) r.front() = r.back() = 0;
-    if (profile.kind != Kind::cell) r.back() = r.front(), z.back() = z.front() + profile.length;
-    return profile_curve(r, z, profile.length);
+    const double length = profile.curve.length;
+    if (profile.curve.topology == Topology::cell)
+        r.front() = r.back() = 0;
+    else
+        r.back() = r.front(), z.back() = z.front() + length;
+    return curve_through(r, z, length);
 }
 
-BlendedCurve area_below(const SmoothProfile& profile, const ProfileCurve& curve) {
+CurveFunctions area_below(const FittedProfile& profile, const PerturbedCurve& curve) {
     const std::size_t n = curve.functions.x.size();
     std::vector<double> area(n);
     for (std::size_t i = 0; i < n; ++i) area[i] = static_cast<double>(i) / static_cast<double>(n - 1);
-    measure_by(area_of, profile, area);
-    if (profile.kind == Kind::cell) {
+    measure_by(area_of, profile.curve.at, profile.waves, area);
+    if (curve.is_cell()) {
         area.back() = 1;
     } else {
         std::vector<double> s = curve.functions.x;
         for (std::size_t i = 0; i < n; ++i) area[i] -= s[i];
         area.back() = area.front();
     }
-    return along_curve(curve, std::vector<double>(n, 0.0), area);
+    return functions_along(curve, std::vector<double>(n, 0.0), area);
 }
 
 }  // namespace tubule

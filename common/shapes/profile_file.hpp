@@ -2,8 +2,6 @@
 // the spontaneous curvature, where the file has that of each point.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -12,8 +10,7 @@
 #include <vector>
 
 #include "common/formula/formula.hpp"
-#include "common/shapes/meridian.hpp"
-#include "common/shapes/profile_curve.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 
 namespace tubule {
 
@@ -39,13 +36,10 @@ public:
     using std::invalid_argument::invalid_argument;
 };
 
-// Sums of waves in the fraction s of the arc length: of a cell r = SUM a_k sin(k pi s), z = SUM b_k cos(k pi s), else
-// r and z - length s are sums of cos(2 pi k s) and sin(2 pi k s).
-struct SmoothProfile {
-    ProfileCurve::Kind kind = ProfileCurve::Kind::cell;
-    double length = 0;
-    Eigen::VectorXd r, z;  // coefficients: of a cell by k, else 1, cos, sin, cos, sin, ...
-    double distance = 0;   // of the points, at most, from the curve
+// A smooth curve near the points, in the fraction s of its arc length.
+struct FittedProfile {
+    Curve curve;
+    double distance = 0;  // of the points, at most, from the curve
     int points = 0, waves = 0;
     // H0 as a function of the part of the area below, 0 to 1, where the file has it; fitted by as few waves as suffice.
     std::shared_ptr<const Formula> H0 = {};
@@ -57,15 +51,12 @@ struct SmoothProfile {
 // Where this text of a file has a column H0: "FILE:LINE:COLUMN" of its heading; else empty.
 std::string place_of_H0(const std::filesystem::path& path, const std::string& text);
 // Throws ProfileError, with the path as the name of the text.
-SmoothProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file);
+FittedProfile read_profile(const std::filesystem::path& path, const std::string& text, const ProfileFile& file);
 
-// r, dr/ds, z, dz/ds
-std::array<double, 4> point_at(const SmoothProfile& profile, double s);
-Meridian meridian(const SmoothProfile& profile);
 // The curve through enough points that errors between them are below that of the fit.
-ProfileCurve profile_curve(const SmoothProfile& profile);
-// On that curve, as along_curve() has functions: its second one is the part of the area below, without that of s where
-// the curve is no cell.
-BlendedCurve area_below(const SmoothProfile& profile, const ProfileCurve& curve);
+PerturbedCurve curve_through(const FittedProfile& profile);
+// On that curve, as functions_along() has functions: its second one is the part of the area below, without that of s
+// where the curve is no cell.
+CurveFunctions area_below(const FittedProfile& profile, const PerturbedCurve& curve);
 
 }  // namespace tubule

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -38,7 +38,7 @@ void make_noise(ResultFrame& result);
 
 inline Asymmetry asymmetry(const ResultFrame& result) {
     const Asymmetry noise = noise_around(result.noise);
-    return noise.first.empty() ? wave_around(result.modes) : noise;
+    return noise.first.empty() ? mode_around(result.modes) : noise;
 }
 
 // One of l and n, and of all the same.

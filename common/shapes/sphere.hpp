@@ -6,7 +6,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 #include "common/shapes/noise.hpp"
 
 namespace tubule {
@@ -58,9 +58,9 @@ inline UnitSphere base(const Sphere&) {
 }
 inline Asymmetry asymmetry(const Sphere& sphere) {
     const Asymmetry noise = noise_around(sphere.noise);
-    return noise.first.empty() ? wave_around(sphere.modes) : noise;
+    return noise.first.empty() ? mode_around(sphere.modes) : noise;
 }
-inline Meridian meridian(const Sphere& sphere) {
+inline Curve meridian(const Sphere& sphere) {
     require_axisymmetric(sphere);
     return sphere_image(sphere);
 }

@@ -6,7 +6,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/geometry/surface_point.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -28,14 +28,11 @@ Vector3<S> position(const Torus& torus, const Vector3<S>& p) {
 inline Torus base(const Torus& torus) {
     return torus;
 }
-inline Meridian meridian(const Torus& torus) {
-    Meridian m;
-    m.topology = Topology::tube;
-    m.at = [torus](double t) {
-        const double a = torus.tube_radius, c = std::cos(2 * pi * t), s = std::sin(2 * pi * t);
-        return std::array{torus.radius + a * c, -2 * pi * a * s, a * s, 2 * pi * a * c};
-    };
-    return m;
+inline Curve meridian(const Torus& torus) {
+    return curve_of(Topology::tube, 0, [torus](const auto& t) {
+        const auto angle = 2 * pi * t;
+        return std::array{torus.radius + torus.tube_radius * cos(angle), torus.tube_radius * sin(angle)};
+    });
 }
 
 inline double area(const Torus& t) {

@@ -8,7 +8,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 #include "common/shapes/noise.hpp"
 
 namespace tubule {
@@ -74,11 +74,14 @@ inline Cylinder base(const Tube& tube) {
 }
 inline Asymmetry asymmetry(const Tube& tube) {
     const Asymmetry noise = noise_around(tube.noise);
-    return noise.first.empty() ? wave_around(tube.modes) : noise;
+    return noise.first.empty() ? mode_around(tube.modes) : noise;
 }
-inline Meridian meridian(const Tube& tube) {
+inline Curve meridian(const Tube& tube) {
     require_axisymmetric(tube);
-    return graph_meridian(tube);
+    return curve_of(Topology::tube, tube.length, [tube](const auto& t) {
+        const auto z = tube.length * t;
+        return std::array{radius_at(tube, z), z};
+    });
 }
 
 // The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.

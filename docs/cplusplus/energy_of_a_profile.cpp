@@ -1,5 +1,4 @@
 // Energy, area and volume of a closed profile given by points, and the force on it.
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -8,6 +7,7 @@
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_start.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 
 using namespace tubule;
 using namespace tubule::axisym;
@@ -15,12 +15,12 @@ using namespace tubule::axisym;
 int main() {
     // A spheroid, from its south pole to its north pole.
     const double a = 1.2, c = 0.6;
-    std::vector<std::array<double, 2>> points;
+    std::vector<double> r, z;
     for (int i = 0; i <= 60; ++i) {
         const double angle = pi * i / 60;
-        points.push_back({i % 60 == 0 ? 0 : a * std::sin(angle), -c * std::cos(angle)});
+        r.push_back(i % 60 == 0 ? 0 : a * std::sin(angle)), z.push_back(-c * std::cos(angle));
     }
-    const Meridian profile = meridian(points, Topology::cell);
+    const Curve profile = meridian(curve_through(r, z, 0));
 
     // f(H, K) = k20 (H - H0)^2 + k40 (H - H0)^4 + k42 K^2, with H = -2/R on a sphere.
     const Bending bending{.k = {0.5, 0, 0.05}, .H0 = -1};

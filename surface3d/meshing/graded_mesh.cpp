@@ -24,22 +24,16 @@ constexpr double growth = 1.0 / 3;
 struct Place {
     Eigen::Vector3d x, along, around;
 };
-Place place(const Profile& profile, double t, double theta) {
-    if (profile.period == 0) {
+Place place(const Curve& profile, double t, double theta) {
+    if (profile.length == 0) {
         if (t < 0 || t > 1) t = t < 0 ? -t : 2 - t, theta += pi;  // over the pole and down on the other side
         t = std::clamp(t, 1e-6, 1 - 1e-6);                        // the angle has no direction at a pole
     }
-    const double turns = profile.period > 0 ? std::floor(t) : 0, step = 1e-6;
-    const auto at = [&](double parameter) {
-        const Eigen::Vector2d rz = profile.at(parameter - turns);
-        return Eigen::Vector2d(rz[0], rz[1] + turns * profile.period);
-    };
-    const Eigen::Vector2d here = at(t);
-    const double low = std::max(t - step, turns), high = std::min(t + step, turns + 1);
-    const Eigen::Vector2d slope = (at(high) - at(low)) / (high - low);
+    const double turns = profile.length > 0 ? std::floor(t) : 0;
+    const auto [r, r1, z, z1] = profile.at(t - turns);
     const Eigen::Vector3d radial(std::cos(theta), std::sin(theta), 0), tangent(-std::sin(theta), std::cos(theta), 0);
-    return {here[0] * radial + here[1] * Eigen::Vector3d::UnitZ(),
-            slope[0] * radial + slope[1] * Eigen::Vector3d::UnitZ(), here[0] * tangent};
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    return {r * radial + (z + turns * profile.length) * up, r1 * radial + z1 * up, r * tangent};
 }
 
 // How far the shape operator on a curve is from the polynomials of a degree, root mean square.
@@ -151,7 +145,7 @@ std::vector<double> sizes_for(const Resolution& r, bool periodic, double level) 
 }
 
 // Rings whose distances and numbers of points follow the sizes, as in a lattice of equilateral triangles.
-std::vector<Ring> rings_for(const Resolution& r, const Profile& profile, const std::vector<double>& size) {
+std::vector<Ring> rings_for(const Resolution& r, const Curve& profile, const std::vector<double>& size) {
     std::vector<double> rows(samples + 1, 0);  // number of rows up to a sample
     for (int i = 1; i <= samples; ++i)
         rows[i] = rows[i - 1] + (r.speed[i] / size[i] + r.speed[i - 1] / size[i - 1]) / (std::sqrt(3.0) * samples);
@@ -161,23 +155,23 @@ std::vector<Ring> rings_for(const Resolution& r, const Profile& profile, const s
             std::clamp(static_cast<int>(std::upper_bound(rows.begin(), rows.end(), row) - rows.begin()), 1, samples);
         return (i - 1 + (row - rows[i - 1]) / (rows[i] - rows[i - 1])) / samples;
     };
-    std::vector<double> ends = profile.fixed;
+    std::vector<double> ends = profile.seams;
     ends.insert(ends.begin(), 0.0);
     ends.push_back(1.0);
     std::vector<Ring> rings;
     for (std::size_t piece = 0; piece + 1 < ends.size(); ++piece) {
         const double low = at_parameter(rows, ends[piece]), high = at_parameter(rows, ends[piece + 1]);
         int n = std::max(1, static_cast<int>(std::lround(high - low)));
-        if (profile.period > 0 && ends.size() == 2) n = std::max(2, 2 * ((n + 1) / 2));
+        if (profile.length > 0 && ends.size() == 2) n = std::max(2, 2 * ((n + 1) / 2));
         for (int j = 0; j < n; ++j) {
             const double t = j == 0 ? ends[piece] : parameter_of(low + (high - low) * j / n);
-            const Eigen::Vector2d rz = profile.at(t);
+            const auto at = profile.at(t);
             const int count = static_cast<int>(std::lround(at_parameter(r.around, t) / at_parameter(size, t)));
-            const bool pole = profile.period == 0 && piece == 0 && j == 0;
-            rings.push_back({rz[0], rz[1], pole ? 1 : std::max(count, 5), rings.size() % 2 ? 0.5 : 0.0});
+            const bool pole = profile.length == 0 && piece == 0 && j == 0;
+            rings.push_back({at[0], at[2], pole ? 1 : std::max(count, 5), rings.size() % 2 ? 0.5 : 0.0});
         }
     }
-    if (profile.period == 0) rings.push_back({0, profile.at(1)[1], 1, 0});
+    if (profile.length == 0) rings.push_back({0, profile.at(1)[2], 1, 0});
     return rings;
 }
 
@@ -191,7 +185,7 @@ double triangles_of(const Resolution& r, const std::vector<double>& size) {
 
 // Rings of sizes_of(level), with the level that gives this many triangles; there are more the lower the level.
 template <class Sizes>
-TriangleMesh rings_of_number(const Resolution& r, const Profile& profile, int triangles, Sizes&& sizes_of) {
+TriangleMesh rings_of_number(const Resolution& r, const Curve& profile, int triangles, Sizes&& sizes_of) {
     TriangleMesh best;
     double wanted = triangles;
     const auto excess = [&](const TriangleMesh& mesh) {
@@ -204,7 +198,7 @@ TriangleMesh rings_of_number(const Resolution& r, const Profile& profile, int tr
             const double level = std::sqrt(low * high);
             (triangles_of(r, sizes_of(level)) > wanted ? low : high) = level;
         }
-        TriangleMesh mesh = ring_mesh(rings_for(r, profile, sizes_of(high)), profile.period);
+        TriangleMesh mesh = ring_mesh(rings_for(r, profile, sizes_of(high)), profile.length);
         wanted *= triangles / static_cast<double>(mesh.triangles.size());
         if (best.triangles.empty() || excess(mesh) < excess(best)) best = std::move(mesh);
     }
@@ -213,7 +207,7 @@ TriangleMesh rings_of_number(const Resolution& r, const Profile& profile, int tr
 
 }  // namespace
 
-Resolution measure_resolution(const ExactPoint& point, const Profile& profile, int order) {
+Resolution measure_resolution(const ExactPoint& point, const Curve& profile, int order) {
     Resolution r{std::vector<double>(samples + 1), std::vector<double>(samples + 1), {}, {}};
     const auto at = [&](double t, double theta) {
         const Place p = place(profile, t, theta);
@@ -260,13 +254,13 @@ Resolution measure_resolution(const ExactPoint& point, const Profile& profile, i
     return r;
 }
 
-TriangleMesh uniform_rings(const Resolution& r, const Profile& profile, int triangles) {
+TriangleMesh uniform_rings(const Resolution& r, const Curve& profile, int triangles) {
     return rings_of_number(r, profile, triangles, [](double size) { return std::vector<double>(samples + 1, size); });
 }
 
-TriangleMesh graded_rings(const Resolution& r, const Profile& profile, int triangles) {
+TriangleMesh graded_rings(const Resolution& r, const Curve& profile, int triangles) {
     return rings_of_number(r, profile, triangles,
-                           [&](double level) { return sizes_for(r, profile.period > 0, level); });
+                           [&](double level) { return sizes_for(r, profile.length > 0, level); });
 }
 
 }  // namespace tubule::surface3d

@@ -26,11 +26,11 @@ using ExactPoint =
     std::function<SurfacePoint<double>(const Eigen::Vector3d& p, const Eigen::Vector3d& e1, const Eigen::Vector3d& e2)>;
 
 // For elements of this order, the worst of 8 meridians. `point` is called by several threads at once.
-Resolution measure_resolution(const ExactPoint& point, const Profile& profile, int order);
+Resolution measure_resolution(const ExactPoint& point, const Curve& profile, int order);
 
 // Measures the surface map(profile); `map` as for mapped_mesh.
 template <class Map>
-Resolution resolution_of(const Map& map, const Profile& profile, int order) {
+Resolution resolution_of(const Map& map, const Curve& profile, int order) {
     return measure_resolution(
         [&](const auto& p, const auto& e1, const auto& e2) { return point_of_map<double>(map, p, e1, e2); }, profile,
         order);
@@ -38,7 +38,7 @@ Resolution resolution_of(const Map& map, const Profile& profile, int order) {
 
 // About this many triangles, of equal size, or each with about the same part of the square of the defect. Neighbouring
 // sizes differ by no more than a third of a size per size.
-TriangleMesh uniform_rings(const Resolution& resolution, const Profile& profile, int triangles);
-TriangleMesh graded_rings(const Resolution& resolution, const Profile& profile, int triangles);
+TriangleMesh uniform_rings(const Resolution& resolution, const Curve& profile, int triangles);
+TriangleMesh graded_rings(const Resolution& resolution, const Curve& profile, int triangles);
 
 }  // namespace tubule::surface3d

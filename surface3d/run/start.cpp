@@ -13,7 +13,6 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/result/start_frame.hpp"
-#include "common/shapes/profile_curve.hpp"
 #include "common/solve/memory.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/curvature/exact_curvature.hpp"
@@ -102,18 +101,18 @@ double best_width(const Cylinder& tube, const Map& map, int order) {
     return std::clamp(std::pow(along / around, 0.5 / degree), 1.0, widest);
 }
 
-// A surface of revolution with waves, as a map from a base; it may move.
-struct WavedMap {
-    WavedProfile surface;
+// A surface of revolution with modes, as a map from a base; it may move.
+struct CurveMap {
+    PerturbedCurve curve;
     Torus base;
     template <class S>
     Vector3<S> operator()(const Vector3<S>& p) const {
-        return position(surface, base, p);
+        return position(curve, base, p);
     }
     VectorField velocities(const TriangleMesh& triangles, int order) const {
-        if (!surface.velocity) return {};
+        if (!curve.velocity) return {};
         const CurvedMesh nodes =
-            mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return velocity(surface, base, p); });
+            mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return velocity(curve, base, p); });
         VectorField out(3, nodes.size());
         for (int i = 0; i < out.cols(); ++i) out.col(i) = nodes.nodes[i];
         return out;
@@ -121,13 +120,13 @@ struct WavedMap {
 };
 
 // The same with a spontaneous curvature of the area below.
-struct ProfileMap : WavedMap {
-    BlendedCurve area_below;  // as tubule::area_below() has it
+struct ProfileMap : CurveMap {
+    CurveFunctions area_below;  // as tubule::area_below() has it
     std::shared_ptr<const Formula> H0_of_area;
 
     double H0_at(const Eigen::Vector3d& p) const {
-        const double along = place_of(surface.curve, base, p).along;
-        const double rise = surface.curve.kind == ProfileCurve::Kind::cell ? 0 : along;
+        const double along = place_of(curve, base, p).along;
+        const double rise = curve.is_cell() ? 0 : along;
         const double area = value_at(area_below, along)[1] + rise;
         return evaluate(*H0_of_area, &area);
     }
@@ -159,15 +158,15 @@ Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
             if (kind == MeshKind::uniform && by_accuracy) return divided(base, triangles, best_width(base, map, order));
         if constexpr (!std::is_same_v<Base, Torus>) {
             const auto resolution = [&]() -> const Resolution& {
-                return once(resolutions, order, [&] { return resolution_of(map, profile_of(base), order); });
+                return once(resolutions, order, [&] { return resolution_of(map, meridian(base), order); });
             };
-            if (kind == MeshKind::graded) return graded_rings(resolution(), profile_of(base), triangles);
-            if constexpr (std::is_same_v<Base, Profile>) {
+            if (kind == MeshKind::graded) return graded_rings(resolution(), meridian(base), triangles);
+            if constexpr (std::is_same_v<Base, Curve>) {
                 TriangleMesh rings = uniform_rings(resolution(), base, triangles);
                 return kind == MeshKind::irregular ? jittered(rings, jitter, seed) : rings;
             }
         }
-        if constexpr (!std::is_same_v<Base, Profile>)
+        if constexpr (!std::is_same_v<Base, Curve>)
             return kind == MeshKind::irregular ? jittered(divided(base, triangles), jitter, seed)
                                                : divided(base, triangles);
     };
@@ -259,17 +258,17 @@ struct Prepare {
     Prepared operator()(const Shape& shape) const {
         return on(base(shape), [shape](const auto& p) { return position(shape, p); });
     }
-    Prepared operator()(const WavedProfile& surface) const {
-        return of_profile(surface.curve, [&](const Torus& torus) { return WavedMap{surface, torus}; });
+    Prepared operator()(const PerturbedCurve& curve) const {
+        return of_profile(curve, [&](const Torus& torus) { return CurveMap{curve, torus}; });
     }
     template <class MapOn>
-    Prepared of_profile(const ProfileCurve& curve, const MapOn& map_on) const {
+    Prepared of_profile(const PerturbedCurve& curve, const MapOn& map_on) const {
         // Where the torus is only a base, its grid must be one of cells about as long as wide.
         const Torus torus{curve.mean_radius, std::min(curve.arc_length / (2 * pi), 0.9 * curve.mean_radius)};
         const auto map = map_on(torus);
-        if (curve.kind == ProfileCurve::Kind::ring) return on(torus, map);
-        if (curve.kind == ProfileCurve::Kind::cell) return on(profile_of(UnitSphere{}), map);
-        return on(profile_of(Cylinder{curve.mean_radius, curve.length}), map);
+        if (curve.is_ring()) return on(torus, map);
+        if (curve.is_cell()) return on(meridian(UnitSphere{}), map);
+        return on(meridian(Cylinder{curve.mean_radius, curve.length}), map);
     }
     Prepared operator()(const FormulaShape& shape) const {
         const auto map = [shape](const auto& p) { return position(shape, p); };
@@ -277,12 +276,12 @@ struct Prepare {
         return on(UnitSphere{}, map);
     }
     Prepared operator()(const ProfileFile& file) const {
-        const SmoothProfile profile = start_profile(c, file);
-        const WavedProfile surface{profile_curve(profile), {}, {}};
+        const FittedProfile profile = start_profile(c, file);
+        const PerturbedCurve curve = curve_through(profile);
         const auto with_H0 = [&](const Torus& torus) {
-            return ProfileMap{{surface, torus}, area_below(profile, surface.curve), profile.H0};
+            return ProfileMap{{curve, torus}, area_below(profile, curve), profile.H0};
         };
-        Prepared out = profile.H0 ? of_profile(surface.curve, with_H0) : (*this)(surface);
+        Prepared out = profile.H0 ? of_profile(curve, with_H0) : (*this)(curve);
         out.notes.push_back(profile.note());
         return out;
     }
@@ -335,19 +334,9 @@ struct Prepare {
                     false};
         }
         try {
-            const auto profile = profile_of(frame);
-            if (const auto* spline = std::get_if<Revolution>(&profile)) {
-                if (asks_for_velocity()) throw without_velocity();
-                if (from.modes.empty()) return of_spline(*spline);
-            }
-            WavedProfile start;
-            if (!from.modes.empty()) {
-                start = disturbed_profile(c, frame);
-            } else {
-                const auto& [r, z, length] = std::get<ProfilePoints>(profile);
-                start.curve = profile_curve(r, z, length);
-            }
-            if (asks_for_velocity()) start.velocity = profile_velocities(frame, start.curve);
+            PerturbedCurve start = disturbed_curve(c, frame);
+            if (asks_for_velocity()) start.velocity = frame_velocity(frame, start);
+            if (asks_for_velocity() && !start.velocity) throw without_velocity();
             return (*this)(start);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}: {}", from.path, error.what()));
@@ -383,23 +372,12 @@ struct Prepare {
         for (int i = 0; i < mesh.size(); ++i) out.col(i) = mesh.nodes[i];
         return out;
     }
-    ProfileVelocity profile_velocities(const Record& frame, const ProfileCurve& curve) const {
-        const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
-                    *around = find_array(frame, "u_theta");
-        if (!normal || !along) throw without_velocity();
-        return profile_velocity(curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
-    }
-    Prepared of_spline(const Revolution& tube) const {
-        double radius = 0;
-        for (const double r : tube.coefficients) radius += r / tube.coefficients.size();
-        return on(Cylinder{radius, tube.length}, [tube](const auto& p) { return position(tube, p); });
-    }
 };
 
 }  // namespace
 
 Start::Start(const Case& c) {
-    Prepared prepared = c.handover ? Prepare{c}(c.handover->surface) : std::visit(Prepare{c}, c.shape);
+    Prepared prepared = c.handover ? Prepare{c}(c.handover->curve) : std::visit(Prepare{c}, c.shape);
     make_ = std::move(prepared.make);
     resizable_ = prepared.resizable;
     notes_ = std::move(prepared.notes);

@@ -30,9 +30,9 @@ std::vector<double> uneven_breaks(int n) {
 
 // A closed curve, half of one, or a period, disturbed beyond symmetry and smoothness.
 Vector rough(const CurveSpace& space, double size = 0.02) {
-    const Meridian whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
-                           : space.length() > 0 ? meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}})
-                                                : meridian(Torus{2, 0.7});
+    const Curve whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
+                        : space.length() > 0 ? meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}})
+                                             : meridian(Torus{2, 0.7});
     return fit(space, space.images() == 2 ? half(whole) : whole) + random_vector(space.size(), size);
 }
 
@@ -89,7 +89,7 @@ TEST(CurveSpace, prolongationIsTheSameCurve) {
             fine(topology, equal_breaks(10), 5, 4, length);
         const Vector x = rough(coarse), y = fine.prolong(coarse, x);
         for (double s : {0.0, 0.13, 0.5, 0.77, 1.0}) {
-            const CurvePoint a = coarse.evaluate(x, s), b = fine.evaluate(y, s);
+            const CurveSample a = coarse.evaluate(x, s), b = fine.evaluate(y, s);
             EXPECT_NEAR(a.r, b.r, 1e-12);
             EXPECT_NEAR(a.z, b.z, 1e-12);
             EXPECT_NEAR(a.z1, b.z1, 1e-10);
@@ -121,7 +121,7 @@ TEST(CurveForms, derivativesOfEveryFunctional) {
 TEST(CurveForms, mass) {
     // Exact: INT |dX|^2 dS is the area for a shift along the axis, and INT r^2 dS = 8 pi/3 R^4 for dX = r e_r.
     for (const Topology topology : {Topology::cell, Topology::half_cell}) {
-        const Meridian m = topology == Topology::cell ? meridian(Sphere{}) : half(meridian(Sphere{}));
+        const Curve m = topology == Topology::cell ? meridian(Sphere{}) : half(meridian(Sphere{}));
         const CurveSpace space(topology, equal_breaks(20), 7, 6);
         const CurveForms forms(space, bending(1));
         const Vector x = fit(space, m);
@@ -149,12 +149,11 @@ TEST(CurveForms, tellsWhatIsInadmissible) {
     EXPECT_FALSE(forms.add_gradient({.energy = 1}, x.data(), gradient.data()));
 }
 
-CurveObservation observe(const Meridian& m, const Bending& law, std::vector<double> breaks, int degree,
-                         int smoothness) {
+CurveObservation observe(const Curve& m, const Bending& law, std::vector<double> breaks, int degree, int smoothness) {
     const CurveSpace space(m.topology, std::move(breaks), degree, smoothness, m.length);
     return CurveForms(space, law).observe(fit(space, m));
 }
-CurveObservation observe(const Meridian& m, const Bending& law, int elements = 40, int degree = 7) {
+CurveObservation observe(const Curve& m, const Bending& law, int elements = 40, int degree = 7) {
     return observe(m, law, equal_breaks(elements), degree, degree - 1);
 }
 
@@ -245,7 +244,7 @@ TEST(CurveForms, ordersOfConvergence) {
 TEST(CurveForms, halvesAreWorthTheirWhole) {
     // Exact: symmetry.
     const Bending law = bending(0.2, -2, 0.03, 0.06);
-    for (const Meridian& whole : {meridian(Dumbbell{}), meridian(Tube{1, 2.5, {{0.2, 1, 0, 0}}})}) {
+    for (const Curve& whole : {meridian(Dumbbell{}), meridian(Tube{1, 2.5, {{0.2, 1, 0, 0}}})}) {
         const auto a = observe(whole, law, 40), b = observe(half(whole), law, 20);
         EXPECT_NEAR(a.energy, b.energy, 1e-9 * a.energy);
         EXPECT_NEAR(a.area, b.area, 1e-10);
@@ -280,7 +279,7 @@ TEST(CurveForms, defectMeasuresTheEnergyLost) {
     // (Where it vanishes: EquilibriumTest.)
     for (int degree : {3, 5})
         for (const Topology topology : {Topology::cell, Topology::half_cell}) {
-            const Meridian whole = meridian(Ellipsoid{1, 1, 1.5});
+            const Curve whole = meridian(Ellipsoid{1, 1, 1.5});
             const CurveSpace space(topology,
                                    equal_breaks((degree == 3 ? 20 : 40) / (topology == Topology::cell ? 1 : 2)), degree,
                                    degree - 1);
@@ -296,22 +295,20 @@ TEST(CurveForms, defectMeasuresTheEnergyLost) {
 }
 
 TEST(CurveStart, meridiansFromPointsAndCurves) {
-    // Exact: points of a known curve give that curve, to the order of quintic interpolation.
-    const auto points_of = [](const Meridian& m, int n) {
-        std::vector<std::array<double, 2>> points;
+    // Exact: points of a known curve give that curve, to the order of their polynomials of degree 6.
+    const auto through = [](const Curve& m, int n) {
+        std::vector<double> r, z;
         for (int i = 0; i <= n; ++i) {
             const double t = (i + 0.3 * std::sin(2 * pi * i / n)) / n;
-            points.push_back({m.at(t)[0], m.at(t)[2]});
+            r.push_back(m.at(t)[0]), z.push_back(m.at(t)[2]);
         }
-        return points;
+        return meridian(curve_through(r, z, m.length));
     };
     const Bending law = bending(0.2, -2, 0.03, 0.06);
-    for (const Meridian& m :
-         {meridian(Ellipsoid{1, 1, 1.5}), half(meridian(Ellipsoid{1, 1, 1.5})), meridian(Torus{2, 0.7}),
-          meridian(Tube{1, 2.5, {{0.2, 1, 0, 0}}}), half(meridian(Tube{1, 2.5, {{0.2, 1, 0, 0}}}))}) {
+    for (const Curve& m :
+         {meridian(Ellipsoid{1, 1, 1.5}), meridian(Torus{2, 0.7}), meridian(Tube{1, 2.5, {{0.2, 1, 0, 0}}})}) {
         const auto exact = observe(m, law, 60);
-        const auto points = points_of(m, 120);
-        const auto found = observe(meridian(points, m.topology, m.length), law, 60);
+        const auto found = observe(through(m, 120), law, 60);
         EXPECT_NEAR(found.energy, exact.energy, 1e-6 * exact.energy);
         EXPECT_NEAR(found.volume, exact.volume, 1e-7 * exact.volume);
         const CurveSpace space(m.topology, equal_breaks(60), 7, 6, m.length);
@@ -333,22 +330,6 @@ TEST(CurveStart, refusals) {
                   meridian(Ellipsoid{1, 2, 1});
               }),
               "shape.b must be a = 1, not 2: tier \"axisym\" is axisymmetric about z");
-    std::vector<std::array<double, 2>> points{{0, -1}, {0.5, -0.8}};
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
-              "a curve needs at least 7 points, not 2");
-    points = {{0, -1}, {0.5, -0.8}, {0.8, -0.5}, {1, 0}, {0.8, 0.5}, {0.5, 0.8}, {0.1, 1}};
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
-              "the last point of a closed curve must have r = 0");
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::half_cell); }),
-              "the last point of a half cell must have z = 0");
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::tube, 2); }),
-              "point 0 of the curve has radius 0; it must be positive");
-    points[3][0] = -1;
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
-              "point 3 of the curve has radius -1; it must be positive");
-    points[3] = points[2];
-    EXPECT_EQ(message_of<std::invalid_argument>([&] { meridian(points, Topology::cell); }),
-              "points 2 and 3 of the curve coincide or are not finite");
     const CurveSpace space(Topology::cell, equal_breaks(6), 5, 4);
     EXPECT_EQ(message_of<std::invalid_argument>([&] { fit(space, meridian(Torus{})); }),
               "the curve does not have the topology or the period of its space");

@@ -44,7 +44,7 @@ TEST(StationarySystem, jacobianIsThatOfTheResidual) {
                                  Constraints{}, Constraints{{}, {}, 0.8}})
         for (const Topology topology : {Topology::cell, Topology::half_cell}) {
             const auto space = std::make_shared<CurveSpace>(topology, equal_breaks(7), 5, 4);
-            const Meridian m = meridian(Ellipsoid{1, 1, 1.5});
+            const Curve m = meridian(Ellipsoid{1, 1, 1.5});
             const StationarySystem system(space, {bending(0.2, -2, 0.03, 0.06), c}, 0.3);
             Vector u(space->size() + 3), w(u.size());
             u << fit(*space, topology == Topology::cell ? m : half(m)), -0.7, 1.3, 0.2;
@@ -211,7 +211,7 @@ TEST(Equilibrium, doesNotDependOnTheGaugeNorOnTheHalf) {
     for (double gauge : {1e-3, 1.0}) {
         EquilibriumSettings settings = accurate(1e-10);
         settings.gauge = gauge;
-        for (const Meridian& start : {meridian(capsule), half(meridian(capsule))}) {
+        for (const Curve& start : {meridian(capsule), half(meridian(capsule))}) {
             const auto e = find_equilibrium(problem, start, settings);
             ASSERT_EQ(e.stop, Stop::finished) << e.message;
             EXPECT_NEAR(e.observed.energy, r.E, 1e-9) << gauge;
@@ -266,7 +266,7 @@ TEST(Equilibrium, atTheMeasuredForceAFreePeriodStays) {
     ASSERT_EQ(a.stop, Stop::finished) << a.message;
     const double force = axial_force(kept, a), h = 1e-3;
     EXPECT_NEAR((found(7 + h).observed.energy - found(7 - h).observed.energy) / (2 * h), force, 1e-5 * std::abs(force));
-    Meridian longer = meridian(*a.space, a.x);
+    Curve longer = meridian(*a.space, a.x);
     longer.length *= 1.01;
     longer.at = [at = longer.at](double t) {
         const auto [r, r1, z, z1] = at(t);
@@ -303,7 +303,7 @@ TEST(Equilibrium, failuresAreSaid) {
 }
 
 // Reduced volume at which two families of vesicles have the same energy, by bisection.
-double transition(Meridian first, Meridian second, double v) {
+double transition(Curve first, Curve second, double v) {
     Equilibrium a = find_equilibrium(vesicle(v), first), b = find_equilibrium(vesicle(v), second);
     EquilibriumSettings settings;
     settings.descend = false;

@@ -18,7 +18,7 @@ namespace mode_stability_test {
 const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false}, overdamped{.friction = 1};
 
 // A shape made stationary by its multipliers.
-Equilibrium held(const Meridian& m, const Bending& law, int elements, int degree, double sigma, double lambda) {
+Equilibrium held(const Curve& m, const Bending& law, int elements, int degree, double sigma, double lambda) {
     Equilibrium e;
     e.space = std::make_shared<CurveSpace>(m.topology, equal_breaks(elements), degree, degree - 1, m.length);
     e.x = fit(*e.space, m);
@@ -51,7 +51,7 @@ TEST(ModeStability, sphere) {
         return -(L / (R * R)) *
                (law.F2(h) * L / (R * R) + law.f(h) + law.k42 * (2 * Lam - 5) / std::pow(R, 4) + law.sigma);
     };
-    for (const Meridian& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))})
+    for (const Curve& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))})
         for (int degree : {5, 7}) {
             const Equilibrium e =
                 held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, degree, law.sigma, lambda);
@@ -90,7 +90,7 @@ TEST(ModeStability, tube) {
     const Law law;
     const double R = 0.8, length = 3, h = -1 / R - law.H0;
     const double b0 = -(law.f(h) + law.F1(h) / R) / R, lambda = b0 - law.sigma / R;
-    for (const Meridian& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
+    for (const Curve& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
         const Equilibrium e = held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, lambda);
         const ModeStability stability(fixed(law.bending(), e), e);
         for (int mode = 0; mode <= 3; ++mode)
@@ -122,7 +122,7 @@ TEST(ModeStability, stokesFlow) {
         {
             const double R = 1.2, h = -2 / R - law.H0;
             const double b0 = -(2 / R) * (law.f(h) + law.F1(h) / R - law.k42 / std::pow(R, 4));
-            for (const Meridian& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))}) {
+            for (const Curve& m : {meridian(Sphere{R, {}}), half(meridian(Sphere{R, {}}))}) {
                 const Equilibrium e = held(m, law.bending(), m.topology == Topology::cell ? 24 : 12, 5, law.sigma,
                                            b0 - 2 * law.sigma / R);
                 const ModeStability stability(fixed(law.bending(), e), e);
@@ -142,7 +142,7 @@ TEST(ModeStability, stokesFlow) {
         }
         const double R = 0.8, length = 3, h = -1 / R - law.H0;
         const double b0 = -(law.f(h) + law.F1(h) / R) / R;
-        for (const Meridian& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
+        for (const Curve& m : {meridian(Tube{R, length, {}}), half(meridian(Tube{R, length, {}}))}) {
             const Equilibrium e =
                 held(m, law.bending(), m.topology == Topology::tube ? 24 : 12, 5, law.sigma, b0 - law.sigma / R);
             const ModeStability stability(fixed(law.bending(), e), e);
@@ -208,7 +208,7 @@ TEST(ModeStability, shapesThatMove) {
     }
 }
 
-double rate_of_mode_two(const StationaryProblem& problem, const Meridian& start) {
+double rate_of_mode_two(const StationaryProblem& problem, const Curve& start) {
     EquilibriumSettings settings;
     settings.accuracy = 1e-8;
     const Equilibrium e = find_equilibrium(problem, start, settings);

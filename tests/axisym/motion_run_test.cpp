@@ -11,8 +11,8 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
-#include "tests/support/summary_detail.hpp"
 #include "tests/support/paths.hpp"
+#include "tests/support/summary_detail.hpp"
 
 namespace tubule::axisym {
 namespace motion_run_test {
@@ -327,7 +327,7 @@ TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
 
 TEST(CurveRun, theFluidStartsAsTheOverdampedModelMoves) {
     // Initial acceleration of the fluid at rest = velocity of the overdamped model: theory.md (3.8).
-    const Meridian m = half(meridian(Ellipsoid{0.6, 0.6, 1.2}));
+    const Curve m = half(meridian(Ellipsoid{0.6, 0.6, 1.2}));
     const CurveSpace space(Topology::half_cell, equal_breaks(16), 5, 4);
     const Eigen::VectorXd x = fit(space, m);
     const CurveObservation o = CurveForms(space, {}).observe(x);

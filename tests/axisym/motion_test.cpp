@@ -54,9 +54,9 @@ std::vector<CurveLaw> ensembles(bool tube) {
 }
 
 Vector some_curve(const CurveSpace& space) {
-    const Meridian whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
-                           : space.length() > 0 ? meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}})
-                                                : meridian(Torus{2, 0.7});
+    const Curve whole = space.closed()       ? meridian(Ellipsoid{1, 1, 1.5})
+                        : space.length() > 0 ? meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}})
+                                             : meridian(Torus{2, 0.7});
     return fit(space, space.images() == 2 ? half(whole) : whole);
 }
 
@@ -137,7 +137,7 @@ double inf_sup(const CurveSpace& space, const Vector& x) {
     for (int e = 0; e < field.elements(); ++e)
         for (int q = 0; q < SplineSpace::lanes; ++q) {
             const auto& b = field.basis(e, 0);
-            const CurvePoint p = space.evaluate(x, b.z[q]);
+            const CurveSample p = space.evaluate(x, b.z[q]);
             const double dS = space.images() * b.weight[q] * 2 * pi * p.r * std::hypot(p.r1, p.z1);
             for (int i = 0; i < field.width(); ++i)
                 for (int j = 0; j < field.width(); ++j)

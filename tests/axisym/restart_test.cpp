@@ -121,7 +121,7 @@ TEST(Restart, refusesARecordThatLacksAField) {
 
 // What a case may start from: the spline of a graph, else points.
 TEST(Frame, isNoStartWithoutItsProfile) {
-    const auto profile = [](const Record& record) { return tubule::profile_of(record); };
+    const auto profile = [](const Record& record) { return frame_curve(record); };
     Case c = relaxing(1e-3);
     c.time.end = 1e-3, c.time.output.clear();
     Record frame = run_case(c).log.frames.front();

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "axisym/graph/graph_start.hpp"
 #include "common/case/read.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
@@ -66,8 +66,8 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
     const Bending more = with_terms(bending(0.3, -0.4, 0.02, 0.15),
                                     {powers(0.02, 2, 1), powers(-0.01, 3, 0), formula(0.1, "sqrt(1 + H^2 + K^2)")});
     const double R = 0.8, length = 3;
-    const Meridian tube = meridian(Tube{R, length, {}});
-    const Meridian sphere = meridian(Sphere{1.2, {}});
+    const Curve tube = meridian(Tube{R, length, {}});
+    const Curve sphere = meridian(Sphere{1.2, {}});
     for (const auto& [energy, law] : {std::pair{listed, law_of(ModelKind::gradient_flow)},
                                       {listed, law_of(ModelKind::overdamped)},
                                       {listed, law_of(ModelKind::stokes, 2, 0.3)},
@@ -109,9 +109,9 @@ TEST(Dispersion, spectraOfTubesAndSpheres) {
 }
 
 TEST(Dispersion, shapesWithoutASpectrumAreRefused) {
-    const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
-    const Meridian straight = meridian(Tube{1, 3, {}});
-    const auto found = [](MotionLaw law, const Meridian& shape) {
+    const Curve wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
+    const Curve straight = meridian(Tube{1, 3, {}});
+    const auto found = [](MotionLaw law, const Curve& shape) {
         return spectrum(bending(1), law, held_by(law), shape).modes.size();
     };
     EXPECT_EQ(found(law_of(ModelKind::gradient_flow), wavy), 3u);
@@ -167,7 +167,7 @@ TEST(Dispersion, wavesAroundTheAxisAlone) {
     const double R = 0.8, length = 3;
     SpectrumSettings around;
     around.first = 1, around.count = 1, around.accuracy = 1e-8;
-    const Meridian tube = meridian(Tube{R, length, {}});
+    const Curve tube = meridian(Tube{R, length, {}});
     const Spectrum found = spectrum(energy, free, held_by(free), tube, around);
     const UniformTube exact{energy, R, theory::tension_of_free_volume(energy, R)};
     EXPECT_NEAR(found.sigma, exact.tension, 1e-8);
@@ -180,7 +180,7 @@ TEST(Dispersion, wavesAroundTheAxisAlone) {
         EXPECT_NEAR(found.modes[m - 1].rates[0] / fastest, 1, 1e-8) << m;
     }
     // In motion: those of the gradient flow at this instant, whatever is held; of what flows, an estimate that says so.
-    const Meridian wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
+    const Curve wavy = meridian(Tube{1, 3, {{0.2, 1, 0, 0}}});
     const MotionLaw gradient = law_of(ModelKind::gradient_flow);
     const Spectrum whole = spectrum(bending(1), gradient, Held::nothing, wavy),
                    part = spectrum(bending(1), gradient, Held::nothing, wavy, around);
@@ -191,12 +191,12 @@ TEST(Dispersion, wavesAroundTheAxisAlone) {
 
 TEST(ProfileModes, ofTubesAndCells) {
     // Exact: the amplitudes the shapes were given. Of a sphere the middle of the volume is off by products of them.
-    const Meridian tube = meridian(Tube{1.1, 3, {{0.2, 1, 0, 0.3}, {0.05, 3, 0, 1}}});
+    const Curve tube = meridian(Tube{1.1, 3, {{0.2, 1, 0, 0.3}, {0.05, 3, 0, 1}}});
     EXPECT_NEAR(mean_radius(tube), 1.1, 1e-13);
     EXPECT_NEAR(mode_amplitude(tube, 1), 0.2, 1e-13);
     EXPECT_NEAR(mode_amplitude(tube, 2), 0, 1e-13);
     EXPECT_NEAR(mode_amplitude(tube, 3), 0.05, 1e-13);
-    const Meridian cell = meridian(Sphere{1.2, {{1e-4, 2, 0}, {2e-4, 5, 0}}});
+    const Curve cell = meridian(Sphere{1.2, {{1e-4, 2, 0}, {2e-4, 5, 0}}});
     EXPECT_NEAR(mean_radius(cell), 1.2, 1e-7);
     EXPECT_NEAR(mode_amplitude(cell, 2), 1e-4, 2e-7);
     EXPECT_NEAR(mode_amplitude(cell, 5), 2e-4, 2e-7);
@@ -210,7 +210,7 @@ theory::GrowthFit fit_of_frames(const std::vector<Record>& frames, int n) {
     std::vector<double> times, amplitudes;
     for (const Record& frame : frames) {
         times.push_back(frame.time);
-        amplitudes.push_back(mode_amplitude(frame_meridian(frame), n));
+        amplitudes.push_back(mode_amplitude(meridian(frame_curve(frame)), n));
     }
     return theory::fit_growth(times, amplitudes);
 }

@@ -32,7 +32,7 @@ std::vector<double> uneven_breaks(int n) {
 
 // A closed curve, half of one, or a period, disturbed beyond symmetry and smoothness.
 Vector rough(const CurveSpace& space) {
-    const Meridian whole =
+    const Curve whole =
         space.closed() ? meridian(Ellipsoid{1, 1, 1.5}) : meridian(Tube{1, space.length(), {{0.2, 1, 0, 0}}});
     return fit(space, space.images() == 2 ? half(whole) : whole) + random_vector(space.size(), 0.02);
 }
@@ -102,7 +102,7 @@ TEST(VaryingH0, aFixedH0PushesAlongTheCurve) {
     forms.fix_H0(x);
     const auto slide = [](double s) { return std::sin(pi * s) * std::cos(2 * pi * s); };
     const Vector along = space.project([&](double s) {
-        const CurvePoint p = space.evaluate(x, s);
+        const CurveSample p = space.evaluate(x, s);
         return std::array{slide(s) * p.r1, slide(s) * p.z1};
     });
     Vector power = Vector::Zero(space.size());

@@ -49,7 +49,7 @@ RevolutionSurface spheroid(double a, double c, double height = 0, int points = 2
         r.push_back(i == 0 || i == points - 1 ? 0 : a * std::sin(angle));
         z.push_back(height - c * std::cos(angle));
     }
-    return RevolutionSurface(profile_curve(r, z, 0));
+    return RevolutionSurface(curve_through(r, z, 0));
 }
 
 // r = 1 + amplitude cos(2 pi (z - shift)/length), as points of a profile.
@@ -60,16 +60,16 @@ RevolutionSurface wave(double amplitude, double length, double shift = 0) {
         r.push_back(1 + amplitude * std::cos(2 * pi * (i / 240.0 - shift / length)));
     }
     r.back() = r.front();
-    return RevolutionSurface(profile_curve(r, z, length));
+    return RevolutionSurface(curve_through(r, z, length));
 }
 
 // A cubic spline through nothing in particular: B-splines sum up to one, so equal coefficients are a cylinder.
-Revolution spline(double length, const std::vector<double>& values) {
+PerturbedCurve spline(double length, const std::vector<double>& values) {
     const int n = static_cast<int>(values.size());
-    Revolution out{3, length, {}, values};
-    out.coefficients.insert(out.coefficients.end(), values.begin(), values.begin() + 3);
-    for (int i = 0; i < n + 7; ++i) out.knots.push_back(length * (i - 3) / n);
-    return out;
+    std::vector<double> knots, coefficients = values;
+    coefficients.insert(coefficients.end(), values.begin(), values.begin() + 3);
+    for (int i = 0; i < n + 7; ++i) knots.push_back(length * (i - 3) / n);
+    return spline_curve(3, length, knots, coefficients);
 }
 
 RigidMotion some_motion(double angle) {
@@ -230,11 +230,12 @@ TEST(Distance, OfTwoMeshesOfOneSurfaceFalls) {
 }
 
 TEST(Distance, OfAProfileFromItsMeshFalls) {
-    const Revolution profile = spline(2, {1, 1.1, 1.2, 1.15, 1, 0.9, 0.85, 0.92});
+    const PerturbedCurve profile = spline(2, {1, 1.1, 1.2, 1.15, 1, 0.9, 0.85, 0.92});
     const RevolutionSurface exact(profile);
     const auto apart = [&](int n) {
-        return distance(exact, surface(mapped_mesh(tube_rings(1, 2, n, 2 * n), 3,
-                                                   [&](const auto& p) { return Vector3d(position(profile, p)); })));
+        return distance(exact, surface(mapped_mesh(tube_rings(1, 2, n, 2 * n), 3, [&](const auto& p) {
+                            return Vector3d(position(profile, Torus{}, p));
+                        })));
     };
     // A cubic spline has jumps of its third derivative at multiples of 1/4, where rings of 8 and 16 have nodes.
     const Distance coarse = apart(8), fine = apart(16);

@@ -60,7 +60,7 @@ TEST(SelfIntersection, NotWherePlanesNearlyAgree) {
         for (const int order : {3, 4}) {
             SCOPED_TRACE(testing::Message() << "length " << length << ", order " << order);
             const Capsule capsule{1, length};
-            const Profile profile = base(capsule);
+            const Curve profile = base(capsule);
             const auto map = map_of(capsule);
             const TriangleMesh rings = graded_rings(resolution_of(map, profile, order), profile, 200);
             EXPECT_FALSE(find_self_intersection(mapped_mesh(rings, order, map)));
@@ -274,7 +274,7 @@ TEST(NewMesh, WhereAreaAndVolumeAreOneCondition) {
 // missing.
 TEST(NewMesh, OnlyNearASphereAreAreaAndVolumeOneCondition) {
     const Capsule capsule{0.913, 3.135};
-    const Profile profile = base(capsule);
+    const Curve profile = base(capsule);
     const CurvedMesh few =
         mapped_mesh(uniform_rings(resolution_of(map_of(capsule), profile, 3), profile, 113), 3, map_of(capsule));
     const CurvedMesh sphere = mapped_mesh(icosphere(2), 4, map_of(Sphere{.radius = 1, .modes = {{1e-3, 2, 1}}}));

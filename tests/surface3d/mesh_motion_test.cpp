@@ -127,7 +127,7 @@ TEST(MeshMotion, ForgetsHowNodesMovedAlongTheSurface) {
 
 // The deep neck of cases/pinch_off.toml.
 Motion deep_neck(const Tube& tube, bool graded, bool follow) {
-    const Profile profile = profile_of(base(tube));
+    const Curve profile = meridian(base(tube));
     const auto map = [&](const auto& p) { return position(tube, p); };
     const Resolution resolution = resolution_of(map, profile, 4);
     const TriangleMesh base = (graded ? graded_rings : uniform_rings)(resolution, profile, 128);

@@ -9,7 +9,6 @@
 #include "common/shapes/capsule.hpp"
 #include "common/shapes/dumbbell.hpp"
 #include "common/shapes/ellipsoid.hpp"
-#include "common/shapes/revolution.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
 #include "surface3d/curvature/bending_force.hpp"
@@ -147,7 +146,7 @@ TEST(Shapes, HaveTheIntegralsTheyClaim) {
     EXPECT_NEAR(integrate_exactly(ball, map_of(perturbed_sphere()), K2) / perturbed_K2, 1, 1e-5);
 
     const Capsule capsule{0.4, 1.3};
-    const Profile profile = base(capsule);
+    const Curve profile = base(capsule);
     const TriangleMesh rings = uniform_rings(resolution_of(map_of(capsule), profile, 3), profile, 1000);
     EXPECT_NEAR(integrate_exactly(rings, map_of(capsule), one) / area(capsule), 1, 1e-9);
     EXPECT_NEAR(integrate_exactly(rings, map_of(capsule), flux) / volume(capsule), 1, 1e-9);
@@ -168,14 +167,6 @@ TEST(Shapes, SurfacesOfRevolutionAgreeWithTheirProfile) {
     EXPECT_NEAR(surface.H, profile.H, 1e-13);
     EXPECT_NEAR(surface.K, profile.K, 1e-13);
     EXPECT_NEAR(surface.area * 2 * pi, profile.area, 1e-12);
-
-    // A cubic spline with all its knots at the ends is a Bezier curve: r = 1 + z/2 on [0, 2] from these coefficients.
-    const Revolution cone{
-        .degree = 3, .length = 2, .knots = {0, 0, 0, 0, 2, 2, 2, 2}, .coefficients = {1, 4. / 3, 5. / 3, 2}};
-    EXPECT_NEAR(radius_at(cone, 0.5), 1.25, 1e-14);
-    EXPECT_NEAR(radius_at(cone, 2.5), 1.25, 1e-14);  // periodic
-    EXPECT_NEAR(radius_at(cone, z).d[0], 0.5, 1e-14);
-    EXPECT_NEAR(radius_at(cone, z).dd[0], 0, 1e-13);
 }
 
 TEST(Shapes, TubeModesTurnAroundTheAxis) {
@@ -206,7 +197,7 @@ MeshErrors mesh_errors(const Shape& shape, const TriangleMesh& base, double exac
 // Graded meshes of these numbers of triangles are better than uniform ones by these factors at least. Energy errors can
 // change sign on the way and cancel there, so L2 errors are compared, and more than one number.
 template <class Shape>
-void expect_gains(const Shape& shape, const Profile& profile, const std::vector<int>& numbers, double exact_H2,
+void expect_gains(const Shape& shape, const Curve& profile, const std::vector<int>& numbers, double exact_H2,
                   double exact_K2, const MeshErrors& gain) {
     const Resolution resolution = resolution_of(map_of(shape), profile, 3);
     for (const int triangles : numbers) {
@@ -239,7 +230,7 @@ TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesAtANeck) {
         const auto p = graph_point(r.v, r.d[0], r.dd[0]);
         H2 += p.H * p.H * p.area / 1000, K2 += p.K * p.K * p.area / 1000;
     }
-    expect_gains(neck, profile_of(base(neck)), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
+    expect_gains(neck, meridian(base(neck)), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
 }
 
 }  // namespace mesh_test

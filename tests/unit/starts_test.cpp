@@ -21,7 +21,7 @@ namespace starts_test {
 
 using test::message_of;
 
-SmoothProfile profile_in(const std::filesystem::path& path, const ProfileFile& how) {
+FittedProfile profile_in(const std::filesystem::path& path, const ProfileFile& how) {
     return read_profile(path, read_input(path, megabyte), how);
 }
 
@@ -77,19 +77,19 @@ ProfileFile within(double tolerance, std::optional<double> length = {}) {
 TEST_F(ProfileFiles, ComeAsCloseAsStated) {
     // A spheroid and a tube, known everywhere; the points are exact.
     for (const double tolerance : {1e-3, 1e-6, 1e-8}) {
-        const SmoothProfile cell = profile_in(points(120, spheroid), within(tolerance));
-        EXPECT_EQ(cell.kind, ProfileCurve::Kind::cell);
+        const FittedProfile cell = profile_in(points(120, spheroid), within(tolerance));
+        EXPECT_EQ(cell.curve.topology, Topology::cell);
         EXPECT_LE(cell.distance, tolerance);
-        const SmoothProfile tube = profile_in(points(80,
+        const FittedProfile tube = profile_in(points(80,
                                                      [](double t) {
                                                          return std::array{1 + 0.3 * std::cos(2 * pi * t), 0.5 + 2 * t};
                                                      }),
                                               within(tolerance, 2));
-        EXPECT_EQ(tube.kind, ProfileCurve::Kind::tube);
-        const ProfileCurve curve = profile_curve(cell);
+        EXPECT_EQ(tube.curve.topology, Topology::tube);
+        const PerturbedCurve curve = curve_through(cell);
         for (int i = 0; i <= 500; ++i) {
             const double s = i / 500.0;
-            const auto p = point_at(cell, s), q = point_at(tube, s);
+            const auto p = cell.curve.at(s), q = tube.curve.at(s);
             EXPECT_LT(from_spheroid(p[0], p[2]), 2 * tolerance);
             EXPECT_LT(std::abs(q[0] - 1 - 0.3 * std::cos(pi * (q[2] - 0.5))), 2 * tolerance);
             const auto made = profile_at(curve, s);
@@ -100,27 +100,27 @@ TEST_F(ProfileFiles, ComeAsCloseAsStated) {
 
 TEST_F(ProfileFiles, NoiseIsSmoothedAway) {
     // 200 points with noise of .01: the curve is nearer to the spheroid than the points, and by far smoother.
-    const SmoothProfile fit = profile_in(points(200, spheroid, 0.01), within(0.05));
+    const FittedProfile fit = profile_in(points(200, spheroid, 0.01), within(0.05));
     EXPECT_LE(fit.distance, 0.05);
     for (int i = 0; i <= 200; ++i) {
-        const auto p = point_at(fit, i / 200.0);
+        const auto p = fit.curve.at(i / 200.0);
         EXPECT_LT(from_spheroid(p[0], p[2]), 0.03);
     }
     EXPECT_NE(fit.note().find("201 points"), std::string::npos);
 }
 
 TEST_F(ProfileFiles, RunEitherWayWithOrWithoutTheLastPoint) {
-    const SmoothProfile down = profile_in(points(60, [](double t) { return spheroid(1 - t); }), within(1e-4));
-    EXPECT_GT(point_at(down, 0.5)[3], 0);  // upwards on the outside
+    const FittedProfile down = profile_in(points(60, [](double t) { return spheroid(1 - t); }), within(1e-4));
+    EXPECT_GT(down.curve.at(0.5)[3], 0);  // upwards on the outside
     const auto wave = [](double t) { return std::array{1 + 0.3 * std::cos(2 * pi * t * 63 / 64), 2 * t * 63 / 64}; };
     EXPECT_LE(profile_in(points(63, wave), within(1e-6, 2)).distance, 1e-6);
-    const SmoothProfile ring =
+    const FittedProfile ring =
         profile_in(points(60,
                           [](double t) {
                               return std::array{2 + 0.5 * std::cos(2 * pi * t), 0.5 * std::sin(2 * pi * t)};
                           }),
                    within(1e-9));
-    EXPECT_EQ(ring.kind, ProfileCurve::Kind::ring);
+    EXPECT_TRUE(curve_through(ring).is_ring());
 }
 
 TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
@@ -188,7 +188,7 @@ TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
     for (const double tolerance : {1e-4, 1e-7}) {
         ProfileFile how = within(1e-9);
         how.H0_tolerance = tolerance;
-        const SmoothProfile fit = profile_in(write(sphere_rows(200)), how);
+        const FittedProfile fit = profile_in(write(sphere_rows(200)), how);
         ASSERT_TRUE(fit.H0);
         EXPECT_LE(fit.H0_distance, tolerance);
         using J = Jet<double, 1, 2>;
@@ -201,8 +201,8 @@ TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
             EXPECT_NEAR(H0.dd[0], (at(area + h) - 2 * at(area) + at(area - h)) / (h * h), 1e-2);
         }
         // The same on the curve that tier surface3d makes of it: c = -cos(pi s) = z.
-        const ProfileCurve curve = profile_curve(fit);
-        const BlendedCurve area = area_below(fit, curve);
+        const PerturbedCurve curve = curve_through(fit);
+        const CurveFunctions area = area_below(fit, curve);
         for (const double z : {-1.0, -0.99, -0.3, 0.2, 0.8, 1.0})
             EXPECT_NEAR(value_at(area, z)[1], (1 + z) / 2, 1e-8) << z;
     }
@@ -212,7 +212,7 @@ TEST_F(ProfileFiles, H0OfThePointsIsAFunctionOfTheAreaBelow) {
         const double t = pi * i / 80;
         rows += fmt::format("{:.17g} {:.17g} {:.17g}\n", -std::cos(t), i % 80 == 0 ? 0 : std::sin(t), -std::cos(t));
     }
-    const SmoothProfile down = profile_in(write("z r H0\n" + rows), within(1e-9));
+    const FittedProfile down = profile_in(write("z r H0\n" + rows), within(1e-9));
     EXPECT_NEAR(evaluate(*down.H0, std::array{0.25}.data()), -0.5, 1e-4);
 }
 
@@ -220,14 +220,14 @@ TEST_F(ProfileFiles, H0OfTubesAndRingsRepeatsItself) {
     // A straight tube, whose area grows with z; a torus, whose area over the angle t from the outside is
     // 2 t + sin(t)/2 of 4 pi, with radii 2 and 0.5.
     const auto H0 = [](double area) { return -1 + 0.3 * std::cos(2 * pi * area) + 0.2 * std::sin(4 * pi * area); };
-    const auto check = [&](const SmoothProfile& fit) {
+    const auto check = [&](const FittedProfile& fit) {
         for (int i = 0; i <= 100; ++i) {
             const double area = i / 100.0;
             EXPECT_NEAR(evaluate(*fit.H0, &area), H0(area), 1e-6) << i;
         }
         // The whole way around once.
-        const ProfileCurve curve = profile_curve(fit);
-        const BlendedCurve below = area_below(fit, curve);
+        const PerturbedCurve curve = curve_through(fit);
+        const CurveFunctions below = area_below(fit, curve);
         EXPECT_NEAR(value_at(below, 0.0)[1], value_at(below, 1.0)[1], 1e-12);
     };
     for (const int last : {39, 40}) {  // without and with the point that is the first one moved up
@@ -251,7 +251,7 @@ TEST_F(ProfileFiles, H0IsSmoothedToItsOwnTolerance) {
               std::string::npos);
     ProfileFile how;
     how.H0_tolerance = 0.05;
-    const SmoothProfile fit = profile_in(write(noisy), how);
+    const FittedProfile fit = profile_in(write(noisy), how);
     EXPECT_NE(fit.note().find("a smooth H0 at most 0.0"), std::string::npos) << fit.note();
     for (int i = 0; i <= 100; ++i)
         EXPECT_NEAR(evaluate(*fit.H0, std::array{i / 100.0}.data()), domains(i / 100.0), 0.05);

@@ -121,8 +121,7 @@ RunSummary on_triangles(const Case& c, const surface3d::Start& start, SurfacePar
 std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
     const NoiseGrowth::Peak peak = growth.largest();
     if (peak.amplitude <= c.automatic.noise * (1 + 1e-12))
-        return fmt::format("start and model are axisymmetric, and no mode grows (m = 1 to {})",
-                           growth.modes());
+        return fmt::format("start and model are axisymmetric, and no mode grows (m = 1 to {})", growth.modes());
     return fmt::format(
         "start and model are axisymmetric, and modes m > 0 stay small: at most {} (m = {} at t = {:.6g})",
         percent(peak.amplitude), peak.m, peak.time);
@@ -274,7 +273,7 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
     Case c = surface_case(case_);
     RunSummary s = clock_.pausing([&] {
         c.handover =
-            Handover{waved_surface(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
+            Handover{perturbed_curve(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
         SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, before);
         return on_triangles(c, surface3d::Start(c), part, restart);
     });

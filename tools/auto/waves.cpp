@@ -4,7 +4,6 @@
 #include <cmath>
 #include <complex>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
 #include "common/result/frame_profile.hpp"
 
@@ -17,7 +16,7 @@ constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
 // Without inertia, under the loads of this time.
-axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Meridian& profile, double time) {
+axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Curve& profile, double time) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
     settings.max_elements = most_elements;
@@ -41,7 +40,7 @@ double rate_with_inertia(double stokes, double overdamped) {
 }
 
 WaveRates wave_rates(const Case& c, const Record& frame) {
-    const Meridian profile = axisym::frame_meridian(frame);
+    const Curve profile = meridian(frame_curve(frame));
     const MotionLaw law = motion_law(c.model);
     const axisym::Spectrum found = spectrum_of(c, law, profile, frame.time);
     WaveRates out;
@@ -57,23 +56,19 @@ WaveRates wave_rates(const Case& c, const Record& frame) {
     return out;
 }
 
-WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
-    const auto [r, z, length] = profile_points(frame);
-    WavedProfile out{profile_curve(r, z, length), {}, {}};
+PerturbedCurve perturbed_curve(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
+    PerturbedCurve out = frame_curve(frame);
+    const std::vector<double>& r = find_array(frame, "r")->data;
     const double radius = *std::max_element(r.begin(), r.end());
-    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), axisym::frame_meridian(frame), frame.time);
+    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), meridian(out), frame.time);
     for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
         const axisym::ModeRates& mode = found.modes[i];
         if (relative_amplitudes[i] == 0 || mode.shape.empty()) continue;
         std::vector<double> w = mode.shape;
         for (double& value : w) value *= relative_amplitudes[i] * radius;
-        out.waves.push_back(normal_wave(out.curve, mode.m, w));
+        out.modes.push_back(normal_mode(out, mode.m, w));
     }
-    const Array *normal = find_array(frame, "u_n"), *along = find_array(frame, "u_t"),
-                *around = find_array(frame, "u_theta");
-    if (motion_law(c.model).inertia != 0 && normal && along)
-        out.velocity =
-            profile_velocity(out.curve, {normal->data, along->data, around ? around->data : std::vector<double>{}});
+    if (motion_law(c.model).inertia != 0) out.velocity = frame_velocity(frame, out);
     return out;
 }
 

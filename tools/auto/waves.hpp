@@ -23,8 +23,8 @@ WaveRates wave_rates(const Case& c, const Record& frame);
 // each has the flow that suits it best, a fluid with the best compromise is no faster.
 double rate_with_inertia(double stokes, double overdamped);
 
-// The surface of a frame with the fastest growing wave of each m on it: relative_amplitudes[m - 1] of the largest
+// The profile of a frame with the fastest growing mode of each m on it: relative_amplitudes[m - 1] of the largest
 // radius, as a normal displacement; none where that is 0. A fluid keeps its velocity.
-WavedProfile waved_surface(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes);
+PerturbedCurve perturbed_curve(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes);
 
 }  // namespace tubule

@@ -18,6 +18,7 @@
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
@@ -161,7 +162,7 @@ std::optional<double> mean_of(const Record& frame, const std::string& array) {
 
 // A frame that is a straight tube, to a thousandth of its radius.
 std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
-    const Meridian profile = axisym::frame_meridian(frame);
+    const Curve profile = meridian(frame_curve(frame));
     if (profile.topology != Topology::tube || !(profile.length > 0)) return std::nullopt;
     TubeSubject out;
     out.tube = {c.energy, axisym::mean_radius(profile), 0};

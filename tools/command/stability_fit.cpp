@@ -6,8 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/solve/pause.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
@@ -55,7 +55,7 @@ double amplitude_of(const Result& result, const Record& frame, WaveNumbers wave)
     if (wave.m > 0)
         throw std::invalid_argument(
             fmt::format("--fit {},{}: a result of tier \"axisym\" has no modes m > 0", wave.n, wave.m));
-    return axisym::mode_amplitude(axisym::frame_meridian(frame), wave.n);
+    return axisym::mode_amplitude(meridian(frame_curve(frame)), wave.n);
 }
 
 // The rows have every step, the frames only what was asked for. A run of both tiers has profiles, of which nothing with

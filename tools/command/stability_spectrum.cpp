@@ -7,6 +7,7 @@
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
+#include "common/result/frame_profile.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/text.hpp"
@@ -85,7 +86,7 @@ std::string json_text(const std::vector<Found>& found) {
 
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
                             const std::vector<Model>& models) {
-    const Meridian shape = subject.frame ? axisym::frame_meridian(*subject.frame) : axisym::start_meridian(subject.c);
+    const Curve shape = subject.frame ? meridian(frame_curve(*subject.frame)) : axisym::initial_curve(subject.c);
     axisym::SpectrumSettings settings;
     settings.last = options.modes, settings.count = options.rates;
     std::vector<Found> found;

@@ -44,10 +44,7 @@ std::unique_ptr<Surface> frame_surface(const Record& frame, const Result& result
             throw std::invalid_argument("the triangles of its surface are missing");
         return std::make_unique<TriangleSurface>(surface3d::frame_surface(frame, result.meshes[*frame.mesh]));
     }
-    const auto profile = profile_of(frame);
-    if (const auto* spline = std::get_if<Revolution>(&profile)) return std::make_unique<RevolutionSurface>(*spline);
-    const auto& [r, z, length] = std::get<ProfilePoints>(profile);
-    return std::make_unique<RevolutionSurface>(profile_curve(r, z, length));
+    return std::make_unique<RevolutionSurface>(frame_curve(frame));
 }
 
 std::unique_ptr<Surface> surface_of(const Result& result, std::size_t frame, char which) {

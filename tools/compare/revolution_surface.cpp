@@ -1,7 +1,6 @@
 #include "tools/compare/revolution_surface.hpp"
 
 #include <cmath>
-#include <stdexcept>
 
 #include "surface3d/mesh/reference_triangle.hpp"
 
@@ -25,16 +24,6 @@ constexpr double spacing_of_grain = 0.25;  // of points around the axis
 constexpr int fewest_around = 8, most_around = 720;
 constexpr double golden = 2.399963229728653;  // angle by which rings are turned: no two are aligned
 
-template <class S>
-std::array<S, 2> curve_at(const Revolution& tube, const S& s) {
-    const S z = s * tube.length;
-    return {radius_at(tube, z), z};
-}
-template <class S>
-std::array<S, 2> curve_at(const ProfileCurve& curve, const S& s) {
-    return profile_at(curve, s);
-}
-
 }  // namespace
 
 struct RevolutionSurface::Nearest {
@@ -42,48 +31,27 @@ struct RevolutionSurface::Nearest {
     Vector2d from;  // the query point, as the periodic image sees it
 };
 
-RevolutionSurface::RevolutionSurface(Revolution tube) : period_(tube.length) {
-    if (tube.degree < 1 || tube.degree > 7 || !(tube.length > 0) || tube.coefficients.empty() ||
-        tube.knots.size() != tube.coefficients.size() + tube.degree + 1)
-        throw std::invalid_argument("the spline of the profile is damaged");
-    std::vector<double> breaks{0};
-    for (const double knot : tube.knots)
-        if (const double s = knot / tube.length; s > breaks.back() + 1e-9 && s < 1 - 1e-9) breaks.push_back(s);
-    breaks.push_back(1);
-    profile_ = std::move(tube);
-    build(breaks);
-}
-
-RevolutionSurface::RevolutionSurface(ProfileCurve curve) : period_(curve.length) {
+RevolutionSurface::RevolutionSurface(PerturbedCurve curve) : curve_(std::move(curve)) {
     std::vector<double> breaks;
-    for (const double x : curve.functions.x)
-        breaks.push_back(curve.kind == ProfileCurve::Kind::cell ? std::acos(std::clamp(-x, -1.0, 1.0)) / pi : x);
+    for (const double x : curve_.functions.x)
+        breaks.push_back(curve_.is_cell() ? std::acos(std::clamp(-x, -1.0, 1.0)) / pi : x);
     breaks.front() = 0, breaks.back() = 1;
-    profile_ = std::move(curve);
-    build(breaks);
-}
-
-RevolutionSurface::CurvePoint RevolutionSurface::evaluate(double s) const {
-    using Second = Jet<double, 1, 2>;
-    // At the upper end of a period the spline starts again at height 0: stay below it.
-    if (std::holds_alternative<Revolution>(profile_)) s = std::min(s, std::nextafter(1.0, 0.0));
-    const auto [r, z] =
-        std::visit([&](const auto& profile) { return curve_at(profile, Second::variable(s, 0)); }, profile_);
-    return {{r.v, z.v}, {r.d[0], z.d[0]}, {r.dd[0], z.dd[0]}};
-}
-
-void RevolutionSurface::build(const std::vector<double>& breaks) {
     std::vector<surface3d::BoxTree<2>::Box> boxes;
     for (std::size_t i = 0; i + 1 < breaks.size(); ++i) add_part(breaks[i], breaks[i + 1], 0, boxes);
     breaks_.push_back(1);
     tree_ = surface3d::BoxTree<2>(std::move(boxes));
 }
 
+CurveSample RevolutionSurface::evaluate(double s) const {
+    const auto [r, z] = profile_at(curve_, Jet<double, 1, 2>::variable(s, 0));
+    return {r.v, r.d[0], r.dd[0], z.v, z.d[0], z.dd[0]};
+}
+
 void RevolutionSurface::add_part(double from, double to, int depth, std::vector<surface3d::BoxTree<2>::Box>& boxes) {
     double second = 0;
-    for (int i = 0; i <= looks; ++i) second = std::max(second, evaluate(from + (to - from) * i / looks).dd.norm());
+    for (int i = 0; i <= looks; ++i) second = std::max(second, evaluate(from + (to - from) * i / looks).dd().norm());
     const double bulge = between_looks * second * (to - from) * (to - from) / 8;
-    const Vector2d a = evaluate(from).x, b = evaluate(to).x;
+    const Vector2d a = evaluate(from).x(), b = evaluate(to).x();
     if (bulge > flat_enough * (b - a).norm() && depth < deepest) {
         add_part(from, (from + to) / 2, depth + 1, boxes);
         add_part((from + to) / 2, to, depth + 1, boxes);
@@ -99,18 +67,18 @@ Foot RevolutionSurface::foot(const Vector3d& x) const {
     const double rho = std::hypot(x[0], x[1]);
     const double cosine = rho > 0 ? x[0] / rho : 1, sine = rho > 0 ? x[1] / rho : 0;
     Nearest nearest;
-    tree_.nearest(Vector2d(rho, x[2]), period_, nearest.square, [&](std::size_t part, const Vector2d& image) {
+    tree_.nearest(Vector2d(rho, x[2]), period(), nearest.square, [&](std::size_t part, const Vector2d& image) {
         const double from = breaks_[part], to = breaks_[part + 1];
-        const Vector2d a = evaluate(from).x, b = evaluate(to).x, chord = b - a;
+        const Vector2d a = evaluate(from).x(), b = evaluate(to).x(), chord = b - a;
         const double t = std::clamp(chord.dot(image - a) / chord.squaredNorm(), 0.0, 1.0);
         const double away = (a + t * chord - image).norm() - bulge_[part];
         if (away > 0 && away * away >= nearest.square) return;
         look_at(from, to, image, nearest);
     });
-    const CurvePoint p = evaluate(nearest.s);
-    const Vector2d normal = Vector2d(p.d[1], -p.d[0]).normalized();
+    const CurveSample p = evaluate(nearest.s);
+    const Vector2d normal = Vector2d(p.d()[1], -p.d()[0]).normalized();
     Foot foot;
-    foot.point = Vector3d(p.x[0] * cosine, p.x[0] * sine, p.x[1] + (x[2] - nearest.from[1]));
+    foot.point = Vector3d(p.x()[0] * cosine, p.x()[0] * sine, p.x()[1] + (x[2] - nearest.from[1]));
     foot.normal = Vector3d(normal[0] * cosine, normal[0] * sine, normal[1]);
     foot.distance = std::sqrt(nearest.square);
     return foot;
@@ -119,22 +87,22 @@ Foot RevolutionSurface::foot(const Vector3d& x) const {
 void RevolutionSurface::look_at(double from, double to, const Vector2d& x, Nearest& nearest) const {
     constexpr int most = 15;
     const double done = 1e-9 * (to - from);
-    const Vector2d a = evaluate(from).x, chord = evaluate(to).x - a;
+    const Vector2d a = evaluate(from).x(), chord = evaluate(to).x() - a;
     double s = from + (to - from) * std::clamp(chord.dot(x - a) / chord.squaredNorm(), 0.0, 1.0), last = 1;
     for (int i = 0; i < most && last > 0; ++i) {
-        const CurvePoint p = evaluate(s);
-        const Vector2d away = p.x - x;
+        const CurveSample p = evaluate(s);
+        const Vector2d away = p.x() - x;
         if (away.squaredNorm() < nearest.square) nearest.square = away.squaredNorm(), nearest.s = s, nearest.from = x;
         if (last < done) return;
-        const double square = p.d.squaredNorm(), curved = square + p.dd.dot(away);
-        const double next = std::clamp(s - p.d.dot(away) / (curved > 1e-3 * square ? curved : square), from, to);
+        const double square = p.d().squaredNorm(), curved = square + p.dd().dot(away);
+        const double next = std::clamp(s - p.d().dot(away) / (curved > 1e-3 * square ? curved : square), from, to);
         last = std::abs(next - s);
         s = next;
     }
 }
 
 Vector3d RevolutionSurface::at(const Place& place) const {
-    const Vector2d x = evaluate(place.at[0]).x;
+    const Vector2d x = evaluate(place.at[0]).x();
     return {x[0] * std::cos(place.at[1]), x[0] * std::sin(place.at[1]), x[1]};
 }
 
@@ -147,7 +115,7 @@ std::vector<double> RevolutionSurface::panels(double width) const {
     std::vector<double> out{0};
     double length = 0;
     for (std::size_t i = 0; i + 1 < breaks_.size(); ++i) {
-        length += (evaluate(breaks_[i + 1]).x - evaluate(breaks_[i]).x).norm();
+        length += (evaluate(breaks_[i + 1]).x() - evaluate(breaks_[i]).x()).norm();
         if (length < width && i + 2 < breaks_.size()) continue;
         out.push_back(breaks_[i + 1]);
         length = 0;
@@ -159,10 +127,10 @@ std::vector<Sample> RevolutionSurface::samples(double grain) const {
     const auto rule = surface3d::gauss_points(gauss);
     std::vector<Sample> out;
     const auto add_ring = [&](double s, double reach, double weight, double turn) {
-        const CurvePoint p = evaluate(s);
-        const double around = grain > 0 ? std::ceil(2 * pi * p.x[0] / (spacing_of_grain * grain)) : 1;
+        const CurveSample p = evaluate(s);
+        const double around = grain > 0 ? std::ceil(2 * pi * p.x()[0] / (spacing_of_grain * grain)) : 1;
         const int count = grain > 0 ? static_cast<int>(std::clamp<double>(around, fewest_around, most_around)) : 1;
-        const double area = weight * 2 * pi * p.x[0] * p.d.norm() / count;
+        const double area = weight * 2 * pi * p.x()[0] * p.d().norm() / count;
         for (int i = 0; i < count; ++i) {
             const Place place{0, {s, grain > 0 ? turn + 2 * pi * i / count : 0}};
             out.push_back({place, {reach, grain > 0 ? pi / count : 0}, at(place), area});

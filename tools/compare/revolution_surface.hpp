@@ -1,10 +1,7 @@
-// A surface of revolution as a frame of tier axisym holds it: a spline r(z), or points of a profile.
+// A surface of revolution as a frame of tier axisym holds it.
 #pragma once
 
-#include <variant>
-
-#include "common/shapes/profile_curve.hpp"
-#include "common/shapes/revolution.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 #include "surface3d/mesh/box_tree.hpp"
 #include "tools/compare/surface.hpp"
 
@@ -14,11 +11,9 @@ namespace tubule::compare {
 // Place is (s, theta): s from 0 to 1 along the profile, theta the angle around the axis; there is only one piece.
 class RevolutionSurface final : public Surface {
 public:
-    // Throws std::invalid_argument for a spline of another degree than 1 ... 7 or of lengths that do not fit.
-    explicit RevolutionSurface(Revolution tube);
-    explicit RevolutionSurface(ProfileCurve curve);
+    explicit RevolutionSurface(PerturbedCurve curve);
 
-    double period() const override { return period_; }
+    double period() const override { return curve_.length; }
     double grain() const override { return 0; }
     Foot foot(const Eigen::Vector3d& x) const override;
     Eigen::Vector3d at(const Place& place) const override;
@@ -26,20 +21,14 @@ public:
     std::vector<Sample> samples(double grain) const override;
 
 private:
-    // (r, z) and its derivatives in s.
-    struct CurvePoint {
-        Eigen::Vector2d x, d, dd;
-    };
     struct Nearest;
 
-    CurvePoint evaluate(double s) const;
-    void build(const std::vector<double>& breaks);
+    CurveSample evaluate(double s) const;
     void add_part(double from, double to, int depth, std::vector<surface3d::BoxTree<2>::Box>& boxes);
     void look_at(double from, double to, const Eigen::Vector2d& x, Nearest& nearest) const;
     std::vector<double> panels(double width) const;
 
-    std::variant<Revolution, ProfileCurve> profile_;
-    double period_;
+    PerturbedCurve curve_;
     std::vector<double> breaks_;  // of the parts, ascending
     std::vector<double> bulge_;   // how far each part is off its chord, at most
     surface3d::BoxTree<2> tree_;

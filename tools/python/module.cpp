@@ -193,15 +193,17 @@ py::dict mesh_dictionary(const Results& r, std::size_t number) {
 }
 
 py::tuple profile(const Results& r, std::size_t number, int points) {
-    const auto shape = profile_of(r.frame(number));
-    if (const auto* listed = std::get_if<ProfilePoints>(&shape))
-        return py::make_tuple(numpy(listed->r), numpy(listed->z), listed->length);
-    const Revolution& tube = std::get<Revolution>(shape);
+    const Record& frame = r.frame(number);
+    if (kind_of(frame) != RecordKind::graph) {
+        const auto [radius, height, length] = profile_points(frame);
+        return py::make_tuple(numpy(radius), numpy(height), length);
+    }
+    const PerturbedCurve tube = frame_curve(frame);
     require_within("points", points, 2, 1000000);
     std::vector<double> radius, height;
     for (int i = 0; i < points; ++i) {
-        height.push_back(tube.length * i / (points - 1));
-        radius.push_back(radius_at(tube, height.back()));
+        const auto at = profile_at(tube, i / (points - 1.0));
+        radius.push_back(at[0]), height.push_back(at[1]);
     }
     return py::make_tuple(numpy(radius), numpy(height), tube.length);
 }

@@ -6,20 +6,17 @@
 
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
+#include "common/result/frame_profile.hpp"
 #include "tools/scan/point.hpp"
 
 namespace tubule {
 namespace {
 
-struct ProfilePoints {
-    std::vector<double> r, z;
-};
-
 // Points along the whole cell or period.
-ProfilePoints profile_of(const axisym::Equilibrium& shape) {
+ProfilePoints points_of(const axisym::Equilibrium& shape) {
     constexpr int intervals = 400;
-    const Meridian whole = axisym::meridian(*shape.space, shape.x);
-    ProfilePoints out;
+    const Curve whole = axisym::meridian(*shape.space, shape.x);
+    ProfilePoints out{{}, {}, whole.length};
     for (int i = 0; i <= intervals; ++i) {
         const auto at = whole.at(static_cast<double>(i) / intervals);
         out.r.push_back(at[0]), out.z.push_back(at[2]);
@@ -56,7 +53,7 @@ PointResult equilibrium_point(const Case& c, const std::function<bool()>& interr
     const bool tube = std::holds_alternative<Tube>(c.shape);
     ProfilePoints profile;
     if (shape.stop == Stop::finished || shape.stop == Stop::self_intersection) {
-        profile = profile_of(shape);
+        profile = points_of(shape);
         const axisym::ShapeMeasures measured = axisym::measures(*shape.space, shape.x);
         p[Measure::energy] = shape.observed.energy;
         p[Measure::area] = shape.observed.area;

@@ -26,7 +26,7 @@ SHAPE = """// Shape "egg".
 
 #include "common/geometry/surface_point.hpp"
 #include "common/shapes/base_surface.hpp"
-#include "common/shapes/meridian.hpp"
+#include "common/shapes/curve.hpp"
 
 namespace tubule {
 
@@ -44,7 +44,7 @@ Vector3<S> position(const Egg& egg, const Vector3<S>& p) {
 inline UnitSphere base(const Egg&) {
     return {};
 }
-inline Meridian meridian(const Egg& egg) {
+inline Curve meridian(const Egg& egg) {
     return sphere_image(egg);
 }
 

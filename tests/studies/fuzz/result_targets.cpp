@@ -68,7 +68,7 @@ Contents sample() {
 void look_at(const Contents& contents) {
     for (const Record& frame : contents.frames) {
         try {
-            profile_of(frame);
+            frame_curve(frame);
         } catch (const std::invalid_argument&) {  // what it documents
         }
     }

@@ -148,9 +148,10 @@ std::vector<std::string> mesh_seeds() {
 
 void profile_text(Input input) {
     try {
-        const SmoothProfile profile =
+        const FittedProfile profile =
             read_profile("input.csv", std::string(reinterpret_cast<const char*>(input.data()), input.size()), {});
-        if (!profile.r.allFinite() || !profile.z.allFinite()) throw std::logic_error("a curve of nan or inf");
+        for (const double value : profile.curve.at(0.3))
+            if (!std::isfinite(value)) throw std::logic_error("a curve of nan or inf");
         const double middle = 0.5;
         if (profile.H0 && !std::isfinite(evaluate(*profile.H0, &middle))) throw std::logic_error("an H0 of nan or inf");
     } catch (const ProfileError&) {
@@ -205,13 +206,11 @@ std::vector<std::string> formula_seeds() {
 }  // namespace
 
 const std::vector<Target>& targets() {
-    static const std::vector<Target> all{{"case", case_text, case_seeds},
-                                         {"override", override_text, override_seeds},
-                                         {"scan", scan_text, scan_seeds},
-                                         {"mesh", mesh_file, mesh_seeds},
-                                         {"profile", profile_text, profile_seeds},
-                                         {"formula", formula_text, formula_seeds},
-                                         {"result", result_parts, result_seeds}};
+    static const std::vector<Target> all{
+        {"case", case_text, case_seeds},          {"override", override_text, override_seeds},
+        {"scan", scan_text, scan_seeds},          {"mesh", mesh_file, mesh_seeds},
+        {"profile", profile_text, profile_seeds}, {"formula", formula_text, formula_seeds},
+        {"result", result_parts, result_seeds}};
     return all;
 }
 

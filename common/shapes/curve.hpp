@@ -1,4 +1,4 @@
-// Profiles of surfaces of revolution, exact: meridian(shape) gives that of a shape.
+// Profile curves of surfaces of revolution, exact: meridian(shape) gives that of a shape.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,40 +24,46 @@ enum class Topology {
     half_tube   // half a period, between the planes of symmetry z = 0 and z = length/2
 };
 
+// A point of a curve with derivatives in its parameter.
+struct CurveSample {
+    double r, r1, r2, z, z1, z2;
+    Eigen::Vector2d x() const { return {r, z}; }
+    Eigen::Vector2d d() const { return {r1, z1}; }
+    Eigen::Vector2d dd() const { return {r2, z2}; }
+};
+
 // A profile curve by any regular parameter t in [0, 1], such that the outward normal is (z', -r')/|X'|: upwards on the
 // outside.
-struct Meridian {
+struct Curve {
     Topology topology = Topology::cell;
     double length = 0;                                  // period of a tube
     std::function<std::array<double, 4>(double t)> at;  // r, dr/dt, z, dz/dt
-    std::vector<double> seams;                          // where in (0, 1) it is less than smooth, ascending
+    std::vector<double> seams = {};                     // where in (0, 1) it is less than smooth, ascending
+
+    // Copies of the curve in the whole cell or period.
+    int images() const { return topology == Topology::half_cell || topology == Topology::half_tube ? 2 : 1; }
 };
+
+// The curve t -> {r, z} of a function of jets.
+template <class F>
+Curve curve_of(Topology topology, double length, const F& f) {
+    using J = Jet<double, 1, 1>;
+    const auto at = [f](double t) {
+        const std::array<J, 2> p = f(J::variable(t, 0));
+        return std::array{p[0].v, p[0].d[0], p[1].v, p[1].d[0]};
+    };
+    return {topology, length, at};
+}
 
 // The image of the meridian of the unit sphere from the south pole, for shapes that map the sphere.
 template <class Shape>
-Meridian sphere_image(const Shape& shape) {
+Curve sphere_image(const Shape& shape) {
     using J = Jet<double, 1, 1>;
-    Meridian m;
-    m.at = [shape](double t) {
-        const J angle = pi * J::variable(t, 0);
+    return curve_of(Topology::cell, 0, [shape](const J& t) {
+        const J angle = pi * t;
         const Vector3<J> X = position(shape, Vector3<J>(sin(angle), J(0.0), -cos(angle)));
-        return std::array{X[0].v, X[0].d[0], X[2].v, X[2].d[0]};
-    };
-    return m;
-}
-
-// One period of radius_at(shape, z).
-template <class Shape>
-Meridian graph_meridian(const Shape& shape) {
-    using J = Jet<double, 1, 1>;
-    Meridian m;
-    m.topology = Topology::tube;
-    m.length = shape.length;
-    m.at = [shape](double t) {
-        const J r = radius_at(shape, J(shape.length) * J::variable(t, 0));
-        return std::array{r.v, r.d[0], shape.length * t, shape.length};
-    };
-    return m;
+        return std::array{X[0], X[2]};
+    });
 }
 
 // Why a shape that is not axisymmetric about z has no meridian: the key to blame, and the message that follows it.
@@ -65,12 +71,12 @@ Meridian graph_meridian(const Shape& shape) {
 using Asymmetry = std::pair<std::string, std::string>;
 
 template <class Mode>
-Asymmetry wave_around(const std::vector<Mode>& modes) {
+Asymmetry mode_around(const std::vector<Mode>& modes) {
     for (std::size_t i = 0; i < modes.size(); ++i)
         if (modes[i].m != 0)
-            return {fmt::format("shape.mode.{}.m", i),
-                    fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no modes m > 0",
-                                modes[i].m)};
+            return {
+                fmt::format("shape.mode.{}.m", i),
+                fmt::format("must be 0, not {}: tier \"axisym\" is axisymmetric and has no modes m > 0", modes[i].m)};
     return {};
 }
 

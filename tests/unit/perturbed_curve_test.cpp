@@ -1,5 +1,5 @@
 // Surfaces of revolution from points of their profile, against closed forms: position, H and K, at poles too.
-#include "common/shapes/profile_curve.hpp"
+#include "common/shapes/perturbed_curve.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,13 +19,13 @@ std::vector<double> uneven(int elements) {
 }
 
 template <class R, class Z>
-ProfileCurve sampled(int elements, double length, const R& r, const Z& z) {
+PerturbedCurve sampled(int elements, double length, const R& r, const Z& z) {
     std::vector<double> rs, zs;
     for (const double t : uneven(elements)) rs.push_back(r(t)), zs.push_back(z(t));
-    return profile_curve(rs, zs, length);
+    return curve_through(rs, zs, length);
 }
 
-SurfacePoint<double> point(const ProfileCurve& curve, const Eigen::Vector3d& p, const Torus& base = {}) {
+SurfacePoint<double> point(const PerturbedCurve& curve, const Eigen::Vector3d& p, const Torus& base = {}) {
     const Eigen::Vector3d any = Eigen::Vector3d(0.3, -0.8, 0.6).cross(p).normalized();
     const Eigen::Vector3d first = std::abs(p[2]) < 1e-12 ? Eigen::Vector3d(Eigen::Vector3d::UnitZ().cross(p)) : any;
     return point_of_map<double>([&](const auto& q) { return position(curve, base, q); }, p, first, p.cross(first));
@@ -37,13 +37,13 @@ struct Errors {
 
 // The spheroid x^2 + y^2 + z^2/c^2 = 1; H and K of an ellipsoid in closed form by the position.
 constexpr double half_axis = 0.6;
-ProfileCurve spheroid(int elements) {
+PerturbedCurve spheroid(int elements) {
     return sampled(
         elements, 0, [](double t) { return t == 0 || t == 1 ? 0 : std::sin(pi * t); },
         [](double t) { return -half_axis * std::cos(pi * t); });
 }
 Errors spheroid_errors(int elements) {
-    const ProfileCurve curve = spheroid(elements);
+    const PerturbedCurve curve = spheroid(elements);
     Errors worst;
     for (int i = 0; i <= 400; ++i) {
         const double angle = pi * i / 400;
@@ -57,7 +57,7 @@ Errors spheroid_errors(int elements) {
     return worst;
 }
 
-TEST(ProfileCurve, CellIsSmoothAtThePoles) {
+TEST(PerturbedCurve, CellIsSmoothAtThePoles) {
     const Errors coarse = spheroid_errors(10), fine = spheroid_errors(20);
     // |H| and |K| are up to 3.8 and 2.8. Polynomials of degree 6: order 7, and 5 in second derivatives.
     EXPECT_LT(fine.position, 1e-9);
@@ -68,13 +68,13 @@ TEST(ProfileCurve, CellIsSmoothAtThePoles) {
     EXPECT_GT(std::log2(coarse.K / fine.K), 4.5);
 }
 
-TEST(ProfileCurve, TubeThatOverhangs) {
+TEST(PerturbedCurve, TubeThatOverhangs) {
     // z' = 2 + 1.2 pi cos(2 pi t) < 0 about t = 1/2. At its points, curvatures are those of the curve: theory.md (4.5).
     const double length = 2;
     const auto r = [](double t) { return 1 + 0.4 * std::cos(2 * pi * t); };
     const auto z = [&](double t) { return length * t + 0.6 * std::sin(2 * pi * t); };
-    const ProfileCurve curve = sampled(30, length, r, z);
-    EXPECT_EQ(curve.kind, ProfileCurve::Kind::tube);
+    const PerturbedCurve curve = sampled(30, length, r, z);
+    EXPECT_EQ(curve.topology, Topology::tube);
     const std::vector<double> t = uneven(30);
     for (std::size_t i = 0; i + 1 < t.size(); ++i) {
         const Eigen::Vector3d base(0, 1.5, length * curve.functions.x[i]);
@@ -92,12 +92,12 @@ TEST(ProfileCurve, TubeThatOverhangs) {
     }
 }
 
-TEST(ProfileCurve, RingIsATorus) {
+TEST(PerturbedCurve, RingIsATorus) {
     const double tube = 0.5, radius = 1.5;  // begins on the outside and goes up
-    const ProfileCurve curve = sampled(
+    const PerturbedCurve curve = sampled(
         20, 0, [&](double t) { return radius + tube * std::cos(2 * pi * t); },
         [&](double t) { return tube * std::sin(2 * pi * t); });
-    EXPECT_EQ(curve.kind, ProfileCurve::Kind::ring);
+    EXPECT_TRUE(curve.is_ring());
     EXPECT_NEAR(curve.arc_length, 2 * pi * tube, 1e-9);
     EXPECT_NEAR(curve.mean_radius, radius, 1e-9);
     const Torus base{1.2, 0.4};
@@ -114,10 +114,27 @@ TEST(ProfileCurve, RingIsATorus) {
     }
 }
 
-TEST(ProfileCurve, Refusals) {
+TEST(PerturbedCurve, OfASpline) {
+    // A cubic spline with all its knots at the ends is a Bezier curve: r = 1 + z/2 on [0, 2] from these coefficients.
+    const PerturbedCurve cone = spline_curve(3, 2, {0, 0, 0, 0, 2, 2, 2, 2}, {1, 4. / 3, 5. / 3, 2});
+    EXPECT_EQ(cone.topology, Topology::tube);
+    EXPECT_NEAR(cone.arc_length, std::sqrt(5), 1e-13);
+    EXPECT_NEAR(cone.mean_radius, 1.5, 1e-13);
+    using J = Jet<double, 1, 2>;
+    for (const double z : {0.0, 0.5, 1.9, 2.5}) {  // periodic
+        const auto x = position(cone, Torus{}, Vector3<J>(J(0.6), J(0.8), J::variable(z, 0)));
+        EXPECT_NEAR(std::hypot(x[0].v, x[1].v), 1 + std::fmod(z, 2) / 2, 1e-14);
+        EXPECT_NEAR(x[0].d[0], 0.3, 1e-13);
+        EXPECT_NEAR(x[0].dd[0], 0, 1e-10);
+        EXPECT_NEAR(x[2].v, z, 1e-14);
+    }
+    EXPECT_THROW(spline_curve(3, 2, {0, 0, 2, 2}, {1, 2}), std::invalid_argument);
+}
+
+TEST(PerturbedCurve, Refusals) {
     const auto refusal = [](std::vector<double> r, std::vector<double> z, double length = 0) -> std::string {
         try {
-            profile_curve(r, z, length);
+            curve_through(r, z, length);
         } catch (const std::invalid_argument& error) {
             return error.what();
         }
