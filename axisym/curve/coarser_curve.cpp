@@ -29,7 +29,7 @@ RunObserver nobody;  // who sees its rows; pauses come from the clock
 
 }  // namespace
 
-CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock,
+CoarserCurve::CoarserCurve(const Problem& c, const InitialShape& start, const RunClock& clock,
                            const CurveSettings& settings)
     : case_(c), run_(std::make_unique<CurveSimulation>(c, start, settings, nullptr)) {
     run_->begin();
@@ -37,7 +37,7 @@ CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunCl
     loop_->begin();
 }
 
-CoarserCurve::CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const Record& record)
+CoarserCurve::CoarserCurve(const Problem& c, const InitialShape& start, const RunClock& clock, const Record& record)
     : case_(c) {
     const Record own = nested(record, prefix, RecordKind::curve);
     Saved saved;

@@ -13,8 +13,8 @@ namespace tubule::axisym {
 class CoarserCurve {
 public:
     // References must outlive it. A new run; one that was saved (throws as RecordReader); one that has ended.
-    CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const CurveSettings& settings);
-    CoarserCurve(const Problem& c, const Beginning& start, const RunClock& clock, const Record& record);
+    CoarserCurve(const Problem& c, const InitialShape& start, const RunClock& clock, const CurveSettings& settings);
+    CoarserCurve(const Problem& c, const InitialShape& start, const RunClock& clock, const Record& record);
     CoarserCurve(const Problem& c, std::unique_ptr<CurveSimulation> ended);
     static void check_restart(const Record& record);
     void save(Record& record) const;

@@ -639,11 +639,11 @@ struct Equilibrated {
 
 }  // namespace
 
-CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
+InitialState CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
     constexpr int most_iterations = 25;
     constexpr double most_growth = 10;  // of a correction, before smaller ones follow
     constexpr double rounding = 1e-9;   // of the curve: corrections below it need not become smaller
-    Start s{y0, Eigen::VectorXd::Zero(at_.size)};
+    InitialState s{y0, Eigen::VectorXd::Zero(at_.size), 2 * h, h};
     Eigen::VectorXd before = y0, F(at_.size);
     Eigen::SparseMatrix<double> J = pattern_;
     SparseLu lu;
@@ -667,7 +667,6 @@ CurveMotion::Start CurveMotion::consistent(const Eigen::VectorXd& y0, double h) 
             last = size;
         }
     }
-    s.time = 2 * h;
     s.rate.array() *= differential().array();  // the others jumped from a guess
     return s;
 }

@@ -42,6 +42,13 @@ struct MotionLayout {
     int size = 0;
 };
 
+// Unknowns and rates that a motion begins with.
+struct InitialState {
+    Eigen::VectorXd y, rate;
+    double time = 0, step = 0;   // of the unknowns, and of the first step from them
+    Eigen::VectorXd shown = {};  // the unknowns at t = 0, with the exact curve
+};
+
 // In weak form, for all test displacements phi, velocities v, and pressures q (dS = 2 pi r g ds):
 //   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve moves with u, its parameter stays even (gauge J)
 //   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
@@ -86,13 +93,9 @@ public:
     };
     Balance balance(double t, const double* y, const double* rate) const;
 
-    // Consistent unknowns and rates at t = 0 from the curve and velocities of y0, whose other entries are a guess: two
-    // implicit Euler steps of length h. Throws SolveError if Newton's method fails.
-    struct Start {
-        Eigen::VectorXd y, rate;
-        double time = 0;  // that the steps have taken
-    };
-    Start consistent(const Eigen::VectorXd& y0, double h) const;
+    // Consistent unknowns and rates from the curve and velocities of y0 at t = 0, whose other entries are a guess:
+    // after two implicit Euler steps of length h. Throws SolveError if Newton's method fails.
+    InitialState consistent(const Eigen::VectorXd& y0, double h) const;
 
 private:
     struct Local;

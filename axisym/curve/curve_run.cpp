@@ -43,7 +43,7 @@ public:
           watch_(watch),
           clock_(clock),
           restart_(restart),
-          start_(beginning_of(c)),
+          start_(initial_shape(c)),
           settings_(restart ? curve_restart(*restart).settings
                             : settings_for(c, start_, first_settings(c, start_.meridian.images()))) {}
 
@@ -126,7 +126,7 @@ private:
     RunObserver& watch_;
     const RunClock& clock_;
     const Record* restart_;  // until the run resumes from it
-    const Beginning start_;
+    const InitialShape start_;
     CurveSettings settings_;  // of the run to be reported
     int failures_ = 0;        // of pairs
     std::unique_ptr<CoarserCurve> coarser_;

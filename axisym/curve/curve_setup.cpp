@@ -66,7 +66,7 @@ std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, co
                                         c.law.free_period);
 }
 
-// H0 goes with the points of this start.
+// H0 is a property of the points of the initial shape.
 void fix_H0(const Problem& c, CurveForms& forms, const Eigen::VectorXd& x) {
     if (!c.energy.H0_varies()) return;
     try {
@@ -86,7 +86,7 @@ CurveLaw law_of(const Problem& c) {
     return law;
 }
 
-Beginning beginning_of(const Problem& c) {
+InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
     if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() &&
@@ -107,11 +107,11 @@ Beginning beginning_of(const Problem& c) {
             file ? start_profile(c, *file).note() : ""};
 }
 
-double Beginning::free_energy(const MotionLaw& law) const {
+double InitialShape::free_energy(const MotionLaw& law) const {
     return bending.energy + loads_at(law, 0).energy(area, volume, meridian.length);
 }
 
-CurveSetup::CurveSetup(const Problem& of, const Beginning& from, const CurveSettings& with)
+CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveSettings& with)
     : c(of), start(from), settings(with), series(curve_series(of)) {
     const ArcLength arc(start.meridian);
     space = space_of(c, start.meridian, first_breaks(arc, settings, c, least_seam));
@@ -136,7 +136,7 @@ CurveSetup::CurveSetup(const Problem& of, const Beginning& from, const CurveSett
     if (c.energy.H0_varies()) motion->fix_H0(x);
 }
 
-Snapshot CurveSetup::initial_shape(Snapshot s) const {
+Snapshot CurveSetup::with_exact_shape(Snapshot s) const {
     s.o.energy = start.bending.energy, s.o.energy_term = start.bending.energy_term;
     s.o.area = start.area, s.o.volume = start.volume;
     s.free_energy = start.free_energy(motion->law());
@@ -178,16 +178,15 @@ TimeControl CurveSetup::control(double first_step) const {
     return control;
 }
 
-CurveBegin given_state(const CurveSetup& setup) {
-    const MotionLayout& at = setup.motion->layout();
-    CurveBegin out;
-    out.y = Eigen::VectorXd::Zero(at.size), out.rate = out.y;
+InitialState state_without_velocity(const CurveSetup& setup) {
+    InitialState out;
+    out.y = out.rate = Eigen::VectorXd::Zero(setup.motion->layout().size);
     out.y.head(setup.space->size()) = fit(*setup.space, ArcLength(setup.start.meridian));
     out.shown = out.y;
     return out;
 }
 
-CurveSettings settings_for(const Problem& c, const Beginning& start, CurveSettings s) {
+CurveSettings settings_for(const Problem& c, const InitialShape& start, CurveSettings s) {
     constexpr double most_lost = 0.1;  // of the energy; what less than that costs, a pair of runs shows
     if (c.profile_resolution_given() || !start.meridian.seams.empty()) return s;
     const double allowed = most_lost * start.bending.magnitude;
@@ -221,33 +220,31 @@ void set_velocity(const CurveSetup& setup, Eigen::VectorXd& y) {
 
 }  // namespace
 
-CurveBegin begin_state(const CurveSetup& setup) {
+InitialState initial_state(const CurveSetup& setup) {
     const CurveSpace& space = *setup.space;
     const MotionLayout& at = setup.motion->layout();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(at.size);
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
-    std::optional<CurveMotion::Start> consistent;
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
     const double first_output = OutputTimes(setup.c).next();
     double h = std::min(1e-8 * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
     const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
                         most_risen * setup.reference_energy;
-    for (int tries = 0; !consistent; ++tries) try {
-            const CurveMotion::Start found = setup.motion->consistent(y, h);
+    for (int tries = 0;; ++tries) try {
+            InitialState found = setup.motion->consistent(y, h);
             const Snapshot soon = measure(*setup.motion, found.time, found.y.data(), found.rate.data());
             if (!is_admissible(soon) || !(soon.total() <= most))
                 throw SolveError("the first step leads to no admissible shape of lower energy");
-            consistent = found;
+            found.shown = found.y;
+            found.shown.head(space.size()) = y.head(space.size());
+            return found;
         } catch (const SolveError&) {
             if (tries == 4 || 20 * h > first_output) throw;
             h *= 10;
         }
-    CurveBegin out{consistent->y, consistent->rate, consistent->y, consistent->time, h};
-    out.shown.head(space.size()) = y.head(space.size());
-    return out;
 }
 
 }  // namespace tubule::axisym

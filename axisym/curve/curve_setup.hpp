@@ -17,7 +17,7 @@ namespace tubule::axisym {
 CurveLaw law_of(const Problem& c);
 
 // The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
-struct Beginning {
+struct InitialShape {
     Curve meridian;
     double area = 0, volume = 0;
     ShapeEnergy bending;
@@ -26,14 +26,14 @@ struct Beginning {
 
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
 };
-Beginning beginning_of(const Problem& c);
+InitialShape initial_shape(const Problem& c);
 
-// The system of one run. Case and beginning must outlive it.
+// The system of one run. Case and initial shape must outlive it.
 struct CurveSetup {
-    CurveSetup(const Problem& c, const Beginning& start, const CurveSettings& settings);
+    CurveSetup(const Problem& c, const InitialShape& start, const CurveSettings& settings);
 
     const Problem& c;
-    const Beginning& start;
+    const InitialShape& start;
     CurveSettings settings;
     std::unique_ptr<CurveSpace> space;
     std::unique_ptr<CurveMotion> motion;
@@ -45,23 +45,18 @@ struct CurveSetup {
     Eigen::VectorXd curve(const double* y) const { return Eigen::Map<const Eigen::VectorXd>(y, space->size()); }
     // What was measured on the spline that is nearest to the initial shape, with the energy, area and volume of the
     // shape.
-    Snapshot initial_shape(Snapshot measured) const;
+    Snapshot with_exact_shape(Snapshot measured) const;
     // Without the monitored quantities: dissipation and guards.
     ImplicitSystem system() const;
     TimeControl control(double first_step) const;
 };
 
-// Initial unknowns and rates: those to compute from, and those to show, with the exact curve.
-struct CurveBegin {
-    Eigen::VectorXd y, rate, shown;
-    double time = 0, first_step = 0;  // when the unknowns are those to compute from
-};
-// Throws SolveError where the equations have no solution that the motion may reach.
-CurveBegin begin_state(const CurveSetup& setup);
-// The initial shape alone, with no velocity: what can be shown where begin_state() throws.
-CurveBegin given_state(const CurveSetup& setup);
+// What the run computes from. Throws SolveError where the equations have no solution that the motion may reach.
+InitialState initial_state(const CurveSetup& setup);
+// The initial shape alone, with no velocity: what can be shown where initial_state() throws.
+InitialState state_without_velocity(const CurveSetup& setup);
 
 // These settings, with as many more elements as a spline needs that has nearly the energy of the initial shape.
-CurveSettings settings_for(const Problem& c, const Beginning& start, CurveSettings settings);
+CurveSettings settings_for(const Problem& c, const InitialShape& start, CurveSettings settings);
 
 }  // namespace tubule::axisym

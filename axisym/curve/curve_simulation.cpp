@@ -79,7 +79,7 @@ struct CurveSimulation::View : StateView {
 
 CurveSimulation::~CurveSimulation() = default;
 
-CurveSimulation::CurveSimulation(const Problem& c, const Beginning& start, const CurveSettings& settings,
+CurveSimulation::CurveSimulation(const Problem& c, const InitialShape& start, const CurveSettings& settings,
                                  CoarserCurve* coarser)
     : setup_(c, start, settings), coarser_(coarser) {
     summary.reference_energy = setup_.reference_energy;
@@ -96,17 +96,17 @@ const Snapshot& CurveSimulation::observe(double t, const double* y, const double
 }
 
 void CurveSimulation::begin() {
-    CurveBegin at;
+    InitialState at;
     try {
-        at = begin_state(setup_);
+        at = initial_state(setup_);
     } catch (const SolveError& error) {
-        at = given_state(setup_);
+        at = state_without_velocity(setup_);
         initial_stop_ =
             StopReport{Stop::solver_failed, 0, error.what(),
                        "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
     }
-    make_integrator(at.y, at.rate, at.time, at.first_step);
-    const Snapshot s = setup_.initial_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
+    make_integrator(at.y, at.rate, at.time, at.step);
+    const Snapshot s = setup_.with_exact_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
     past_.total_start = s.total();
     past_.least = past_.total_start;
     compare(0, s);

@@ -22,7 +22,7 @@ class CurveSimulation : public Simulation {
 public:
     // All references must outlive it. Then begin() from the initial shape or resume() from a frame or checkpoint.
     // `coarser`: the run to compare with, if any.
-    CurveSimulation(const Problem& c, const Beginning& start, const CurveSettings& settings, CoarserCurve* coarser);
+    CurveSimulation(const Problem& c, const InitialShape& start, const CurveSettings& settings, CoarserCurve* coarser);
     ~CurveSimulation() override;
     void begin();
     void resume(const Record& restart);

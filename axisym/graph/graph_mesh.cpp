@@ -54,31 +54,30 @@ Observation GraphMesh::look(const double* x, const double* v, std::vector<double
     return o;
 }
 
-FirstMesh first_mesh(const Problem& c, const GraphSettings& settings, const Cell& cell,
-                     const std::function<double(double)>& start) {
+std::vector<double> initial_breaks(const Problem& c, const GraphSettings& settings, const Cell& cell,
+                                   const std::function<double(double)>& shape) {
     const Discretisation& d = c.discretisation;
     int most_waves = 0;
     for (const TubeMode& mode : std::get<Tube>(c.shape).modes) most_waves = std::max(most_waves, mode.n);
     const int first = d.elements ? std::max(2, (*d.elements + cell.images() - 1) / cell.images())
                                  : std::max(fewest_elements, 8 * most_waves / cell.images());
-    FirstMesh out{uniform_breaks(cell, first)};
+    std::vector<double> breaks = uniform_breaks(cell, first);
     for (int pass = 0;; ++pass) {
-        const SplineSpace space = space_of(cell, out.breaks, c);
+        const SplineSpace space = space_of(cell, breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));
-        const Eigen::VectorXd x = space.project(start);
+        const Eigen::VectorXd x = space.project(shape);
         const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
         const FormulaDomain::Margin domain = forms.observe(x.data(), rest.data()).domain;
         require_defined(c, domain, fmt::format("z = {:.6g}", domain.place));
-        out.reference_energy = reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
-        const double allowed = settings.defect * out.reference_energy;
-        if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return out;
+        const double allowed = settings.defect * reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
+        if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return breaks;
         const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
-        if (lost < allowed * start_margin) return out;
+        if (lost < allowed * start_margin) return breaks;
         std::vector<double> next =
             adapted_breaks(space, defect, allowed * start_margin / 2, fewest_elements, most_graph_elements + 1);
-        if (static_cast<int>(next.size()) > most_graph_elements + 1) return out;
-        out.breaks = std::move(next);
+        if (static_cast<int>(next.size()) > most_graph_elements + 1) return breaks;
+        breaks = std::move(next);
     }
 }
 

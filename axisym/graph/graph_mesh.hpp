@@ -31,12 +31,8 @@ struct GraphMesh {
     Observation look(const double* x, const double* v, std::vector<double>* defect) const;
 };
 
-struct FirstMesh {
-    std::vector<double> breaks;
-    double reference_energy = 0;
-};
 // Breaks suitable for the initial shape and, as far as can be foreseen, for how the flow changes it.
-FirstMesh first_mesh(const Problem& c, const GraphSettings& settings, const Cell& cell,
-                     const std::function<double(double)>& start);
+std::vector<double> initial_breaks(const Problem& c, const GraphSettings& settings, const Cell& cell,
+                                   const std::function<double(double)>& shape);
 
 }  // namespace tubule::axisym

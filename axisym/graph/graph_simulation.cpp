@@ -99,11 +99,11 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     const Tube& tube = std::get<Tube>(case_.shape);
     const Cell cell = cell_of(tube, case_.discretisation.symmetry);
     const auto shape = [&](double z) { return radius_at(tube, z); };
-    FirstMesh mesh = first_mesh(case_, settings_, cell, shape);
-    summary.reference_energy = mesh.reference_energy;
-    settings_.defect *= mesh.reference_energy;
-    use_mesh(std::make_unique<GraphMesh>(cell, std::move(mesh.breaks), case_));
+    use_mesh(std::make_unique<GraphMesh>(cell, initial_breaks(case_, settings_, cell, shape), case_));
     const Eigen::VectorXd x = mesh_->space.project(shape);
+    const Forms& forms = mesh_->forms;
+    summary.reference_energy = reference_energy(case_, forms.free_energy(x), forms.reference_energy(x));
+    settings_.defect *= summary.reference_energy;
     ErrorTransport& transport = mesh_->transport;
     transport.total = transport.space().project(shape) - transport.space().prolong(mesh_->space, x);
     make_integrator(x, mesh_->forms.rate(x), 0, 0);
