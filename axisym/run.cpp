@@ -7,8 +7,8 @@
 
 namespace tubule::axisym {
 
-std::vector<std::string> series_names(const Case& c) {
-    return begins_as_graph(c) ? graph_series(c).names() : curve_series(c).names();
+std::vector<std::string> series_names(const Problem& c) {
+    return c.unknowns == Unknowns::graph ? graph_series(c).names() : curve_series(c).names();
 }
 
 void check_restart(const Record& record) {
@@ -18,14 +18,14 @@ void check_restart(const Record& record) {
         graph_restart(record);
 }
 
-RunSummary run(const Case& c, RunObserver& observer, const Restart* restart) {
+RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart) {
     const Record* from = restart ? &restart->record : nullptr;
-    const Problem problem(c);
-    if (!begins_as_graph(c) || (from && kind_of(*from) == RecordKind::curve)) return run_curve(problem, observer, from);
-    RunSummary summary = run_graph(problem, observer, from);
+    if (c.unknowns != Unknowns::graph || (from && kind_of(*from) == RecordKind::curve))
+        return run_curve(c, observer, from);
+    RunSummary summary = run_graph(c, observer, from);
     if (summary.stop.reason != Stop::overhang || c.discretisation.parametrisation) return summary;
     observer.discard();
-    return run_curve(problem, observer);
+    return run_curve(c, observer);
 }
 
 }  // namespace tubule::axisym

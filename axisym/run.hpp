@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "common/run/run.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/record.hpp"
+#include "common/run/run.hpp"
 
 namespace tubule::axisym {
 
 // Names of the series a run of this case writes, "time" first.
-std::vector<std::string> series_names(const Case& c);
+std::vector<std::string> series_names(const Problem& c);
 
 // Throws std::runtime_error if a run cannot resume from the record.
 void check_restart(const Record& record);
@@ -19,6 +19,6 @@ void check_restart(const Record& record);
 // Tubes in gradient flow are computed as graphs r(z), from the beginning as curves if one overhangs; all else as
 // curves. Runs the case, from `restart` (a frame or checkpoint of the same case) if given. What the physics or the
 // numerics do is reported in the summary, never thrown; an unusable initial shape throws std::runtime_error.
-RunSummary run(const Case& c, RunObserver& observer, const Restart* restart = nullptr);
+RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::axisym

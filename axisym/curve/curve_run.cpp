@@ -136,7 +136,7 @@ private:
 }  // namespace
 
 RunSummary run_curve(const Problem& c, RunObserver& observer, const Record* restart) {
-    const RunClock clock(c, observer);
+    const RunClock clock(c.time, observer);
     return clock.pausing([&] {
         CurveRuns runs(c, observer, clock, restart);
         return drive(c, observer, clock, runs);

@@ -229,7 +229,7 @@ InitialState initial_state(const CurveSetup& setup) {
     if (setup.start.velocity) set_velocity(setup, y);
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
     // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
-    const double first_output = OutputTimes(setup.c).next();
+    const double first_output = OutputTimes(setup.c.time).next();
     double h = std::min(1e-8 * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
     const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
                         most_risen * setup.reference_energy;

@@ -94,7 +94,7 @@ Curve start_of(Family family, double reduced, double area) {
 }
 
 // H0 of the area is a number everywhere, and the same on both sides of a plane of symmetry.
-void check_varying_H0(const Case& c, const Curve& start) {
+void check_varying_H0(const Problem& c, const Curve& start) {
     if (!c.energy.H0_varies()) return;
     constexpr int points = 256;
     const auto H0 = [&](double area) {
@@ -119,7 +119,7 @@ double wanted_reduced_volume(const Constraints& held) {
     return held.reduced_volume ? *held.reduced_volume : reduced_volume(*held.area, *held.volume);
 }
 
-Task task_of(const Case& c) {
+Task task_of(const Problem& c) {
     const EquilibriumChoices& e = *c.equilibrium;
     Task task;
     try {
@@ -131,15 +131,13 @@ Task task_of(const Case& c) {
     check_varying_H0(c, task.start);
     const auto [area, volume] = area_and_volume(task.start);
     task.problem.bending = c.energy;
-    task.problem.loads = loads_at(motion_law(c.model), 0);
+    task.problem.loads = loads_at(c.law, 0);
     task.problem.free_period = c.model.free_period;
-    const Held is_held = held_of(c);
     Constraints& held = task.problem.constraints;
-    if (is_held == Held::area_and_volume || is_held == Held::area) held.area = e.area.value_or(area);
-    if (is_held == Held::area_and_volume || is_held == Held::volume) held.volume = e.volume.value_or(volume);
-    if (is_held == Held::area_and_volume && e.reduced_volume)
-        held.volume = sphere_volume(*held.area, *e.reduced_volume);
-    if (is_held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    if (c.held == Held::area_and_volume || c.held == Held::area) held.area = e.area.value_or(area);
+    if (c.held == Held::area_and_volume || c.held == Held::volume) held.volume = e.volume.value_or(volume);
+    if (c.held == Held::area_and_volume && e.reduced_volume) held.volume = sphere_volume(*held.area, *e.reduced_volume);
+    if (c.held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
     if (e.family) {
         if (task.start.topology != Topology::cell)
             throw complaint(c, "equilibrium.family",
@@ -189,7 +187,7 @@ int elements_of(const Equilibrium& e) {
 }
 
 // At the points of a frame, of half a shape with their images.
-std::vector<double> samples_of_H0(const Case& c, const Equilibrium& e) {
+std::vector<double> samples_of_H0(const Problem& c, const Equilibrium& e) {
     std::vector<double> s;
     sample_profile(
         *e.space,
@@ -216,11 +214,11 @@ struct ShapeRow {
 
 // The first mode whose growth is found: with a free period, axisymmetric displacements change the period, too, and
 // only negative_directions counts them.
-int first_mode(const Case& c) {
+int first_mode(const Problem& c) {
     return c.model.free_period ? 1 : 0;
 }
 
-SeriesTable<ShapeRow> shape_series(const Case& c) {
+SeriesTable<ShapeRow> shape_series(const Problem& c) {
     const EquilibriumChoices& choices = *c.equilibrium;
     SeriesTable<ShapeRow> table;
     table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
@@ -262,7 +260,7 @@ SeriesTable<ShapeRow> shape_series(const Case& c) {
 
 class Writer {
 public:
-    Writer(const Case& c, const Task& task, RunObserver& observer)
+    Writer(const Problem& c, const Task& task, RunObserver& observer)
         : c_(c),
           task_(task),
           observer_(observer),
@@ -276,7 +274,7 @@ public:
         std::vector<ModeRates> modes;
         if (const auto last = c_.equilibrium->modes) {
             const ModeStability stability(problem, e);
-            for (int m = first_mode(c_); m <= *last; ++m) modes.push_back(stability.rates(m, motion_law(c_.model)));
+            for (int m = first_mode(c_); m <= *last; ++m) modes.push_back(stability.rates(m, c_.law));
         }
         observer_.row(row(point, problem, modes));
         observer_.frame([&] { return frame(point, modes); });
@@ -338,7 +336,7 @@ private:
         return m;
     }
 
-    const Case& c_;
+    const Problem& c_;
     const Task& task_;
     RunObserver& observer_;
     SeriesTable<ShapeRow> series_;
@@ -385,25 +383,25 @@ StopReport find_shapes(const Task& task, Writer& write) {
 
 }  // namespace
 
-std::vector<std::string> equilibrium_series_names(const Case& c) {
+std::vector<std::string> equilibrium_series_names(const Problem& c) {
     return shape_series(c).names();
 }
 
-void check_equilibrium(const Case& c) {
+void check_equilibrium(const Problem& c) {
     task_of(c);
 }
 
-CaseShape find_shape(const Case& c, RunObserver& observer) {
-    const RunClock clock(c, observer);
+CaseShape find_shape(const Problem& c, RunObserver& observer) {
+    const RunClock clock(c.time, observer);
     const Task task = task_of(c);
     CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}};
     if (out.shape.stop == Stop::finished && c.equilibrium->modes)
-        out.modes = mode_stability(task.problem, out.shape, *c.equilibrium->modes, motion_law(c.model));
+        out.modes = mode_stability(task.problem, out.shape, *c.equilibrium->modes, c.law);
     return out;
 }
 
-RunSummary run_equilibrium(const Case& c, RunObserver& observer) {
-    const RunClock clock(c, observer);
+RunSummary run_equilibrium(const Problem& c, RunObserver& observer) {
+    const RunClock clock(c.time, observer);
     const Task task = task_of(c);
     Writer write(c, task, observer);
     StopReport stop;

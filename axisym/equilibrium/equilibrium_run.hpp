@@ -5,26 +5,26 @@
 #include <vector>
 
 #include "axisym/equilibrium/mode_stability.hpp"
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule::axisym {
 
 // What a row of an equilibrium or a branch holds, "time" first.
-std::vector<std::string> equilibrium_series_names(const Case& c);
+std::vector<std::string> equilibrium_series_names(const Problem& c);
 
 // Throws CaseError for an initial shape that cannot be set up, and for constraints that cannot be met.
-void check_equilibrium(const Case& c);
+void check_equilibrium(const Problem& c);
 
 // One row and one frame for each shape, numbered from 0 instead of by time: a single shape, or those of the
 // branch at its steps, its folds and its bifurcations, in order. Throws as check_equilibrium().
-RunSummary run_equilibrium(const Case& c, RunObserver& observer);
+RunSummary run_equilibrium(const Problem& c, RunObserver& observer);
 
 // The shape of a case without a branch, with the growth rates of its modes, and nothing written.
 struct CaseShape {
     Equilibrium shape;
     std::vector<ModeRates> modes;  // of a shape that was found, if asked for
 };
-CaseShape find_shape(const Case& c, RunObserver& observer);
+CaseShape find_shape(const Problem& c, RunObserver& observer);
 
 }  // namespace tubule::axisym

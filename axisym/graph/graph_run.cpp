@@ -88,7 +88,7 @@ private:
 }  // namespace
 
 RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart) {
-    const RunClock clock(c, observer);
+    const RunClock clock(c.time, observer);
     return clock.pausing([&] {
         GraphRuns runs(c, observer, clock, restart);
         return drive(c, observer, clock, runs);

@@ -86,7 +86,7 @@ struct Discretisation {
 // The same of tier surface3d.
 struct SurfaceDiscretisation {
     std::optional<int> elements;  // about how many triangles
-    std::optional<int> order;     // of the elements: 2, 3, 4; default: element_order()
+    std::optional<int> order;     // of the elements: 2, 3, 4; default: see Problem
     MeshKind mesh = MeshKind::uniform;
     // Single shapes only:
     Recovery recovery = Recovery::patch;
@@ -176,17 +176,6 @@ inline bool can_be_graph(const Case& c) {
 inline bool begins_as_graph(const Case& c) {
     return can_be_graph(c) &&
            c.discretisation.parametrisation.value_or(Parametrisation::graph) == Parametrisation::graph;
-}
-
-// What the equilibrium of a case holds fixed.
-inline Held held_of(const Case& c) {
-    return c.equilibrium->held.value_or(default_held(c.model));
-}
-
-// Order of curved triangles: the fourth is more accurate in motion, the third suffices for a single shape
-// (docs/decisions/surface_motion.md).
-inline int element_order(const Case& c) {
-    return c.surface.order.value_or(c.moves() ? 4 : 3);
 }
 
 }  // namespace tubule

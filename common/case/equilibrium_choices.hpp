@@ -40,7 +40,7 @@ inline std::string wrong_branch(double from, double to, double step) {
 }
 
 struct EquilibriumChoices {
-    std::optional<Held> held;                            // by default what [model] leaves: see held_of()
+    std::optional<Held> held;                            // by default what [model] leaves: default_held()
     std::optional<double> area, volume, reduced_volume;  // where absent: those of the initial shape
     std::optional<Family> family;                        // where the search begins; absent: at [shape]
     bool descend = true;                                 // to a minimum; if not, to the closest stationary shape

@@ -1,9 +1,18 @@
 #include "common/case/problem.hpp"
 
+#include <utility>
+
 namespace tubule {
 namespace {
 
 constexpr double high_accuracy = 1e-4;  // from here on, without inertia, steps of higher order pay
+
+Unknowns unknowns_of(const Case& c) {
+    if (c.equilibrium) return Unknowns::equilibrium;
+    if (c.tier == Tier::automatic) return Unknowns::automatic;
+    if (c.tier == Tier::surface3d) return c.moves() ? Unknowns::moving_surface : Unknowns::surface;
+    return begins_as_graph(c) ? Unknowns::graph : Unknowns::curve;
+}
 
 Scheme scheme_of(const Case& c, bool inertia) {
     if (c.surface.scheme) return *c.surface.scheme;
@@ -13,11 +22,26 @@ Scheme scheme_of(const Case& c, bool inertia) {
 
 }  // namespace
 
-Problem::Problem(const Case& c)
-    : Case(c),
-      law(motion_law(c.model)),
-      scheme(scheme_of(c, law.inertia != 0)),
-      element_order(tubule::element_order(c)),
-      begin_time(c.handover ? c.handover->time : 0) {}
+Problem::Problem(Case c)
+    : Case(std::move(c)),
+      unknowns(unknowns_of(*this)),
+      law(motion_law(model)),
+      held((equilibrium ? equilibrium->held : std::nullopt).value_or(default_held(model))),
+      scheme(scheme_of(*this, law.inertia != 0)),
+      element_order(surface.order.value_or(moves() ? 4 : 3)),
+      begin_time(handover ? handover->time : 0) {}
+
+Problem Problem::of_profile(double end, std::vector<double> output) const {
+    Case out = *this;
+    out.tier = Tier::axisym;
+    out.time.end = end, out.time.output = std::move(output);
+    return out;
+}
+
+Problem Problem::of_surface() const {
+    Case out = *this;
+    out.tier = Tier::surface3d;
+    return out;
+}
 
 }  // namespace tubule

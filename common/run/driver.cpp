@@ -10,7 +10,7 @@ namespace {
 constexpr double rounding = 1e-12;  // of E_ref: no energy is known better
 
 // Reports that the last run is less accurate than asked, where it is.
-void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
+void judge(RunSummary& s, const Problem& c, const std::string& fixed_by) {
     if (s.as_accurate_as_asked || can_go_on(s.stop.reason)) return;
     const std::string error = s.error_is_known() ? fmt::format("the estimated error of the energy is {:.2g} of E_ref",
                                                                s.estimated_error)
@@ -24,7 +24,7 @@ void judge(RunSummary& s, const Case& c, const std::string& fixed_by) {
 
 }  // namespace
 
-RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
+RunSummary& drive(const Problem& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs) {
     if (const std::string endless = unbounded_below(c.energy); !endless.empty()) watch.note(endless);
     for (int number = 1;; ++number) {
         watch.next_run(number, number);

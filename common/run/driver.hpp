@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
 
@@ -29,6 +30,6 @@ public:
 
 // Runs the case; everything the observer has been given belongs to the run whose summary is returned. A run that ends
 // as it should, but less accurate than asked, has a warning if the case fixes how fine it is, else it is a failure.
-RunSummary& drive(const Case& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs);
+RunSummary& drive(const Problem& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs);
 
 }  // namespace tubule

@@ -11,7 +11,7 @@ namespace tubule {
 namespace {
 
 // Places of keys tell which term of powers became one of the list.
-std::string as_written(const Case& c, const std::string& key) {
+std::string as_written(const Problem& c, const std::string& key) {
     const auto place = c.places.find(key);
     if (place == c.places.end()) return key;
     for (std::size_t entry = 0;; ++entry) {
@@ -30,16 +30,16 @@ std::string key_of_formula(const Bending& energy) {
     return "energy";
 }
 
-CaseError not_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where) {
+CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
     return complaint(c, key_of_formula(c.energy),
                      fmt::format("must be defined on the start, but at {} {}", where, words(margin)));
 }
 
-void require_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where) {
+void require_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
     if (!(margin.value > 0)) throw not_defined(c, margin, where);
 }
 
-std::string key_of_ill_posed(const Case& c) {
+std::string key_of_ill_posed(const Problem& c) {
     const Bending& energy = c.energy;
     std::string key;
     for (std::size_t term = 0; term < count_terms(energy); ++term) {
@@ -67,7 +67,7 @@ constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it ha
 
 }  // namespace
 
-double reference_energy(const Case& c, double energy, double by_magnitude) {
+double reference_energy(const Problem& c, double energy, double by_magnitude) {
     const std::string formula = key_of_formula(c.energy);
     if (formula != "energy" && !(std::isfinite(energy) && std::isfinite(by_magnitude)))
         throw complaint(c, formula, "must be finite on the start, but it overflows there");
@@ -80,7 +80,7 @@ double reference_energy(const Case& c, double energy, double by_magnitude) {
     return std::abs(energy);
 }
 
-std::string doubt_before(const Case& c, double energy, double E_ref) {
+std::string doubt_before(const Problem& c, double energy, double E_ref) {
     const double allowed = c.accuracy.energy * E_ref;
     if (!(allowed > std::abs(energy)) || !std::isfinite(allowed)) return "";
     const std::string doubt = fmt::format(
@@ -91,7 +91,7 @@ std::string doubt_before(const Case& c, double energy, double E_ref) {
     return fmt::format("{}: ask for less than {:.1g}", doubt, std::abs(energy) / E_ref);
 }
 
-std::string doubt_after(const Case& c, Stop stop, double start, double end, double E_ref) {
+std::string doubt_after(const Problem& c, Stop stop, double start, double end, double E_ref) {
     const double allowed = c.accuracy.energy * E_ref, change = std::abs(end - start);
     if (kind_of(stop).exit_code != 0 || !(allowed > change) || change <= no_change * E_ref) return "";
     return fmt::format(

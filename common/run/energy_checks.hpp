@@ -3,15 +3,15 @@
 
 #include <string>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/case/read.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule {
 
 // Throws CaseError where the formula of the energy is not defined initially; `where` is the place of the margin.
-void require_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
-CaseError not_defined(const Case& c, const FormulaDomain::Margin& margin, const std::string& where);
+void require_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where);
+CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where);
 // The key of the formula; "energy" if there is none.
 std::string key_of_formula(const Bending& energy);
 
@@ -20,7 +20,7 @@ StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, co
 
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.
-std::string key_of_ill_posed(const Case& c);
+std::string key_of_ill_posed(const Problem& c);
 
 // Whether a run that failed came near to that.
 inline bool may_be_undefined(const FormulaDomain::Margin& margin) {
@@ -29,11 +29,11 @@ inline bool may_be_undefined(const FormulaDomain::Margin& margin) {
 
 // E_ref of a run from its initial energy or from (11.1), as the case has it. Throws CaseError where that energy is too
 // small to be a scale, or where the formula of a case has no finite value.
-double reference_energy(const Case& c, double energy, double by_magnitude);
+double reference_energy(const Problem& c, double energy, double by_magnitude);
 
 // The warning that the tolerance exceeds the energy or its change, or empty; energies of the surface, E_ref as above. Before a run: errors may exceed the energy. After it:
 // they may exceed the fall of the energy, kinetic energy included.
-std::string doubt_before(const Case& c, double energy, double E_ref);
-std::string doubt_after(const Case& c, Stop stop, double start, double end, double E_ref);
+std::string doubt_before(const Problem& c, double energy, double E_ref);
+std::string doubt_after(const Problem& c, Stop stop, double start, double end, double E_ref);
 
 }  // namespace tubule

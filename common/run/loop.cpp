@@ -8,7 +8,7 @@
 namespace tubule {
 
 Loop::Loop(Simulation& run, const Problem& c, RunObserver& watch, const RunClock& clock, bool reported)
-    : run_(run), case_(c), clock_(clock), out_(watch, clock, reported), outputs_(c) {
+    : run_(run), case_(c), clock_(clock), out_(watch, clock, reported), outputs_(c.time) {
     if (c.time.stationary) add(std::make_unique<Stationarity>(c));
 }
 

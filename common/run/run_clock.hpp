@@ -17,7 +17,7 @@ RunSummary paused_at_start(const Paused& pause);
 // Has a watch of its own, since runs are called without the command, too.
 class RunClock {
 public:
-    RunClock(const Case& c, RunObserver& watch) : watch_(c.time.limit, [&watch] { return watch.interrupted(); }) {}
+    RunClock(const TimeSpan& time, RunObserver& watch) : watch_(time.limit, [&watch] { return watch.interrupted(); }) {}
 
     // Since it was made, or since the outermost PauseWatch of this thread was.
     double seconds() const { return watch_.seconds(); }

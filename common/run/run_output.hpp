@@ -48,8 +48,8 @@ private:
 // time.output and time.end, in order, as far as they are later than the begin; those not yet written are ahead.
 class OutputTimes {
 public:
-    explicit OutputTimes(const Case& c, double begin = 0) : times_(c.time.output) {
-        times_.push_back(c.time.end);
+    explicit OutputTimes(const TimeSpan& time, double begin = 0) : times_(time.output) {
+        times_.push_back(time.end);
         std::sort(times_.begin(), times_.end());
         times_.erase(std::unique(times_.begin(), times_.end()), times_.end());
         go_on_from(begin);

@@ -197,7 +197,7 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
     return out;
 }
 
-std::optional<TubeStart> tube_start(const Case& c) {
+std::optional<TubeStart> tube_start(const Problem& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
     if (!shape || c.equilibrium || c.energy.H0_varies()) return std::nullopt;
     TubeStart start{{c.energy, shape->radius, 0}, shape->length, {}};
@@ -209,7 +209,7 @@ std::optional<TubeStart> tube_start(const Case& c) {
             sums[{mode.n, mode.m}] += std::polar(1.0, mode.phase) * mode.amplitude;
     for (const auto& [wave, sum] : sums)
         if (std::abs(sum) > 0) start.waves.push_back({wave.first, wave.second, std::abs(sum), 0});
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     if (const auto tension = tension_of(law, c.energy, start.tube.radius))
         start.tube.tension = *tension;
     else if (!start.waves.empty())
@@ -227,9 +227,9 @@ bool drifts_unknown(const MotionLaw& law, const UniformTube& tube) {
 
 }  // namespace
 
-std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to) try {
+std::optional<double> mean_rate(const Problem& c, int n, int m, double from, double to) try {
     std::optional<TubeStart> start = tube_start(c);
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     if (!start || !(to > from) || law.loads_change() || drifts_unknown(law, start->tube)) return std::nullopt;
     std::vector<Wave>& waves = start->waves;
     auto ours = std::find_if(waves.begin(), waves.end(), [&](const Wave& w) { return w.n == n && std::abs(w.m) == m; });

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/theory/dispersion.hpp"
 
 namespace tubule::theory {
@@ -42,11 +42,11 @@ struct TubeStart {
     double length = 1;
     std::vector<Wave> waves;  // each once: those of a case that differ by their phase alone are added
 };
-std::optional<TubeStart> tube_start(const Case& c);  // empty for other cases
+std::optional<TubeStart> tube_start(const Problem& c);  // empty for other cases
 
 // The mean rate of a wave between two times by linear theory of the case: log(a(to)/a(from))/(to - from). Empty if
 // unknown: where area and volume couple all waves, and the case does not contain this one; where loads change in time,
 // or the radius of a tube that a reservoir feeds.
-std::optional<double> mean_rate(const Case& c, int n, int m, double from, double to);
+std::optional<double> mean_rate(const Problem& c, int n, int m, double from, double to);
 
 }  // namespace tubule::theory

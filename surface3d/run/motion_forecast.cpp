@@ -64,7 +64,7 @@ PilotRun pilot_run(const Problem& asked, const Start& start, int triangles, doub
     rough.accuracy.energy = std::max(asked.accuracy.energy, 0.05);
     const Problem c(rough);
     Pilot pilot;
-    const RunClock clock(c, pilot);
+    const RunClock clock(c.time, pilot);
     SurfaceSimulation run(c, pilot, {.elements = triangles, .tolerance = tolerance}, nullptr);
     try {
         run.begin(start);

@@ -102,7 +102,7 @@ void check_restart(const Problem& c, const Record& record) {
 }
 
 RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
-    const RunClock clock(c, observer);
+    const RunClock clock(c.time, observer);
     return clock.pausing([&] {
         MotionRuns runs(c, start, observer, clock, restart);
         return drive(c, observer, clock, runs);

@@ -291,7 +291,7 @@ void advise_given_triangles(const Problem& c, std::string& advice) {
 
 RunSummary run_any(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
     if (c.moves()) return run_motion(c, start, observer, restart);
-    const RunClock clock(c, observer);
+    const RunClock clock(c.time, observer);
     const auto meshes = meshes_of(c, start);
     RunSummary s = clock.pausing([&] { return drive(c, observer, clock, *meshes); });
     if (!meshes->measured()) return s;

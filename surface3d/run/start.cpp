@@ -151,7 +151,7 @@ const T& once(const ByOrder<T>& made, int order, const MakeOne& make) {
 // Meshes of the shape map(base), of the kind that the case asks for, with exact curvatures where it asks for them, and
 // the velocity and H0 of the map if it has these.
 template <class Base, class Map>
-Start::Make meshes_of(const Case& c, const Base& base, const Map& map) {
+Start::Make meshes_of(const Problem& c, const Base& base, const Map& map) {
     const ByOrder<Resolution> resolutions = std::make_shared<std::map<int, Resolution>>();
     const auto triangulation = [=, kind = c.surface.mesh, by_accuracy = !c.surface.elements](int triangles, int order) {
         if constexpr (std::is_same_v<Base, Cylinder>)
@@ -190,7 +190,7 @@ auto usable(const std::string& blame, const MakeOne& make) {
     }
 }
 
-const std::string* given_bytes(const Case& c) {
+const std::string* given_bytes(const Problem& c) {
     return c.input && !c.input->bytes.empty() ? &c.input->bytes : nullptr;
 }
 
@@ -218,11 +218,11 @@ Prepared as_asked(Prepared given, const MeshFile& file, int order) {
 
 // Users of a mesh may not know how large it is. Bending forces change it in R^4/kappa times the friction, as far as
 // viscosity or inertia do not take longer.
-std::string far_off(const Case& c, double area) {
+std::string far_off(const Problem& c, double area) {
     constexpr double latest = 100, earliest = 1e-4;
     const double kappa = 2 * c.energy.k[term_number("k20")], radius = std::sqrt(area / (4 * pi));
     if (!(kappa > 0)) return {};
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     const double size = radius * radius, time = std::max({law.friction * size * size, law.viscosity * size,
                                                           std::sqrt(law.inertia * kappa) * size}) /
                                                 kappa;
@@ -235,7 +235,7 @@ std::string far_off(const Case& c, double area) {
 }
 
 struct Prepare {
-    const Case& c;
+    const Problem& c;
 
     void refuse_what_needs_a_shape() const {
         const std::string absent = "must be absent: the triangles come from shape.path";
@@ -293,14 +293,14 @@ struct Prepare {
                             "run cmake --preset release && cmake --build --preset release");
         const RemeshedStart start = usable(blame, [&] {
             return remeshed_start(read_mesh(beside(c, file.path), file.weld, true, given_bytes(c)), file,
-                                  element_order(c));
+                                  c.element_order);
         });
         return {[start](int, int order) { return StartMesh{start.of_order(order), {}, {}}; }, false, start.notes};
     }
     Prepared operator()(const MeshFile& file) const {
         refuse_what_needs_a_shape();
         const std::string blame = complaint(c, "shape.path", "cannot be used").what();
-        if (file.remesh) return as_asked(remeshed(file, blame), file, element_order(c));
+        if (file.remesh) return as_asked(remeshed(file, blame), file, c.element_order);
         const auto imported = std::make_shared<ImportedMesh>(usable(blame, [&] {
             ImportedMesh mesh = read_mesh(beside(c, file.path), file.weld, false, given_bytes(c));
             close_mesh(mesh);
@@ -313,13 +313,13 @@ struct Prepare {
             });
         };
         std::vector<std::string> notes = imported->notes;
-        const std::vector<std::string>& more = fit(element_order(c)).report.notes;
+        const std::vector<std::string>& more = fit(c.element_order).report.notes;
         notes.insert(notes.end(), more.begin(), more.end());
         return as_asked({[=](int, int order) {
                              return StartMesh{fit(order).surface, {}, {}};
                          },
                          false, notes},
-                        file, element_order(c));
+                        file, c.element_order);
     }
     Prepared operator()(const ResultFrame& from) const {
         const auto [frame, cells] = start_frame(c);
@@ -376,15 +376,15 @@ struct Prepare {
 
 }  // namespace
 
-Start::Start(const Case& c) {
+Start::Start(const Problem& c) {
     Prepared prepared = c.handover ? Prepare{c}(c.handover->curve) : std::visit(Prepare{c}, c.shape);
     make_ = std::move(prepared.make);
     resizable_ = prepared.resizable;
     notes_ = std::move(prepared.notes);
     if (c.moves() && std::holds_alternative<MeshFile>(c.shape))
-        time_scale_ = far_off(c, area_of(make_(0, element_order(c)).mesh));
+        time_scale_ = far_off(c, area_of(make_(0, c.element_order).mesh));
     if (!time_scale_.empty()) notes_.push_back(time_scale_);
-    if (c.moves()) fields_ = fields_of(motion_law(c.model));
+    if (c.moves()) fields_ = fields_of(c.law);
 }
 
 StartMesh Start::mesh(int triangles, int order) const {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/shapes/disturbed_shape.hpp"
 #include "surface3d/curvature/curvature.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
@@ -27,7 +27,7 @@ class Start {
 public:
     // Throws CaseError that names the key to blame: a file that cannot be read or used, a result without such a frame,
     // a mesh or exact curvatures that this shape does not have.
-    explicit Start(const Case& c);
+    explicit Start(const Problem& c);
 
     // With elements of this order and about this many triangles, where their number can be chosen. Throws TooLarge.
     StartMesh mesh(int triangles, int order) const;

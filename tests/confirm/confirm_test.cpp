@@ -174,7 +174,7 @@ Result growing_tube(double first, double factor) {
     for (int i = 0; i <= 10; ++i) {
         Case then = c;
         std::get<Tube>(then.shape).modes = {{first * std::pow(factor, i / 10.0), 1, 1, 0.3}};
-        const surface3d::CurvedMesh mesh = surface3d::Start(then).mesh(60, element_order(then)).mesh;
+        const surface3d::CurvedMesh mesh = surface3d::Start(then).mesh(60, Problem(then).element_order).mesh;
         Record frame;
         frame.time = 0.2 * i;
         frame.mesh = result.meshes.size();

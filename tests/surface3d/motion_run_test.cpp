@@ -485,7 +485,7 @@ end = 0.06
 TEST(CoarserRun, ACoarserRunThatTakesFarShorterStepsIsLost) {
     Outcome o = begin(wavy, {"model.kind=overdamped"});
     const Start start(o.c);
-    const RunClock clock(o.c, o.watch);
+    const RunClock clock(o.c.time, o.watch);
     const auto got_to = [&](double tolerance) {
         CoarserRun run(o.c, start, clock, {80, tolerance, 0, 1, Role::fewer_triangles});
         run.begin();
@@ -505,7 +505,7 @@ TEST(CoarserRun, StepsOfACoarserRunGrowEvenlyWithoutInertia) {
     const auto last_step = [](const std::string& kind) {
         Outcome o = begin(wavy, {"model.kind=" + kind});
         const Start start(o.c);
-        const RunClock clock(o.c, o.watch);
+        const RunClock clock(o.c.time, o.watch);
         CoarserRun run(o.c, start, clock, {80, 1e-2, 0, 1, Role::fewer_triangles});
         run.begin();
         run.advance_to(1e-5, 2.4);

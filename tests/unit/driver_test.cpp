@@ -44,7 +44,7 @@ private:
 RunSummary driven(FakeRuns& runs, Watch& watch) {
     Case c;
     c.accuracy.energy = 2e-3;
-    const RunClock clock(c, watch);
+    const RunClock clock(c.time, watch);
     return drive(c, watch, clock, runs);
 }
 
@@ -90,7 +90,7 @@ TEST(Driver, PausesBeforeAFinerRun) {
 TEST(OutputTimes, AreThoseAfterTheBeginInOrder) {
     Case c;
     c.time.end = 3, c.time.output = {2, 1, 0, 2};
-    OutputTimes times(c);
+    OutputTimes times(c.time);
     EXPECT_EQ(times.pass(), 1);
     EXPECT_TRUE(times.due(2));
     EXPECT_FALSE(times.due(1.9));

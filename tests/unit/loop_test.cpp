@@ -100,7 +100,7 @@ struct Ended {
 
     Ended(const Case& given, bool lands) : c(given), run(lands) {}
     const RunSummary& go(const Record* restart = nullptr) {
-        const RunClock clock(c, watch);
+        const RunClock clock(c.time, watch);
         Loop loop(run, c, watch, clock);
         if (restart) {
             run.resume(*restart);

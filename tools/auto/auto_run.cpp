@@ -35,9 +35,9 @@ std::vector<double> until(const std::vector<double>& times, double end) {
 }
 
 // Besides the output times of the case; rates have kinks where loads have them.
-std::set<double> times_for_rates(const Case& c) {
+std::set<double> times_for_rates(const Problem& c) {
     std::set<double> out;
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     for (double t = next_kink(law, 0); t < c.time.end; t = next_kink(law, t)) out.insert(t);
     for (int i = 1; i < parts; ++i) out.insert(c.time.end * i / parts);
     for (int i = 1; i <= halvings; ++i) out.insert(c.time.end / parts * std::pow(0.5, i));
@@ -64,7 +64,7 @@ std::string percent(double amplitude) {
 }
 
 // Warnings about uncertain rates; empty if there are none.
-std::string doubts(const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
+std::string doubts(const Problem& c, const RatesKnown& known, const NoiseGrowth& growth) {
     std::string out;
     const auto say = [&](const std::string& words) { out += (out.empty() ? "" : "; ") + words; };
     if (known.unknown > 0)
@@ -94,7 +94,7 @@ double work_of(const Before& before, const std::vector<std::string>& names) {
     return work == names.end() ? 0 : before.rows.back()[work - names.begin()];
 }
 
-void add_doubts(RunSummary& s, const Case& c, const RatesKnown& known, const NoiseGrowth& growth) {
+void add_doubts(RunSummary& s, const Problem& c, const RatesKnown& known, const NoiseGrowth& growth) {
     if (const std::string words = doubts(c, known, growth); !words.empty()) s.warnings.push_back(words);
 }
 
@@ -104,7 +104,7 @@ void set_choice(RunSummary& s, const std::string& choice, const std::string& rea
 
 // On few triangles where these do, as docs/choosing.md has it; again as tier surface3d would choose them where the
 // error is larger than requested. A resumed run has the triangles that it had.
-RunSummary on_triangles(const Case& c, const surface3d::Start& start, SurfacePart& part, const Restart* restart) {
+RunSummary on_triangles(const Problem& c, const surface3d::Start& start, SurfacePart& part, const Restart* restart) {
     if (restart || !c.accuracy.estimate || !few_triangles_do(c, start)) return surface3d::run(c, start, part, restart);
     Case few = c;
     few.surface.elements = surface3d::least_triangles;
@@ -118,7 +118,7 @@ RunSummary on_triangles(const Case& c, const surface3d::Start& start, SurfacePar
 }
 
 // Why a run stayed axisymmetric.
-std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
+std::string why_axisymmetric(const Problem& c, const NoiseGrowth& growth) {
     const NoiseGrowth::Peak peak = growth.largest();
     if (peak.amplitude <= c.automatic.noise * (1 + 1e-12))
         return fmt::format("start and model are axisymmetric, and no mode grows (m = 1 to {})", growth.modes());
@@ -128,10 +128,10 @@ std::string why_axisymmetric(const Case& c, const NoiseGrowth& growth) {
 }
 
 // Rows and frames of the axisymmetric part on their way to the file, kept for later. Its last frame is held back.
-class FirstPart : public RunObserver {
+class FirstPart : public TierPart {
 public:
     FirstPart(RunObserver& file, RowMap map, const NoiseGrowth& growth, double end)
-        : file_(file), map_(std::move(map)), growth_(growth), end_(end) {}
+        : TierPart(file, std::move(map)), growth_(growth), end_(end) {}
     void row(std::span<const double> values) override {
         before.rows.push_back(map_(values));
         file_.row(before.rows.back());
@@ -148,32 +148,26 @@ public:
         file_.frame([&] { return record; });
         before.frames.push_back(std::move(record));
     }
-    void checkpoint(const Record& state) override { file_.checkpoint(state); }
     void discard() override {
         file_.discard();
         before = {};
         last.reset();
     }
-    void next_run(int number, int of) override { file_.next_run(number, of); }
-    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
-    bool interrupted() override { return file_.interrupted(); }
 
     Before before;
     std::optional<Record> last;
 
 private:
-    RunObserver& file_;
-    RowMap map_;
     const NoiseGrowth& growth_;
     double end_;
 };
 
 class AutoRun {
 public:
-    AutoRun(const Case& c, const Choice& choice, RunObserver& file)
+    AutoRun(const Problem& c, const Choice& choice, RunObserver& file)
         : case_(c),
           file_(file),
-          clock_(c, file),
+          clock_(c.time, file),
           choice_(choice),
           names_(joined_series_names(c, choice.axisymmetric)) {}
 
@@ -183,11 +177,11 @@ public:
     RunSummary after_switch(const Record& at, const Before& before, const Restart* restart);
 
 private:
-    RowMap axisym_rows() const { return {names_, axisym::series_names(axisym_case(case_, case_.time.end, {})), 1}; }
+    RowMap axisym_rows() const { return {names_, axisym::series_names(case_.of_profile(case_.time.end, {})), 1}; }
     RunSummary watched(ProfileWatch& watch, const std::set<double>& for_rates, const Restart* restart);
     RunSummary with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch);
 
-    const Case& case_;
+    const Problem& case_;
     RunObserver& file_;
     RunClock clock_;  // of all parts together
     const Choice& choice_;
@@ -198,7 +192,7 @@ private:
 
 RunSummary AutoRun::in_three_dimensions(const Restart* restart) {
     if (!restart) file_.note(fmt::format("tier surface3d: {}", choice_.reason));
-    const Case c = surface_case(case_);
+    const Problem c = case_.of_surface();
     const Before nothing;
     SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, nothing);
     RunSummary s = on_triangles(c, *choice_.start, part, restart);
@@ -212,7 +206,7 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
     std::vector<double> output = case_.time.output;
     output.insert(output.end(), for_rates.begin(), for_rates.end());
     std::sort(output.begin(), output.end());
-    Case c = axisym_case(case_, case_.time.end, output);
+    Case c = case_.of_profile(case_.time.end, output);
     RunSummary s = axisym::run(c, watch, restart);
     const NoiseGrowth& growth = watch.growth();
     if (s.stop.reason != Stop::stationary || growth.empty() || watch.reached()) return s;
@@ -240,7 +234,7 @@ RunSummary AutoRun::axisymmetric(const Restart* restart) {
 
 RunSummary AutoRun::with_switch(const NoiseGrowth::Peak& at, const ProfileWatch& watch) {
     file_.discard();
-    Case c = axisym_case(case_, at.time, until(case_.time.output, at.time));
+    Case c = case_.of_profile(at.time, until(case_.time.output, at.time));
     c.time.stationary.reset();
     FirstPart part(file_, axisym_rows(), watch.growth(), at.time);
     RunSummary s = axisym::run(c, part);
@@ -270,10 +264,12 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
     for (double& a : amplitudes)
         if (a < grown * case_.automatic.noise && a < largest) a = 0;
 
-    Case c = surface_case(case_);
     RunSummary s = clock_.pausing([&] {
-        c.handover =
+        Case handed = case_;
+        handed.tier = Tier::surface3d;
+        handed.handover =
             Handover{perturbed_curve(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
+        const Problem c = handed;
         SurfacePart part(file_, {names_, surface3d::series_names(c), 2}, before);
         return on_triangles(c, surface3d::Start(c), part, restart);
     });
@@ -290,7 +286,7 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
 
 }  // namespace
 
-RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
+RunSummary run_auto(const Problem& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished) {
     AutoRun run(c, choice, file);
     if (!choice.axisymmetric) return run.in_three_dimensions(restart);

@@ -1,7 +1,7 @@
 // A case of tier "auto": axisymmetric while that is adequate, in three dimensions where it is not.
 #pragma once
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/run.hpp"
 #include "tools/auto/choice.hpp"
@@ -12,7 +12,7 @@ namespace tubule {
 // axis at many times. Where the noise of the case grows to auto.largest by them, the run is made again until then, and
 // goes on in tier surface3d with these waves on the profile. `unfinished` is the file that `restart` belongs to. What
 // was chosen, and why, is in the details of the summary ("choice", "reason", ...) and goes to note().
-RunSummary run_auto(const Case& c, const Choice& choice, RunObserver& file, const Restart* restart,
+RunSummary run_auto(const Problem& c, const Choice& choice, RunObserver& file, const Restart* restart,
                     const Result* unfinished);
 
 }  // namespace tubule

@@ -4,7 +4,6 @@
 
 #include "axisym/run.hpp"
 #include "surface3d/run/run.hpp"
-#include "tools/auto/choice.hpp"
 
 namespace tubule {
 
@@ -25,10 +24,10 @@ bool vanishes_by_symmetry(const std::string& name) {
 
 }  // namespace
 
-std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymmetric) {
-    std::vector<std::string> names = surface3d::series_names(surface_case(c));
+std::vector<std::string> joined_series_names(const Problem& c, bool begins_axisymmetric) {
+    std::vector<std::string> names = surface3d::series_names(c.of_surface());
     if (begins_axisymmetric) {
-        const auto first = axisym::series_names(axisym_case(c, c.time.end, {}));
+        const auto first = axisym::series_names(c.of_profile(c.time.end, {}));
         std::erase_if(names, [&](const std::string& name) {
             return !has(first, name) && !(vanishes_by_symmetry(name) && has(first, "momentum_z"));
         });

@@ -2,16 +2,17 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule {
 
 // Names of the series, "time" first. Of a run that begins axisymmetric: those that both tiers have, momenta that vanish
 // by symmetry, and `tier`, 1 or 2. One that begins in three dimensions has all of that tier, and `tier`.
-std::vector<std::string> joined_series_names(const Case& c, bool begins_axisymmetric);
+std::vector<std::string> joined_series_names(const Problem& c, bool begins_axisymmetric);
 
 // A tier's rows as those of the file.
 class RowMap {
@@ -35,22 +36,31 @@ struct Before {
 // The axisymmetric part of an unfinished file.
 Before axisymmetric_part(const Result& unfinished);
 
-// A run in three dimensions, as the file's second part or all of it: where it begins again, the first part stays.
-class SurfacePart : public RunObserver {
+// A run in one tier, as a part of the file.
+class TierPart : public RunObserver {
 public:
-    SurfacePart(RunObserver& file, RowMap map, const Before& before) : file_(file), map_(map), before_(before) {}
+    TierPart(RunObserver& file, RowMap map) : file_(file), map_(std::move(map)) {}
     void row(std::span<const double> values) override { file_.row(map_(values)); }
     std::size_t mesh(const SurfaceCells& cells) override { return file_.mesh(cells); }
     void frame(const std::function<Record()>& make) override { file_.frame(make); }
     void checkpoint(const Record& state) override { file_.checkpoint(state); }
-    void discard() override;
+    void discard() override { file_.discard(); }
     void next_run(int number, int of) override { file_.next_run(number, of); }
     void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
     bool interrupted() override { return file_.interrupted(); }
 
-private:
+protected:
     RunObserver& file_;
     RowMap map_;
+};
+
+// A run in three dimensions, the second part or all of the file: where it begins again, the first part stays.
+class SurfacePart : public TierPart {
+public:
+    SurfacePart(RunObserver& file, RowMap map, const Before& before) : TierPart(file, map), before_(before) {}
+    void discard() override;
+
+private:
     const Before& before_;
 };
 

@@ -11,10 +11,9 @@ namespace {
 constexpr double rough_rates = 0.1;  // error, relative
 }
 
-ProfileWatch::ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::set<double> only_for_rates)
-    : case_(c),
-      file_(file),
-      map_(std::move(map)),
+ProfileWatch::ProfileWatch(const Problem& c, RunObserver& file, RowMap map, std::set<double> only_for_rates)
+    : TierPart(file, std::move(map)),
+      case_(c),
       only_for_rates_(std::move(only_for_rates)),
       growth_(c.automatic.noise, c.automatic.modes) {}
 

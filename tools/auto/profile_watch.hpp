@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 #include "tools/auto/joined_file.hpp"
 #include "tools/auto/noise_growth.hpp"
@@ -18,20 +18,17 @@ struct RatesKnown {
     std::string why_unknown;  // the last time
 };
 
-class ProfileWatch : public RunObserver {
+class ProfileWatch : public TierPart {
 public:
-    // Frames at the times `only_for_rates` do not go to the file.
-    ProfileWatch(const Case& c, RunObserver& file, RowMap map, std::set<double> only_for_rates);
+    // The case must outlive it. Frames at the times `only_for_rates` do not go to the file.
+    ProfileWatch(const Problem& c, RunObserver& file, RowMap map, std::set<double> only_for_rates);
 
     // Resumes from a frame of the file, with the amplitudes stored there.
     void resume(const Record& frame);
 
-    void row(std::span<const double> values) override { file_.row(map_(values)); }
     void frame(const std::function<Record()>& make) override;
     void checkpoint(const Record& state) override;
     void discard() override;
-    void next_run(int number, int of) override { file_.next_run(number, of); }
-    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
     bool interrupted() override { return reached_ || file_.interrupted(); }
 
     const NoiseGrowth& growth() const { return growth_; }
@@ -45,9 +42,7 @@ private:
     std::vector<double> last_rates() const;
     Record with_amplitudes(Record frame) const;
 
-    const Case& case_;
-    RunObserver& file_;
-    RowMap map_;
+    const Problem& case_;
     std::set<double> only_for_rates_;
     NoiseGrowth growth_;
     RatesKnown known_;

@@ -16,7 +16,7 @@ constexpr double rate_accuracy = 1e-2;
 constexpr int most_elements = 60;
 
 // Without inertia, under the loads of this time.
-axisym::Spectrum spectrum_of(const Case& c, MotionLaw law, const Curve& profile, double time) {
+axisym::Spectrum spectrum_of(const Problem& c, MotionLaw law, const Curve& profile, double time) {
     axisym::SpectrumSettings settings;
     settings.first = 1, settings.last = c.automatic.modes, settings.count = 1, settings.accuracy = rate_accuracy;
     settings.max_elements = most_elements;
@@ -39,9 +39,9 @@ double rate_with_inertia(double stokes, double overdamped) {
     return (-b + root.real()) / 2;
 }
 
-WaveRates wave_rates(const Case& c, const Record& frame) {
+WaveRates wave_rates(const Problem& c, const Record& frame) {
     const Curve profile = meridian(frame_curve(frame));
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     const axisym::Spectrum found = spectrum_of(c, law, profile, frame.time);
     WaveRates out;
     for (const axisym::ModeRates& mode : found.modes) out.rates.push_back(fastest(mode));
@@ -56,11 +56,11 @@ WaveRates wave_rates(const Case& c, const Record& frame) {
     return out;
 }
 
-PerturbedCurve perturbed_curve(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
+PerturbedCurve perturbed_curve(const Problem& c, const Record& frame, const std::vector<double>& relative_amplitudes) {
     PerturbedCurve out = frame_curve(frame);
     const std::vector<double>& r = find_array(frame, "r")->data;
     const double radius = *std::max_element(r.begin(), r.end());
-    const axisym::Spectrum found = spectrum_of(c, motion_law(c.model), meridian(out), frame.time);
+    const axisym::Spectrum found = spectrum_of(c, c.law, meridian(out), frame.time);
     for (std::size_t i = 0; i < found.modes.size() && i < relative_amplitudes.size(); ++i) {
         const axisym::ModeRates& mode = found.modes[i];
         if (relative_amplitudes[i] == 0 || mode.shape.empty()) continue;
@@ -68,7 +68,7 @@ PerturbedCurve perturbed_curve(const Case& c, const Record& frame, const std::ve
         for (double& value : w) value *= relative_amplitudes[i] * radius;
         out.modes.push_back(normal_mode(out, mode.m, w));
     }
-    if (motion_law(c.model).inertia != 0) out.velocity = frame_velocity(frame, out);
+    if (c.law.inertia != 0) out.velocity = frame_velocity(frame, out);
     return out;
 }
 

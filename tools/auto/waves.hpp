@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule {
@@ -16,7 +16,7 @@ struct WaveRates {
 };
 
 // Growth rates of the profile of a frame. Throws std::invalid_argument or SolveError where they cannot be computed.
-WaveRates wave_rates(const Case& c, const Record& frame);
+WaveRates wave_rates(const Problem& c, const Record& frame);
 
 // The rate of a wave with inertia, from those of the same model without it (viscosity and friction alone) and of the
 // overdamped model (mass instead of friction): s^2/overdamped + s/stokes = 1, the root with the largest real part. As
@@ -25,6 +25,6 @@ double rate_with_inertia(double stokes, double overdamped);
 
 // The profile of a frame with the fastest growing mode of each m on it: relative_amplitudes[m - 1] of the largest
 // radius, as a normal displacement; none where that is 0. A fluid keeps its velocity.
-PerturbedCurve perturbed_curve(const Case& c, const Record& frame, const std::vector<double>& relative_amplitudes);
+PerturbedCurve perturbed_curve(const Problem& c, const Record& frame, const std::vector<double>& relative_amplitudes);
 
 }  // namespace tubule

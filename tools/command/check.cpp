@@ -48,12 +48,12 @@ std::string shown_path(const std::string& path) {
 }
 
 // Keys that the case leaves to the program, and what it takes for them: defaults that depend on other keys.
-std::vector<std::string> chosen(const Case& c) {
+std::vector<std::string> chosen(const Problem& c) {
     std::vector<std::string> out;
-    if (c.tier != Tier::surface3d) return out;
-    if (!c.surface.order) out.push_back(fmt::format("discretisation.order = {}", element_order(c)));
-    if (!c.moves()) return out;
-    if (!c.surface.scheme) out.push_back(fmt::format("discretisation.scheme = \"{}\"", entry(Problem(c).scheme).name));
+    if (c.unknowns != Unknowns::moving_surface && c.unknowns != Unknowns::surface) return out;
+    if (!c.surface.order) out.push_back(fmt::format("discretisation.order = {}", c.element_order));
+    if (c.unknowns == Unknowns::surface) return out;
+    if (!c.surface.scheme) out.push_back(fmt::format("discretisation.scheme = \"{}\"", entry(c.scheme).name));
     if (!c.surface.time_tolerance && !c.surface.step)
         out.emplace_back("discretisation.time_tolerance follows from accuracy.energy");
     return out;
@@ -74,7 +74,7 @@ struct Checked {
 };
 
 // None where a trial run fails: the case is valid all the same.
-std::optional<Advice> advice_for(const Case& c, const Forecast& expected) {
+std::optional<Advice> advice_for(const Problem& c, const Forecast& expected) {
     try {
         return advice(c, expected);
     } catch (const std::exception&) {
@@ -83,7 +83,7 @@ std::optional<Advice> advice_for(const Case& c, const Forecast& expected) {
 }
 
 // What model.kind = "auto" stands for: with --quick, without trial runs, a fluid.
-Case chosen_case(const Case& c, const CheckOptions& options, Checked& out) {
+Problem chosen_case(const Problem& c, const CheckOptions& options, Checked& out) {
     if (c.model.kind != ModelKind::automatic) return c;
     if (options.quick) return with_model(c, {ModelKind::fluid, ""}).c;
     if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
@@ -98,14 +98,14 @@ Checked checked(const std::string& path, const CheckOptions& options) {
     out.path = path;
     bool chooses = false;
     try {
-        const Case given = read_case(path, options.sets);
+        const Problem given = read_case(path, options.sets);
         chooses = given.model.kind == ModelKind::automatic;
         const PauseWatch watch(given.time.limit, interrupted);
         out.toml = effective_toml(given);
         if (const std::string falls = unbounded_below(given.energy); !falls.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), falls));
         for (const std::string& note : physics_notes(given)) out.warnings.push_back(valid_utf8(note));
-        const Case c = chosen_case(given, options, out);
+        const Problem c = chosen_case(given, options, out);
         out.chosen = chosen(c);
         if (const std::string warning = engine_for(c)->warning(); !warning.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), warning));

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/run.hpp"
 #include "tools/run/model_advice.hpp"
@@ -30,7 +30,7 @@ TUBULE_COMMANDS(TUBULE_COMMAND)
 // What a result records when its run begins: the build, the machine, the time; and when it has ended.
 About about_start();
 void add_choice(About& about, const ChosenCase& chosen);  // of its model, if that was chosen
-About about_end(const Case& c, const RunSummary& summary, double wall_seconds);
+About about_end(const Problem& c, const RunSummary& summary, double wall_seconds);
 
 // What `run` does, for the subcommands that do so too: the exit status. Throws CaseError for bad input.
 struct RunOptions {
@@ -52,6 +52,6 @@ std::filesystem::path result_path(const RunOptions& options, const std::filesyst
 void check_output(const std::filesystem::path& file);
 // And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another
 // case.
-void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite);
+void check_replaced(const Problem& c, const std::filesystem::path& file, bool overwrite);
 
 }  // namespace tubule

@@ -53,7 +53,7 @@ struct ConfirmOptions {
 struct ConfirmedPoint {
     confirm::Pick pick;
     std::vector<std::string> sets;  // what varies, key=value
-    Case c;
+    Problem c;
     PointResult axisymmetric;
     std::string surface_case, file;  // text; result
     confirm::SurfaceEnd surface;
@@ -199,8 +199,9 @@ std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult
         p.c = result.scan.case_of(pick.point);
         p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
-        if (p.c.equilibrium) throw CaseError(options.scan + ": is a scan of equilibria: nothing moves there");
-        if (p.c.tier != Tier::axisym)
+        if (p.c.unknowns == Unknowns::equilibrium)
+            throw CaseError(options.scan + ": is a scan of equilibria: nothing moves there");
+        if (!p.c.is_axisymmetric())
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");
         p.surface_case = confirm::surface_case(p.c, p.axisymmetric, options.choices);
         all.push_back(std::move(p));

@@ -83,7 +83,7 @@ void add_choice(About& about, const ChosenCase& chosen) {
     about.insert(about.end(), {{"model", name(chosen.c.model)}, {"model_reason", chosen.reason}});
 }
 
-About about_end(const Case& c, const RunSummary& s, double wall_seconds) {
+About about_end(const Problem& c, const RunSummary& s, double wall_seconds) {
     About about{{"stop", std::string(name(s.stop.reason))},
                 {"stop_time", s.stop.time},
                 {"stop_message", s.stop.message},
@@ -103,7 +103,7 @@ namespace {
 class Recorder : public RunObserver {
 public:
     // `from`: the state that the run resumes from, or none.
-    Recorder(const Case& c, ResultWriter& writer, const std::vector<std::string>& series, bool quiet,
+    Recorder(const Problem& c, ResultWriter& writer, const std::vector<std::string>& series, bool quiet,
              const Record* from)
         : case_(c),
           writer_(writer),
@@ -140,7 +140,7 @@ public:
     double defect() const { return defect_; }
 
 private:
-    const Case& case_;
+    const Problem& case_;
     ResultWriter& writer_;
     std::size_t defect_column_;
     double defect_ = 0;
@@ -155,7 +155,7 @@ bool has_rows(const std::filesystem::path& file) {
 }
 
 // Expectations that a complete result does not meet, one line each.
-std::vector<std::string> unmet(const Case& c, const Result& result) {
+std::vector<std::string> unmet(const Problem& c, const Result& result) {
     std::vector<std::string> lines;
     const Stop stop = stop_of(result).value(), expected = c.expect.stop.value_or(Stop::finished);
     if (stop != expected) lines.push_back(fmt::format("stop is {}, expected {}", name(stop), name(expected)));
@@ -178,14 +178,14 @@ std::vector<std::string> unmet(const Case& c, const Result& result) {
 }
 
 // Exit status of a result that is to be as expected, which is said where it is not.
-int compare(const Case& c, const std::filesystem::path& file) {
+int compare(const Problem& c, const std::filesystem::path& file) {
     const std::vector<std::string> lines = unmet(c, read_result(file));
     for (const std::string& line : lines) say(stderr, "{}: not as expected: {}\n", c.path, line);
     return lines.empty() ? 0 : 1;
 }
 
 void report(const ChosenCase& chosen, const RunSummary& s, const std::string& file, double seconds) {
-    const Case& c = chosen.c;
+    const Problem& c = chosen.c;
     const std::string when = c.moves() ? fmt::format(" at t = {:.6g}", s.stop.time) : "";
     say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
     const int status = exit_code(s.stop.reason);
@@ -206,12 +206,12 @@ void report(const ChosenCase& chosen, const RunSummary& s, const std::string& fi
     say(stdout, "    {}{}{:.3g} s; {}\n", s.effort, s.effort.empty() ? "" : ", ", seconds, file);
 }
 
-bool derivatives_can_be_checked(const Case& c) {
-    return c.tier == Tier::axisym && std::holds_alternative<Tube>(c.shape);
+bool derivatives_can_be_checked(const Problem& c) {
+    return c.is_axisymmetric() && is_tube(c.shape);
 }
 
 // Prints the Taylor slopes of every term at the start; whether all are as they should be.
-bool derivatives_pass(const Case& c) {
+bool derivatives_pass(const Problem& c) {
     bool pass = true;
     for (const auto& [key, check] : axisym::check_terms(c)) {
         say(stdout, "{}: {}\n{}\n", c.path, key, check.text());
@@ -227,7 +227,7 @@ struct Opened {
 };
 
 Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
-    const Case& c = chosen.c;
+    const Problem& c = chosen.c;
     About about = about_start();
     add_choice(about, chosen);
     about.emplace_back("case_path", valid_utf8(std::filesystem::absolute(c.path).string()));
@@ -236,10 +236,10 @@ Opened create(const ChosenCase& chosen, const Engine& engine, const std::filesys
 
 // Goes on with a result, or begins again if it was killed before its first frame; nothing if it is complete.
 std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, const std::filesystem::path& file) {
-    const Case& c = chosen.c;
+    const Problem& c = chosen.c;
     Result old = read_result(file);
     if (!goes_on(c, old, file)) return std::nullopt;
-    if (c.equilibrium)
+    if (c.unknowns == Unknowns::equilibrium)
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
     ResultWriter writer = ResultWriter::resume(
@@ -268,7 +268,7 @@ struct Ended {
 
 // A run that cannot go on is at its end, too: rows and frames until then are kept. Passes on bad input that is found
 // before there is a row, and errors of the disk: the file has what was written until then.
-Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Recorder& recorder) {
+Ended run_to_its_end(const Problem& c, const Engine& engine, Opened& result, Recorder& recorder) {
     const auto failed = [&](const std::exception& error) {
         return Ended{failed_run(c, error, recorder.reached()), true};
     };
@@ -288,14 +288,14 @@ Ended run_to_its_end(const Case& c, const Engine& engine, Opened& result, Record
 }
 
 // A frame at a time that lies behind cannot be written any more.
-void tell_missed_outputs(const Case& c, const Result& result, double from) {
+void tell_missed_outputs(const Problem& c, const Result& result, double from) {
     if (const auto missed = missed_outputs(c, result, from); !missed.empty())
         say(stderr, "{}: time.output {} is not written: the run goes on from t = {:.6g}\n", c.path,
             fmt::join(missed, ", "), from);
 }
 
 int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOptions& options) {
-    Case& c = chosen.c;
+    Problem& c = chosen.c;
     if (options.check_derivatives && !derivatives_pass(c)) {
         say(stderr, "{}: a derivative is wrong; the case was not run\n", c.path);
         return exit_code(Stop::solver_failed);
@@ -327,7 +327,8 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
     Ended ended;
     {
-        Recorder recorder(c, result->writer, engine->series_names(), options.quiet || c.equilibrium,
+        Recorder recorder(c, result->writer, engine->series_names(),
+                          options.quiet || c.unknowns == Unknowns::equilibrium,
                           result->restart ? &result->restart->record : nullptr);
         ended = run_to_its_end(c, *engine, *result, recorder);
         if (const std::string off = balance_warning(c, ended.summary, recorder.defect()); !off.empty())
@@ -349,7 +350,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
 }
 
 // A run would destroy the result that it starts from before it has read it.
-void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& file) {
+void refuse_to_replace_the_start(const Problem& c, const std::filesystem::path& file) {
     const auto* start = std::get_if<ResultFrame>(&c.shape);
     std::error_code none;
     if (start && std::filesystem::equivalent(std::filesystem::path(c.path).parent_path() / start->path, file, none))
@@ -359,13 +360,14 @@ void refuse_to_replace_the_start(const Case& c, const std::filesystem::path& fil
                         c.path, file.string()));
 }
 
-bool can_be_resumed(const Case& c, const Result& result) {
+bool can_be_resumed(const Problem& c, const Result& result) {
     const auto stop = stop_of(result);
-    return !c.equilibrium && (!stop || can_go_on(*stop)) && (!result.frames.empty() || result.checkpoint);
+    return c.unknowns != Unknowns::equilibrium && (!stop || can_go_on(*stop)) &&
+           (!result.frames.empty() || result.checkpoint);
 }
 
 // A result of another case may be needed, and so may the hours of a run that can go on: only --overwrite replaces them.
-void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& file) {
+void refuse_to_replace_another_case(const Problem& c, const std::filesystem::path& file) {
     if (!is_hdf5(file)) return;
     std::string other;
     try {
@@ -386,7 +388,7 @@ void refuse_to_replace_another_case(const Case& c, const std::filesystem::path& 
 
 }  // namespace
 
-void check_replaced(const Case& c, const std::filesystem::path& file, bool overwrite) {
+void check_replaced(const Problem& c, const std::filesystem::path& file, bool overwrite) {
     check_output(file);
     refuse_to_replace_the_start(c, file);
     if (!overwrite) refuse_to_replace_another_case(c, file);
@@ -401,7 +403,7 @@ struct Job {
 };
 
 // What is bad input is found before trial runs; a result that goes on keeps its model.
-ChosenCase with_model_of_run(const Case& c, const std::filesystem::path& file, const RunOptions& options) {
+ChosenCase with_model_of_run(const Problem& c, const std::filesystem::path& file, const RunOptions& options) {
     if (c.model.kind != ModelKind::automatic) return {c, ""};
     check_output(file);
     if (options.refuse_ill_posed)
@@ -435,7 +437,7 @@ Job job_of(const std::string& path, const RunOptions& options) {
     if (options.until) sets.push_back(fmt::format("time.end={}", *options.until));
     if (is_hdf5(path)) return job_of_result(path, sets, options);
     const auto file = result_path(options, path);
-    const Case c = read_case(path, sets, options.resume ? inputs_to_resume(file) : CaseInputs{});
+    const Problem c = read_case(path, sets, options.resume ? inputs_to_resume(file) : CaseInputs{});
     if (options.expect && c.expect.values.empty() && !c.expect.stop)
         throw CaseError(fmt::format("{}: has no table [expect], with which --expect would compare", path));
     try {
@@ -468,7 +470,7 @@ int run_cases(const RunOptions& options) {
     }
     int status = 0;
     for (const auto& [chosen, file, paused] : jobs) {
-        const Case& c = chosen.c;
+        const Problem& c = chosen.c;
         int one = 0;
         try {
             if (paused) throw Paused(*paused);

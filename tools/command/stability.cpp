@@ -40,10 +40,11 @@ void require_within(const std::string& option, double value, double low, double 
         throw std::invalid_argument(fmt::format("{} must be from {:g} to {:g}, not {:g}", option, low, high, value));
 }
 
-std::string words(const Model& model) {
+std::string words_of_model(const Problem& c) {
+    const Model& model = c.model;
     std::string text = name(model);
     const ModelEntry& has = model_entry(model.kind);
-    const double friction = motion_law(model).friction;
+    const double friction = c.law.friction;
     if (has.viscous) text += fmt::format(", Re = {:g}", model.Re);
     if (has.viscous || friction != 1) text += fmt::format(", gamma = {:g}", friction);
     if (model.keeps_volume) text += *model.keeps_volume ? ", volume fixed" : ", volume free";
@@ -105,22 +106,24 @@ std::vector<std::string> model_names() {
     return names;
 }
 
-std::vector<Model> models_of(const StabilityOptions& options, const Model& own) {
+// The case with each model that is asked about.
+std::vector<Problem> models_of(const StabilityOptions& options, const Problem& c) {
+    const Model& own = c.model;
     const bool all = options.model == "all";
-    std::vector<Model> models;
+    std::vector<Problem> models;
     bool viscous = false, inextensible = false;
     for (const ModelEntry& other : tubule::models) {
         if (other.kind == ModelKind::automatic) continue;
         if (!all && (options.model.empty() ? other.kind != own.kind : options.model != other.name)) continue;
-        Model model = own;
-        model.kind = other.kind;
+        Case changed = c;
+        Model& model = changed.model;
         if (other.kind != own.kind) model = with_kind(own, other.kind);
         if (options.Re) model.Re = *options.Re;
         // Without viscosity or friction nothing would resist: with --model all, such a model keeps its own.
         if (options.gamma && (other.viscous || (other.inextensible && *options.gamma > 0)))
             model.gamma = *options.gamma;
         viscous = viscous || other.viscous, inextensible = inextensible || other.inextensible;
-        models.push_back(model);
+        models.emplace_back(changed);
     }
     if (!viscous && options.Re)
         throw std::invalid_argument("--Re is only valid with --model \"stokes\", \"fluid\" or \"all\"");
@@ -133,7 +136,7 @@ std::vector<Model> models_of(const StabilityOptions& options, const Model& own) 
 }
 
 // The shape of a time-dependent case, if its waves are known in closed form.
-std::optional<TubeSubject> tube_of(const Case& c) {
+std::optional<TubeSubject> tube_of(const Problem& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
     if (!shape || c.equilibrium) return std::nullopt;
     TubeSubject out;
@@ -161,7 +164,7 @@ std::optional<double> mean_of(const Record& frame, const std::string& array) {
 }
 
 // A frame that is a straight tube, to a thousandth of its radius.
-std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
+std::optional<TubeSubject> tube_of(const Problem& c, const Record& frame) {
     const Curve profile = meridian(frame_curve(frame));
     if (profile.topology != Topology::tube || !(profile.length > 0)) return std::nullopt;
     TubeSubject out;
@@ -177,11 +180,12 @@ std::optional<TubeSubject> tube_of(const Case& c, const Record& frame) {
 }
 
 // The shape that a case with [equilibrium] finds, as a frame.
-Record equilibrium_frame(Case c) {
+Record equilibrium_frame(const Problem& given) {
     struct Keep : RunObserver {
         std::vector<Record> frames;
         void frame(const std::function<Record()>& make) override { frames.push_back(make()); }
     } keep;
+    Case c = given;
     c.equilibrium->modes.reset();
     c.equilibrium->branch = {};
     const auto summary = axisym::run_equilibrium(c, keep);
@@ -197,7 +201,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     if (!options.fit.empty()) return fit_report(options, subject);
     if (subject.c.model.kind == ModelKind::automatic && options.model.empty())
         throw complaint(subject.c, "model.kind", "must not be \"auto\" for growth rates: name a model with --model");
-    const std::vector<Model> models = models_of(options, subject.c.model);
+    const std::vector<Problem> models = models_of(options, subject.c);
     std::optional<TubeSubject> tube;
     if (subject.frame && subject.frame->mesh)
         throw std::invalid_argument(
@@ -217,7 +221,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     if (sphere && !subject.frame && !options.numerical && !subject.c.equilibrium && sphere->modes.empty())
         return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
     if (options.waves) throw std::invalid_argument("--waves applies only to tubes and spheres, in closed form");
-    if (subject.c.tier == Tier::surface3d)
+    if (subject.c.unknowns == Unknowns::surface || subject.c.unknowns == Unknowns::moving_surface)
         throw std::invalid_argument("tier \"surface3d\" has spectra only for straight tubes and spheres");
     if (subject.c.equilibrium && !subject.frame) subject.frame = equilibrium_frame(subject.c);
     return spectrum_report(options, subject, models);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/theory/dispersion.hpp"
 
@@ -33,7 +33,7 @@ struct StabilityOptions {
 
 // The case, and the frame of a result that is asked about; `result` where all of it is at hand.
 struct StabilitySubject {
-    Case c;
+    Problem c;
     bool case_is_known = true;  // not if a result to be fitted has a case of another version's keys
     std::optional<Result> result = {};
     std::optional<Record> frame = {};
@@ -55,17 +55,19 @@ std::string stability_answer(const StabilityOptions& options, StabilitySubject s
 // The frame of a result that the options name, counted from the end where negative. Throws std::invalid_argument.
 StabilitySubject stability_subject(Result result, const StabilityOptions& options);
 
-// Reports throw std::invalid_argument for what cannot be asked.
-std::string tube_report(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
+// Reports throw std::invalid_argument for what cannot be asked. `models`: the case with each model that is asked about.
+std::string tube_report(const StabilityOptions& options, const TubeSubject& subject,
+                        const std::vector<Problem>& models);
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
-                          const std::vector<Model>& models);
+                          const std::vector<Problem>& models);
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
-                            const std::vector<Model>& models);
+                            const std::vector<Problem>& models);
 std::string fit_report(const StabilityOptions& options, const StabilitySubject& subject);
 // What the picture of --plot is drawn from, as JSON.
-std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models);
+std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,
+                        const std::vector<Problem>& models);
 
-// Name and numbers.
-std::string words(const Model& model);
+// Name and numbers of its model.
+std::string words_of_model(const Problem& c);
 
 }  // namespace tubule

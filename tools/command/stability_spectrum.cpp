@@ -17,25 +17,25 @@ namespace tubule {
 namespace {
 
 struct Found {
-    Model model;
+    Problem problem;
     axisym::Spectrum spectrum;
 };
 
 // What the case says is held, where it looked for an equilibrium.
-Held held_in(const Case& c, const MotionLaw& law) {
-    return c.equilibrium && !law.inextensible ? held_of(c) : axisym::held_by(law);
+Held held_in(const Problem& c, const MotionLaw& law) {
+    return c.equilibrium && !law.inextensible ? c.held : axisym::held_by(law);
 }
 
 std::string words_of(const std::vector<Found>& found) {
     std::string out;
-    for (const auto& [model, spectrum] : found) {
-        out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words(model));
+    for (const auto& [problem, spectrum] : found) {
+        out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words_of_model(problem));
         if (spectrum.at_rest())
             add(out, "  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
-        if (model.free_period) out += "    0   left out: such waves change the free period\n";
+        if (problem.law.free_period) out += "    0   left out: such waves change the free period\n";
         const axisym::ModeRates* fastest = nullptr;
         for (const axisym::ModeRates& mode : spectrum.modes) {
             out += fmt::format("{:>5}", mode.m);
@@ -58,20 +58,20 @@ std::string words_of(const std::vector<Found>& found) {
 
 std::string csv_of(const std::vector<Found>& found) {
     std::string out = "model,m,number,rate\n";
-    for (const auto& [model, spectrum] : found)
+    for (const auto& [problem, spectrum] : found)
         for (const axisym::ModeRates& mode : spectrum.modes)
             for (std::size_t i = 0; i < mode.rates.size(); ++i)
-                add(out, "{},{},{},{:.17g}\n", name(model), mode.m, i, mode.rates[i]);
+                add(out, "{},{},{},{:.17g}\n", name(problem.model), mode.m, i, mode.rates[i]);
     return out;
 }
 
 std::string json_text(const std::vector<Found>& found) {
     Json models = Json::array();
-    for (const auto& [model, spectrum] : found) {
+    for (const auto& [problem, spectrum] : found) {
         Json modes = Json::array();
         for (const axisym::ModeRates& mode : spectrum.modes)
             modes.push_back({{"m", mode.m}, {"rates", mode.rates}, {"shape", mode.shape}});
-        models.push_back({{"model", name(model)},
+        models.push_back({{"model", name(problem.model)},
                           {"at_rest", spectrum.at_rest()},
                           {"tension", spectrum.sigma},
                           {"pressure", -spectrum.lambda},
@@ -85,23 +85,23 @@ std::string json_text(const std::vector<Found>& found) {
 }  // namespace
 
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
-                            const std::vector<Model>& models) {
+                            const std::vector<Problem>& models) {
     const Curve shape = subject.frame ? meridian(frame_curve(*subject.frame)) : axisym::initial_curve(subject.c);
     axisym::SpectrumSettings settings;
     settings.last = options.modes, settings.count = options.rates;
     std::vector<Found> found;
     std::string refused;
     const double time = subject.frame && !subject.c.equilibrium ? subject.frame->time : 0;  // of loads that change
-    for (const Model& model : models) try {
-            const MotionLaw law = motion_law(model);
+    for (const Problem& problem : models) try {
+            const MotionLaw& law = problem.law;
             const Held held = held_in(subject.c, law);
             settings.sigma = options.tension;
             settings.first = law.free_period ? 1 : 0;
             axisym::set_loads(settings, law, held, time);
-            found.push_back({model, axisym::spectrum(subject.c.energy, law, held, shape, settings)});
+            found.push_back({problem, axisym::spectrum(subject.c.energy, law, held, shape, settings)});
         } catch (const std::invalid_argument& error) {
             if (models.size() == 1) throw;
-            refused += fmt::format("\n{}: none: {}\n", name(model), error.what());
+            refused += fmt::format("\n{}: none: {}\n", name(problem.model), error.what());
         }
     switch (options.output()) {
         case Output::csv:

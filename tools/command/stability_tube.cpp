@@ -39,8 +39,7 @@ struct WaveRow {
 
 // One model's answer.
 struct ModelReport {
-    Model model;
-    MotionLaw law;
+    Problem problem;
     UniformTube tube;  // with the tension of this model
     std::string tension_source;
     std::vector<WaveRow> rows;
@@ -121,23 +120,25 @@ std::vector<theory::Wave> case_waves(const TubeSubject& subject) {
 }
 
 void set_tension(const TubeSubject& subject, ModelReport& report) {
-    const bool inextensible = report.law.inextensible, asked = subject.tension_source == "as asked";
-    const std::optional<double> own = theory::tension_of(report.law, subject.tube.energy, subject.tube.radius);
-    if (own && !report.law.area_is_free()) {
+    const bool inextensible = report.problem.law.inextensible, asked = subject.tension_source == "as asked";
+    const std::optional<double> own = theory::tension_of(report.problem.law, subject.tube.energy, subject.tube.radius);
+    if (own && !report.problem.law.area_is_free()) {
         if (asked)
             throw std::invalid_argument(
-                report.law.keeps_volume
+                report.problem.law.keeps_volume
                     ? "--tension must be absent: with the period free, the axial force determines it"
                     : "--tension must be absent: with the volume free, the tube's balance determines it");
         report.tube.tension = *own;
-        report.tension_source = report.law.keeps_volume ? "by the axial force" : "of a tube whose volume is free";
-    } else if (own && !subject.tension && (report.law.reservoir || !report.law.tension.is_zero())) {
+        report.tension_source =
+            report.problem.law.keeps_volume ? "by the axial force" : "of a tube whose volume is free";
+    } else if (own && !subject.tension && (report.problem.law.reservoir || !report.problem.law.tension.is_zero())) {
         report.tube.tension = *own;
-        report.tension_source = report.law.loads_change() ? "of the case, at t = 0" : "of the case";
+        report.tension_source = report.problem.law.loads_change() ? "of the case, at t = 0" : "of the case";
     } else if (subject.tension && (inextensible || subject.tension_source != "minus the mean pressure of the frame")) {
         report.tube.tension = *subject.tension, report.tension_source = subject.tension_source;
     } else if (inextensible && !subject.waves.empty()) {
-        report.tube.tension = theory::tension_of_waves(subject.tube, report.law, subject.length, case_waves(subject));
+        report.tube.tension =
+            theory::tension_of_waves(subject.tube, report.problem.law, subject.length, case_waves(subject));
         report.tension_source = "keeps area and volume, given the waves at the start of the case";
     } else {
         report.tension_source =
@@ -160,7 +161,7 @@ double rounded(double value, double scale) {
 }
 double radius_rate_of(const ModelReport& report) {
     const auto& [energy, R, tension] = report.tube;
-    return rounded(theory::radius_rate_of(report.law, report.tube),
+    return rounded(theory::radius_rate_of(report.problem.law, report.tube),
                    std::abs(density(energy, -1 / R, 0.0).HH) / (R * R * R));
 }
 // The k42 above which no wave of m = 0 grows: 2 k42 is its part of f_KK.
@@ -176,14 +177,14 @@ std::optional<double> least_k42_of(const UniformTube& tube) {
 
 // By which factors the waves of the table have grown when the case ends, of an extensible membrane.
 void add_factors(const TubeSubject& subject, ModelReport& report) {
-    if (report.law.inextensible || report.law.loads_change() || !(subject.end > 0)) return;
+    if (report.problem.law.inextensible || report.problem.law.loads_change() || !(subject.end > 0)) return;
     std::vector<theory::Wave> waves;
     for (const WaveRow& row : report.rows)
         if (row.n && (*row.n > 0 || row.m > 0)) waves.push_back({*row.n, row.m, 1, 0});
     if (waves.empty()) return;
     theory::WaveState end;
     try {
-        end = theory::waves_in_time(report.tube, report.law, subject.length, waves, {subject.end}).front();
+        end = theory::waves_in_time(report.tube, report.problem.law, subject.length, waves, {subject.end}).front();
     } catch (const SolveError&) {  // the radius vanishes, for one: the rates of this instant are right all the same
         return;
     }
@@ -193,9 +194,9 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
     report.radius_at_end = end.radius;
 }
 
-ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Model& model) {
-    const MotionLaw law = motion_law(model);
-    ModelReport report{model, law, subject.tube, "", {}, {}, {}, {}};
+ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Problem& model) {
+    const MotionLaw& law = model.law;
+    ModelReport report{model, subject.tube, "", {}, {}, {}, {}};
     set_tension(subject, report);
     const auto add_row = [&](std::optional<int> n, double q, int m) {
         check_pause();
@@ -250,7 +251,7 @@ std::string e_fold(double rate) {
 }
 
 void add_rows(Text& out, const ModelReport& report, double end) {
-    const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.law.inertia != 0,
+    const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.problem.law.inertia != 0,
                factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; });
     add(out, "    m {}{:>12} {:>14}{} {:>12}{}\n", numbered ? "   n " : "", "q", "rate",
         swings ? "      frequency" : "", "e-fold in", factors ? fmt::format("  factor until t = {:g}", end) : "");
@@ -267,7 +268,7 @@ void add_rows(Text& out, const ModelReport& report, double end) {
 }
 
 void add_model(Text& out, const ModelReport& report, int last, double end) {
-    add(out, "\n{}\n", words(report.model));
+    add(out, "\n{}\n", words_of_model(report.problem));
     add(out, "  tension {:.8g} ({}), reduced {:.8g}\n", report.tube.tension, report.tension_source,
         theory::reduced_tension(report.tube));
     const auto grown = instabilities(report.tube, last);
@@ -343,8 +344,8 @@ std::string csv_of(const std::vector<ModelReport>& reports) {
     add(out, "model,tension,m,n,q,rate,frequency,factor\n");
     for (const ModelReport& report : reports)
         for (const WaveRow& row : report.rows)
-            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.model), report.tube.tension, row.m,
-                row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
+            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.problem.model), report.tube.tension,
+                row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
                 row.factor ? fmt::format("{:.17g}", *row.factor) : "");
     return to_string(out);
 }
@@ -378,10 +379,10 @@ Json json_of(const ModelReport& report) {
         fastest.push_back({{"m", m}, {"q", wave ? Json(wave->q) : Json()}, {"rate", wave ? Json(wave->rate) : Json()}});
     }
     if (const auto& f = report.fastest_fitting) fitting = {{"n", f->n}, {"m", f->m}, {"q", f->q}, {"rate", f->rate}};
-    return {{"model", name(report.model)},
+    return {{"model", name(report.problem.model)},
             {"beyond", instabilities(report.tube, static_cast<int>(report.fastest.size()) - 1)},
-            {"Re", report.model.Re},
-            {"gamma", motion_law(report.model).friction},
+            {"Re", report.problem.model.Re},
+            {"gamma", report.problem.law.friction},
             {"tension", report.tube.tension},
             {"tension_source", report.tension_source},
             {"reduced_tension", theory::reduced_tension(report.tube)},
@@ -406,9 +407,10 @@ Json json_of(const TubeSubject& subject, const std::vector<Threshold>& limits, i
 
 }  // namespace
 
-std::string tube_report(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models) {
+std::string tube_report(const StabilityOptions& options, const TubeSubject& subject,
+                        const std::vector<Problem>& models) {
     std::vector<ModelReport> reports;
-    for (const Model& model : models) reports.push_back(report_of(options, subject, model));
+    for (const Problem& model : models) reports.push_back(report_of(options, subject, model));
     const std::vector<Threshold> limits = thresholds(subject.tube, options.modes);
     switch (options.output()) {
         case Output::csv:
@@ -422,10 +424,11 @@ std::string tube_report(const StabilityOptions& options, const TubeSubject& subj
 }
 
 // Rates over a range of wave numbers that holds all bands and the waves of the table.
-std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject, const std::vector<Model>& models) {
+std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,
+                        const std::vector<Problem>& models) {
     std::vector<ModelReport> reports;
     double q_end = 0;
-    for (const Model& model : models) {
+    for (const Problem& model : models) {
         reports.push_back(report_of(options, subject, model));
         for (int m = 0; m <= options.modes; ++m)
             for (const theory::Band& band : theory::growing_bands(reports.back().tube, m))
@@ -438,9 +441,9 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
     }
     Json panels = Json::array();
     for (const ModelReport& report : reports) {
-        Model short_of_volume = report.model;
-        short_of_volume.keeps_volume.reset();
-        const std::string title = words(short_of_volume);
+        Case short_of_volume = report.problem;
+        short_of_volume.model.keeps_volume.reset();
+        const std::string title = words_of_model(short_of_volume);
         Json curves = Json::array();
         for (int m = 0; m <= options.modes; ++m) {
             std::vector<double> q, rate, neutral;
@@ -448,7 +451,7 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
             for (int i = 0; i <= samples; ++i) {
                 // The limit of long waves: q = 0 itself may stand for a radius that is kept.
                 q.push_back(std::max(i * q_end / samples, 1e-6 * q_end));
-                rate.push_back(theory::growth(report.tube, report.law, q.back(), m).rate());
+                rate.push_back(theory::growth(report.tube, report.problem.law, q.back(), m).rate());
             }
             for (const theory::Band& band : theory::growing_bands(report.tube, m))
                 for (const double edge : {band.from, band.to})
@@ -461,19 +464,19 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
 }
 
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
-                          const std::vector<Model>& models) {
+                          const std::vector<Problem>& models) {
     const int last = options.waves.value_or(6);
     Text out;
     Json list = Json::array();
     if (options.csv) add(out, "model,l,rate,frequency\n");
     if (!options.csv) add(out, "sphere of radius {:.8g}; {}; for any m <= l\n", sphere.radius, moduli(sphere.energy));
-    for (const Model& model : models) {
-        const MotionLaw law = motion_law(model);
+    for (const Problem& c : models) {
+        const MotionLaw& law = c.law;
         const bool swings = law.inertia != 0, moves = law.unconstrained();
         theory::UniformSphere loaded = sphere;
         if (!options.tension && law.area_is_free()) loaded.tension = law.tension.at(0);
         const double radius_rate = law.pressure.at(0) - theory::pressure_at_rest(loaded);
-        if (!options.csv) add(out, "\n{}\n  tension {:.8g}\n", words(model), loaded.tension);
+        if (!options.csv) add(out, "\n{}\n  tension {:.8g}\n", words_of_model(c), loaded.tension);
         if (!options.csv && moves)
             add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n", radius_rate);
         if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
@@ -481,13 +484,13 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
             const theory::Growth found = growth(loaded, law, l);
             const double s = found.rate();
             if (options.csv) {
-                add(out, "{},{},{:.17g},{:.17g}\n", name(model), l, s, found.frequency());
+                add(out, "{},{},{:.17g},{:.17g}\n", name(c.model), l, s, found.frequency());
             } else {
                 add(out, "{:>5} {:>14.7g}", l, s);
                 if (swings) add(out, " {:>14.7g}", found.frequency());
                 add(out, " {:>12}{}\n", e_fold(s), s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
             }
-            list.push_back({{"model", name(model)}, {"l", l}, {"rate", s}, {"roots", json_of(found.roots)}});
+            list.push_back({{"model", name(c.model)}, {"l", l}, {"rate", s}, {"roots", json_of(found.roots)}});
         }
     }
     if (options.json)

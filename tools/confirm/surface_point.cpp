@@ -28,7 +28,7 @@ constexpr double thinnest_neck = 1e-2;  // that triangles are asked to follow
 // Numbers of waves along and around the axis; l and m of a sphere.
 using Wave = std::pair<int, int>;
 
-std::set<Wave> added_waves(const Case& c) {
+std::set<Wave> added_waves(const Problem& c) {
     if (std::holds_alternative<Sphere>(c.shape)) return {{2, 1}, {2, 2}, {3, 1}};
     std::set<Wave> waves{{1, 1}, {1, 2}};
     for (const theory::FittingWave& wave : fastest_waves(c))
@@ -50,7 +50,7 @@ void add_waves(Case& c, double noise) {
 }
 
 // The first part lasts until tier 1's end or, where a wave with m >= 1 grows, as long as it grows by linear theory.
-std::vector<double> output_times(const Case& c, const PointResult& axisymmetric, double end) {
+std::vector<double> output_times(const Problem& c, const PointResult& axisymmetric, double end) {
     double fastest = 0;
     for (const theory::FittingWave& wave : fastest_waves(c))
         if (wave.m > 0) fastest = std::max(fastest, wave.rate);
@@ -63,7 +63,7 @@ std::vector<double> output_times(const Case& c, const PointResult& axisymmetric,
 }
 
 // All waves with m >= 1 that are considered, except a translation of the tube.
-std::vector<Wave> watched(const Case& c) {
+std::vector<Wave> watched(const Problem& c) {
     int highest = 0;
     std::vector<Wave> waves;
     if (const auto* sphere = std::get_if<Sphere>(&c.shape)) {
@@ -87,13 +87,13 @@ double amplitude(const Result& result, const Record& frame, Wave wave) {
 }
 
 // And which wave it is.
-std::pair<double, Wave> largest_wave(const Case& c, const Result& result, const Record& frame) {
+std::pair<double, Wave> largest_wave(const Problem& c, const Result& result, const Record& frame) {
     std::pair<double, Wave> largest{0, {}};
     for (const Wave& wave : watched(c)) largest = std::max(largest, {amplitude(result, frame, wave), wave});
     return largest;
 }
 
-void fit_largest_wave(SurfaceEnd& a, const Case& c, const Result& result) {
+void fit_largest_wave(SurfaceEnd& a, const Problem& c, const Result& result) {
     std::vector<double> times, amplitudes;
     for (const Record& frame : result.frames) {
         times.push_back(frame.time);
@@ -126,15 +126,14 @@ Verdict verdict(const SurfaceEnd& a, const PointResult& axisymmetric) {
 
 }  // namespace
 
-std::vector<theory::FittingWave> fastest_waves(const Case& c) {
+std::vector<theory::FittingWave> fastest_waves(const Problem& c) {
     const auto start = theory::tube_start(c);
     if (!start) return {};
     std::vector<theory::FittingWave> all;
     for (int m = 0; m <= 2; ++m) {
         theory::FittingWave best{0, m, 0, -std::numeric_limits<double>::infinity()};
         for (int n = m < 2 ? 1 : 0; n <= most_waves; ++n) {
-            const double q = 2 * pi * n / start->length,
-                         rate = theory::growth(start->tube, motion_law(c.model), q, m).rate();
+            const double q = 2 * pi * n / start->length, rate = theory::growth(start->tube, c.law, q, m).rate();
             if (std::isfinite(rate) && rate > best.rate) best = {n, m, q, rate};
         }
         all.push_back(best);
@@ -142,9 +141,8 @@ std::vector<theory::FittingWave> fastest_waves(const Case& c) {
     return all;
 }
 
-std::string surface_case(const Case& c, const PointResult& axisymmetric, const Choices& choices) {
-    Case s = c;
-    s.tier = Tier::surface3d;
+std::string surface_case(const Problem& c, const PointResult& axisymmetric, const Choices& choices) {
+    Case s = c.of_surface();
     s.accuracy.r_min = std::max(c.accuracy.r_min, thinnest_neck);
     s.accuracy.energy = std::max(c.accuracy.energy, rough);
     s.discretisation = {};
@@ -168,7 +166,7 @@ std::string_view name(Verdict verdict) {
 SurfaceEnd surface_end(const PointResult& axisymmetric, const Result& surface) {
     const std::string stop = compare::stop_word(surface);
     if (!stop_from_name(stop) || surface.frames.empty()) throw std::runtime_error("the result is not complete");
-    const Case c = parse_case(surface.case_text.text, surface.case_text.sets, "result", surface.case_text.inputs);
+    const Problem c = parse_case(surface.case_text.text, surface.case_text.sets, "result", surface.case_text.inputs);
     SurfaceEnd a{.stop = stop, .time = compare::stop_time(surface)};
     a.energy_error = compare::stated_error(surface).value_or(not_known);
     if (const double t = axisymmetric[Measure::time]; t <= a.time)

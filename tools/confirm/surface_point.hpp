@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"
@@ -26,11 +26,11 @@ struct Choices {
 // 20 frames until tier 1's end or, where a wave with m >= 1 grows, while it grows by e^6; and 20 after that. Choices
 // that belong to tier 1, time.stationary and [expect] are left out: a symmetric equilibrium may be none in three
 // dimensions. Throws CaseError for other shapes.
-std::string surface_case(const Case& c, const PointResult& axisymmetric, const Choices& choices);
+std::string surface_case(const Problem& c, const PointResult& axisymmetric, const Choices& choices);
 
 // For m = 0, 1, 2 the wave that fits and grows fastest (or decays slowest) in closed form, on the straight tube of the
 // start; changes of the radius and moves of the whole are left out. Empty for other shapes.
-std::vector<theory::FittingWave> fastest_waves(const Case& c);
+std::vector<theory::FittingWave> fastest_waves(const Problem& c);
 
 enum class Verdict {
     agrees,

@@ -23,7 +23,7 @@ namespace {
 
 class Memory : public RunObserver {
 public:
-    Memory(const Case& c, Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+    Memory(const Problem& c, Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
         : case_(c), result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
@@ -64,14 +64,14 @@ public:
     }
 
 private:
-    const Case& case_;
+    const Problem& case_;
     Result& result_;
     const MemoryRunOptions& options_;
     std::optional<ResultWriter>& writer_;
     std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now();
 };
 
-RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& result, RunObserver& observer) {
+RunSummary run_to_its_end(const Problem& c, const Engine& engine, const Result& result, RunObserver& observer) {
     const auto reached = [&]() -> std::optional<double> {
         const std::vector<double>& times = result.series.at("time");
         return times.empty() ? std::nullopt : std::optional(times.back());
@@ -92,14 +92,14 @@ RunSummary run_to_its_end(const Case& c, const Engine& engine, const Result& res
 
 }  // namespace
 
-Result run_in_memory(const Case& given, const MemoryRunOptions& options) {
+Result run_in_memory(const Problem& given, const MemoryRunOptions& options) {
     PauseWatch watch(given.time.limit, options.interrupted);  // for trial runs and the start, too
     ChosenCase chosen = with_chosen_model(given);
     if (const std::string changed = changed_input(chosen.c, inputs_of(chosen.c)); !changed.empty())
         throw CaseError(fmt::format("{}: {}: bring back the file that its result began with, or read the case itself",
                                     chosen.c.path, changed));
     if (!chosen.c.input) chosen.c.input = current_input(chosen.c);
-    const Case& c = chosen.c;
+    const Problem& c = chosen.c;
     const auto engine = engine_for(c);
     Result result;
     result.case_text = kept_case(c);

@@ -5,7 +5,7 @@
 #include <functional>
 #include <optional>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule {
@@ -23,6 +23,6 @@ struct MemoryRunOptions {
 // Runs a case of any tier, or finds its equilibria. Where the numerics fail the result has what was computed until
 // then, and the stop says why. Throws CaseError for bad input, Paused at a start that is interrupted or out of time,
 // and std::runtime_error where nothing could be computed or the output cannot be written.
-Result run_in_memory(const Case& c, const MemoryRunOptions& options);
+Result run_in_memory(const Problem& c, const MemoryRunOptions& options);
 
 }  // namespace tubule

@@ -213,7 +213,7 @@ struct Flag {
     std::atomic<bool> raised = false;
 };
 
-Results run(const Case& c, const py::object& progress, const py::object& output, bool overwrite, int threads,
+Results run(const Problem& c, const py::object& progress, const py::object& output, bool overwrite, int threads,
             const std::shared_ptr<Flag>& enough) {
     require_within("threads", threads, 0, 1000);
     MemoryRunOptions options;
@@ -246,7 +246,7 @@ Results run(const Case& c, const py::object& progress, const py::object& output,
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
+py::dict density_at(const Problem& c, const Numbers& H, const Numbers& K) {
     if (c.energy.H0_varies()) throw complaint_about_H0(c, "must be a number for the density of a case");
     const std::vector<const char*> names{"f", "f_H", "f_K", "f_HH", "f_HK", "f_KK"};
     py::dict out;
@@ -260,20 +260,20 @@ py::dict density_at(const Case& c, const Numbers& H, const Numbers& K) {
     return out;
 }
 
-py::object growth_rates(const Case& c, const Numbers& q, int m, std::optional<double> tension) {
+py::object growth_rates(const Problem& c, const Numbers& q, int m, std::optional<double> tension) {
     const auto start = theory::tube_start(c);
     if (!start) throw std::invalid_argument("growth rates in closed form need a case with shape.kind = \"tube\"");
     require_within("m", m, 0, most_modes);
     if (tension) require_within("tension", *tension, -largest_number, largest_number);
     theory::UniformTube tube = start->tube;
     if (tension) tube.tension = *tension;
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     return of_each(std::function([&](double wave) { return theory::growth(tube, law, wave, m).rate(); }))(q);
 }
 
 // ---- scans
 
-py::dict scan(const Case& c, const std::vector<std::string>& over, const std::string& boundary,
+py::dict scan(const Problem& c, const std::vector<std::string>& over, const std::string& boundary,
               const std::filesystem::path& file, bool overwrite, std::optional<int> jobs, bool to_the_end) {
     ScanChoices choices;
     choices.over = over, choices.boundary = boundary, choices.to_the_end = to_the_end;
@@ -317,22 +317,24 @@ void add_errors(py::module_& m) {
 }
 
 void add_cases(py::module_& m) {
-    py::class_<Case>(m, "Case")
-        .def_readonly("path", &Case::path)
-        .def_readonly("text", &Case::text)
-        .def_readonly("sets", &Case::sets)
-        .def_readonly("title", &Case::title)
-        .def_property_readonly("toml", &effective_toml)
-        .def_property_readonly("is_equilibrium", [](const Case& c) { return c.equilibrium.has_value(); });
+    py::class_<Problem>(m, "Case")
+        .def_readonly("path", &Problem::path)
+        .def_readonly("text", &Problem::text)
+        .def_readonly("sets", &Problem::sets)
+        .def_readonly("title", &Problem::title)
+        .def_property_readonly("toml", [](const Problem& c) { return effective_toml(c); })
+        .def_property_readonly("is_equilibrium", [](const Problem& c) { return c.unknowns == Unknowns::equilibrium; });
     m.def(
         "parse_case",
         [](const std::string& text, const std::vector<std::string>& sets, const std::string& path) {
-            return parse_case(text, sets, path);
+            return Problem(parse_case(text, sets, path));
         },
         py::arg("text"), py::arg("sets"), py::arg("path"));
     m.def(
         "read_case",
-        [](const std::filesystem::path& path, const std::vector<std::string>& sets) { return read_case(path, sets); },
+        [](const std::filesystem::path& path, const std::vector<std::string>& sets) {
+            return Problem(read_case(path, sets));
+        },
         py::arg("path"), py::arg("sets"));
 }
 
@@ -346,7 +348,8 @@ void add_results(py::module_& m) {
                  if (found == r.result->series.end()) throw py::key_error(name);
                  return numpy(found->second);
              })
-        .def("case", [](const Results& r, const std::string& name) { return case_of_result(*r.result, name, {}); })
+        .def("case",
+             [](const Results& r, const std::string& name) { return Problem(case_of_result(*r.result, name, {})); })
         .def_property_readonly("frames", [](const Results& r) { return r.result->frames.size(); })
         .def("frame", &frame_dictionary)
         .def("mesh", &mesh_dictionary)
@@ -376,7 +379,7 @@ void add_closed_forms(py::module_& m) {
               };
               return py::make_tuple(part(&ProfilePoint<double>::H), part(&ProfilePoint<double>::K));
           });
-    m.def("forecast", [](const Case& c) {
+    m.def("forecast", [](const Problem& c) {
         const Forecast f = without_gil(0, [&] { return forecast(c); });
         py::dict out;
         out["resolution"] = f.resolution, out["steps"] = f.steps, out["seconds"] = f.seconds, out["bytes"] = f.bytes;
@@ -399,7 +402,7 @@ void add_answers(py::module_& m) {
         .def_readwrite("modes", &StabilityOptions::modes, "an integer")
         .def_readwrite("rates", &StabilityOptions::rates, "an integer")
         .def_readwrite("numerical", &StabilityOptions::numerical);
-    m.def("stability", [](const Case& c, StabilityOptions options) {
+    m.def("stability", [](const Problem& c, StabilityOptions options) {
         options.json = true, options.file = c.path;
         return as_arguments([&] {
             return without_gil(0, [&] { return stability_answer(options, StabilitySubject{c, true, {}, {}}); });

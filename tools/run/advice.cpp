@@ -26,7 +26,7 @@ std::string reason_of(const RunSummary& s) {
 }
 
 // An axisymmetric initial shape runs in tier "axisym" unless modes m > 0 grow.
-void choose_tier(const Case& c, const Forecast& expected, Advice& out) {
+void choose_tier(const Problem& c, const Forecast& expected, Advice& out) {
     Case watched = c;
     watched.tier = Tier::automatic;
     watched.discretisation = {}, watched.surface = {}, watched.time.limit = {};
@@ -40,7 +40,8 @@ void choose_tier(const Case& c, const Forecast& expected, Advice& out) {
         return;
     }
     out.tier = "axisym";
-    out.seconds = c.tier == Tier::surface3d ? forecast(axisym_case(c, c.time.end, {})).seconds : expected.seconds;
+    const bool of_surface = c.unknowns == Unknowns::moving_surface;
+    out.seconds = of_surface ? forecast(c.of_profile(c.time.end, {})).seconds : expected.seconds;
 }
 
 // Two digits.
@@ -48,16 +49,16 @@ std::string number(double value) {
     return fmt::format("{:.2g}", value);
 }
 
-void choose_mesh(const Case& c, const surface3d::Start& start, const Forecast& expected, Advice& out) {
+void choose_mesh(const Problem& c, const surface3d::Start& start, const Forecast& expected, Advice& out) {
     out.seconds = expected.seconds;
     if (!few_triangles_do(c, start)) return;
-    Case given = surface_case(c);
+    Case given = c.of_surface();
     given.surface.elements = out.elements = surface3d::least_triangles;
     out.seconds = forecast(given).seconds;
     out.reason += ", and is smooth";
 }
 
-void advise_model(const Case& c, Advice& out) {
+void advise_model(const Problem& c, Advice& out) {
     const ModelChoice chosen = choose_model(c);
     if (chosen.unknown) return;
     if (chosen.kind != c.model.kind && out.tier == "axisym") out.seconds = chosen.seconds;
@@ -67,7 +68,7 @@ void advise_model(const Case& c, Advice& out) {
 
 }  // namespace
 
-std::optional<Advice> advice(const Case& c, const Forecast& expected) {
+std::optional<Advice> advice(const Problem& c, const Forecast& expected) {
     if (!c.moves()) return {};
     Advice out;
     out.tier = "surface3d", out.model = name(c.model), out.accuracy = c.accuracy.energy;

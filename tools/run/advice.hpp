@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/forecast.hpp"
 
 namespace tubule {
@@ -20,7 +20,7 @@ struct Advice {
 // Takes a few seconds at most: the run itself, in tier axisym, and those of simpler models. `expected` is the forecast
 // of the case as it is. None where nothing moves. Throws as an engine and its run; Paused where a PauseWatch of this
 // thread ends one of them.
-std::optional<Advice> advice(const Case& c, const Forecast& expected);
+std::optional<Advice> advice(const Problem& c, const Forecast& expected);
 
 // "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ...", "tier surface3d, model stokes, 80 elements, ..."
 std::string words(const Advice& a);

@@ -18,36 +18,30 @@ constexpr double part_of_limit = 0.1;
 
 class Axisymmetric : public Engine {
 public:
-    explicit Axisymmetric(const Case& c) : case_(c) {}
+    using Engine::Engine;
     std::vector<std::string> series_names() const override { return axisym::series_names(case_); }
     void check_restart(const Record& record) const override { axisym::check_restart(record); }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
         return axisym::run(case_, observer, restart);
     }
-
-private:
-    const Case& case_;
 };
 
 class Equilibria : public Engine {
 public:
-    explicit Equilibria(const Case& c) : case_(c) { axisym::check_equilibrium(c); }
+    explicit Equilibria(const Problem& c) : Engine(c) { axisym::check_equilibrium(c); }
     std::vector<std::string> series_names() const override { return axisym::equilibrium_series_names(case_); }
     void check_restart(const Record& record) const override { axisym::check_restart(record); }
     RunSummary run(RunObserver& observer, const Restart*, const Result*) const override {
         return axisym::run_equilibrium(case_, observer);
     }
-
-private:
-    const Case& case_;
 };
 
 class ThreeDimensions : public Engine {
 public:
-    explicit ThreeDimensions(const Case& c) : case_(c), start_(c) {}
+    explicit ThreeDimensions(const Problem& c) : Engine(c), start_(c) {}
     std::vector<std::string> series_names() const override { return surface3d::series_names(case_); }
     void check_restart(const Record& record) const override {
-        if (case_.moves()) surface3d::check_restart(case_, record);
+        if (moves()) surface3d::check_restart(case_, record);
     }
     std::optional<Forecast> forecast_if_long() const override {
         std::optional<double> limit = case_.time.limit;  // to which this counts, too
@@ -55,7 +49,7 @@ public:
         const PauseWatch watch(limit, [] { return false; });
         try {
             std::optional<Forecast> f = forecast_at_rest(case_);
-            if (case_.moves() && surface3d::may_be_long(case_, start_)) f = surface3d::forecast_motion(case_, start_);
+            if (moves() && surface3d::may_be_long(case_, start_)) f = surface3d::forecast_motion(case_, start_);
             return f && (f->seconds.value_or(0) > long_run || f->finer_runs) ? f : std::nullopt;
         } catch (const Paused&) {  // the run itself finds why, if that is not the part
             return std::nullopt;
@@ -63,18 +57,19 @@ public:
     }
     std::string warning() const override { return start_.time_scale(); }
     RunSummary run(RunObserver& observer, const Restart* restart, const Result*) const override {
-        if (restart && !case_.moves()) observer.discard();  // nothing moves: there is no partial state to resume from
+        if (restart && !moves()) observer.discard();  // nothing moves: there is no partial state to resume from
         return surface3d::run(case_, start_, observer, restart);
     }
 
 private:
-    const Case& case_;
+    bool moves() const { return case_.unknowns == Unknowns::moving_surface; }
+
     surface3d::Start start_;
 };
 
 class Automatic : public Engine {
 public:
-    explicit Automatic(const Case& c) : case_(c), choice_(choice_for(c)) {}
+    explicit Automatic(const Problem& c) : Engine(c), choice_(choice_for(c)) {}
     std::vector<std::string> series_names() const override { return joined_series_names(case_, choice_.axisymmetric); }
     void check_restart(const Record& record) const override {
         if (record.mesh)
@@ -88,24 +83,17 @@ public:
     }
 
 private:
-    const Case& case_;
     Choice choice_;
 };
 
 }  // namespace
 
-std::unique_ptr<const Engine> engine_for(const Case& c) {
-    if (c.equilibrium) return std::make_unique<Equilibria>(c);
+std::unique_ptr<const Engine> engine_for(const Problem& c) {
+    if (c.unknowns == Unknowns::equilibrium) return std::make_unique<Equilibria>(c);
     if (c.model.kind == ModelKind::automatic) throw std::logic_error("a case whose model is not chosen yet");
-    switch (c.tier) {
-        case Tier::axisym:
-            return std::make_unique<Axisymmetric>(c);
-        case Tier::surface3d:
-            return std::make_unique<ThreeDimensions>(c);
-        case Tier::automatic:
-            return std::make_unique<Automatic>(c);
-    }
-    throw std::logic_error("a tier without an engine");
+    if (c.is_axisymmetric()) return std::make_unique<Axisymmetric>(c);
+    if (c.unknowns == Unknowns::automatic) return std::make_unique<Automatic>(c);
+    return std::make_unique<ThreeDimensions>(c);
 }
 
 }  // namespace tubule

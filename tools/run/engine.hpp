@@ -4,9 +4,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/forecast.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/run.hpp"
@@ -16,6 +17,7 @@ namespace tubule {
 // A case, checked and with its start prepared: what it starts from is read once.
 class Engine {
 public:
+    explicit Engine(Problem c) : case_(std::move(c)) {}
     virtual ~Engine() = default;
 
     // Names of the series that a run writes, "time" first.
@@ -35,10 +37,12 @@ public:
     // tier's own run.
     virtual RunSummary run(RunObserver& observer, const Restart* restart = nullptr,
                            const Result* unfinished = nullptr) const = 0;
+
+protected:
+    const Problem case_;
 };
 
-// The case must outlive its engine. Throws CaseError where the shape of the case cannot be meshed, or the result that
-// it starts from cannot be read.
-std::unique_ptr<const Engine> engine_for(const Case& c);
+// Throws CaseError where the shape of the case cannot be meshed, or the result that it starts from cannot be read.
+std::unique_ptr<const Engine> engine_for(const Problem& c);
 
 }  // namespace tubule

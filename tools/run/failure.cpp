@@ -38,14 +38,14 @@ std::string extreme_numbers(const toml::node& node, const std::string& key) {
 
 }  // namespace
 
-void blame_extreme_numbers(const Case& c, StopReport& stop) {
+void blame_extreme_numbers(const Problem& c, StopReport& stop) {
     const std::string numbers = extreme_numbers(toml::parse(effective_toml(c)), "");
     if (numbers.empty()) return;
     stop.message = fmt::format("the numbers of the case are too large or too small to compute with: {}", numbers);
     stop.advice = "choose units in which they are nearer to 1";
 }
 
-StopReport failure_of(const Case& c, const std::exception& error, std::optional<double> reached) {
+StopReport failure_of(const Problem& c, const std::exception& error, std::optional<double> reached) {
     const std::string where = reached ? fmt::format("after t = {:.6g}", *reached) : "at the start";
     StopReport stop{Stop::solver_failed, reached.value_or(0), fmt::format("{} ({})", error.what(), where),
                     "try another accuracy.energy or discretisation.elements, or a smoother shape"};
@@ -57,7 +57,7 @@ StopReport failure_of(const Case& c, const std::exception& error, std::optional<
     return stop;
 }
 
-RunSummary failed_run(const Case& c, const std::exception& error, std::optional<double> reached) {
+RunSummary failed_run(const Problem& c, const std::exception& error, std::optional<double> reached) {
     RunSummary summary;
     summary.stop = failure_of(c, error, reached);
     summary.estimated_error = 1;

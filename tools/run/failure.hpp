@@ -4,18 +4,18 @@
 #include <exception>
 #include <optional>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule {
 
 // `reached`: the time of the last row; nothing if the run failed before its first.
-StopReport failure_of(const Case& c, const std::exception& error, std::optional<double> reached);
+StopReport failure_of(const Problem& c, const std::exception& error, std::optional<double> reached);
 // The summary of a run that ended by it.
-RunSummary failed_run(const Case& c, const std::exception& error, std::optional<double> reached);
+RunSummary failed_run(const Problem& c, const std::exception& error, std::optional<double> reached);
 
 // Replaces the message of a run that failed where numbers of the case are so large or small that their powers and
 // products need not be finite.
-void blame_extreme_numbers(const Case& c, StopReport& stop);
+void blame_extreme_numbers(const Problem& c, StopReport& stop);
 
 }  // namespace tubule

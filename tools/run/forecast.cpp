@@ -28,7 +28,8 @@ double memory_in_use() {
     return 1024.0 * static_cast<double>(used.ru_maxrss);
 }
 
-Forecast by_its_beginning(Case c) {
+Forecast by_its_beginning(const Problem& whole) {
+    Case c = whole;
     c.time.limit = std::min(pilot_limit, 0.5 * c.time.limit.value_or(pilot_limit / 0.5));
     const TrialRun trial(c, {});
     const RunSummary& s = trial.summary;
@@ -56,22 +57,22 @@ std::string rounded(double value) {
 
 }  // namespace
 
-std::optional<Forecast> forecast_at_rest(const Case& c) {
-    if (c.tier != Tier::surface3d || c.moves() || c.equilibrium || !c.surface.elements) return std::nullopt;
-    const double size = std::pow(element_order(c), 2) * *c.surface.elements;
+std::optional<Forecast> forecast_at_rest(const Problem& c) {
+    if (c.unknowns != Unknowns::surface || !c.surface.elements) return std::nullopt;
+    const double size = std::pow(c.element_order, 2) * *c.surface.elements;
     Forecast out;
-    out.resolution = fmt::format("about {} triangles of order {}", *c.surface.elements, element_order(c));
+    out.resolution = fmt::format("about {} triangles of order {}", *c.surface.elements, c.element_order);
     out.seconds = seconds_at_rest * size, out.bytes = bytes_at_rest * size;
     return out;
 }
 
-Forecast forecast(const Case& c) {
+Forecast forecast(const Problem& c) {
     if (const auto at_rest = forecast_at_rest(c)) return *at_rest;
-    if (c.tier != Tier::surface3d || !c.moves()) return by_its_beginning(c);
+    if (c.unknowns != Unknowns::moving_surface) return by_its_beginning(c);
     return surface3d::forecast_motion(c, surface3d::Start(c));
 }
 
-std::string cost_of_frames(const Case& c, const Record& first) {
+std::string cost_of_frames(const Problem& c, const Record& first) {
     double bytes = bytes_of_frame;
     for (const Array& array : first.arrays) bytes += sizeof(double) * static_cast<double>(array.data.size());
     const auto frames = static_cast<double>(c.time.output.size()) + 1;

@@ -20,18 +20,19 @@ constexpr int triangles = 500, order = 2;  // whose nodes are looked at
 // to 0 that every run that can be computed ends there.
 constexpr double certain = 1e-3;
 
-bool may_be_known(const Case& c) {
+bool may_be_known(const Problem& c) {
     const bool by_points = std::holds_alternative<MeshFile>(c.shape) || std::holds_alternative<ResultFrame>(c.shape);
-    return c.moves() && c.tier != Tier::automatic && !c.equilibrium && !c.handover && !by_points &&
-           !c.energy.H0_varies() && symbol_may_vanish(c.energy);
+    return c.moves() && c.unknowns != Unknowns::automatic && !c.handover && !by_points && !c.energy.H0_varies() &&
+           symbol_may_vanish(c.energy);
 }
 
 // Curvatures between which waves are looked for: of all directions or, in tier axisym, of those along the profile,
 // across which the curvature is that around the axis.
-std::array<double, 2> across(const Case& c, const surface3d::CurvatureField& exact, const Eigen::Vector3d& x, int i) {
+std::array<double, 2> across(const Problem& c, const surface3d::CurvatureField& exact, const Eigen::Vector3d& x,
+                             int i) {
     const double mean = exact.H[i] / 2, apart = std::sqrt(std::max(mean * mean - exact.K[i], 0.0));
     const double r = std::hypot(x.x(), x.y());
-    if (c.tier != Tier::axisym || apart < 1e-8 * std::abs(mean)) return {mean - apart, mean + apart};
+    if (!c.is_axisymmetric() || apart < 1e-8 * std::abs(mean)) return {mean - apart, mean + apart};
     const double around = -(exact.normal(0, i) * x.x() + exact.normal(1, i) * x.y()) / (r * r);
     return {around, around};
 }
@@ -46,7 +47,7 @@ std::string place_of(const Eigen::Vector3d& x) {
 }
 
 // A formula that has no value somewhere says nothing about the symbol.
-std::optional<CaseError> formula_without_value(const Case& c, const surface3d::StartMesh& start) {
+std::optional<CaseError> formula_without_value(const Problem& c, const surface3d::StartMesh& start) {
     const std::string key = key_of_formula(c.energy);
     if (key == "energy") return std::nullopt;
     DensityDomain domain(c.energy);
@@ -67,7 +68,7 @@ std::optional<CaseError> formula_without_value(const Case& c, const surface3d::S
     return std::nullopt;
 }
 
-Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
+Worst worst_of(const Problem& c, const surface3d::StartMesh& start) {
     Worst worst;
     for (int i = 0; i < start.mesh.size(); ++i) {
         const auto [low, high] = across(c, *start.exact, start.mesh.nodes[i], i);
@@ -81,7 +82,7 @@ Worst worst_of(const Case& c, const surface3d::StartMesh& start) {
 
 }  // namespace
 
-CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const std::string& why) {
+CaseError ill_posed_complaint(const Problem& c, const std::string& outcome, const std::string& why) {
     const std::string key = key_of_ill_posed(c);
     return complaint(
         c, key,
@@ -91,10 +92,9 @@ CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const s
                                         : "bring it nearer to 0, or make energy.k20 larger"));
 }
 
-std::optional<CaseError> ill_posed_start(const Case& c) {
+std::optional<CaseError> ill_posed_start(const Problem& c) {
     if (!may_be_known(c) || c.expect.stop == Stop::ill_posed) return std::nullopt;
-    Case shape = c;
-    shape.tier = Tier::surface3d;
+    Case shape = c.of_surface();
     shape.surface = {};
     shape.surface.recovery = Recovery::exact;
     try {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "common/case/problem.hpp"
 #include "common/case/read.hpp"
 
 namespace tubule {
@@ -11,9 +12,9 @@ namespace tubule {
 // Why a run ends as ill-posed at once, with the place of the modulus to blame, where that is certain: by the curvatures
 // of the shape itself, not of a mesh. Or where the formula of the energy has no value on the start. Empty for all other
 // cases, among them surfaces of given triangles, frames of results and an H0 that varies: their runs find out.
-std::optional<CaseError> ill_posed_start(const Case& c);
+std::optional<CaseError> ill_posed_start(const Problem& c);
 
 // In words, what to do about it.
-CaseError ill_posed_complaint(const Case& c, const std::string& outcome, const std::string& why);
+CaseError ill_posed_complaint(const Problem& c, const std::string& outcome, const std::string& why);
 
 }  // namespace tubule

@@ -29,10 +29,24 @@ constexpr double least_parts = 20, most_parts = 1000;
 constexpr double rounding = 1e-12;  // of an energy
 constexpr double accuracy = 1e-4;   // of the pilots in tier axisym, or better if the case is
 constexpr double accuracy_of_surface = 1e-2;
-// Measured (docs/decisions/tiers.md, tests/studies/benchmark/model_differences.py): on a length L the viscosity damps like a
-// friction of `viscous`/(Re L^2), and slows what friction alone would drive down by the factor 1 + `slower`/(gamma Re
-// L^2).
+// Measured (docs/decisions/tiers.md, tests/studies/benchmark/model_differences.py): on a length L the viscosity damps
+// like a friction of `viscous`/(Re L^2), and slows what friction alone would drive down by the factor 1 +
+// `slower`/(gamma Re L^2).
 constexpr double viscous = 2, slower = 4.5;
+
+// A model with fewer terms instead of that of a case, its path being the energy over time.
+struct SimplerModel {
+    ModelKind kind = ModelKind::overdamped;
+    // Expected differences from the path of the case, the largest and that at the end, relative to E_ref: in
+    // docs/model_differences.csv 0.9 to 6.6 times the measured ones.
+    double on_the_way = 0, at_end = 0;
+    double seconds = 0;  // that its trial run took: in tier axisym what it takes
+    bool rests = false;  // nothing moves
+};
+struct SimplerModels {
+    std::vector<SimplerModel> models;
+    std::string unknown;  // why there are none, in words
+};
 
 double fall(const EnergyTrace& path) {
     return path.energies().front() - path.energies().back();
@@ -81,14 +95,14 @@ bool speeds_up(const EnergyTrace& path, double part) {
 
 // The case with this model in the tier that shows its path: tier axisym; of starts that may leave it, tier "auto"; of
 // others, few triangles.
-Case pilot_of(const Case& c, ModelKind kind, bool axisymmetric) {
+Problem pilot_of(const Problem& c, ModelKind kind, bool axisymmetric) {
     Case out = c;
     out.model.kind = kind;
     out.time = {.end = c.time.end, .output = {}, .stationary = {}, .limit = {}};
     out.discretisation = {}, out.surface = {};
     if (axisymmetric) {
         out.accuracy.energy = std::min(c.accuracy.energy, accuracy);
-        if (c.tier != Tier::axisym) out.tier = Tier::automatic;
+        if (!c.is_axisymmetric()) out.tier = Tier::automatic;
         return out;
     }
     out.tier = Tier::surface3d;
@@ -97,11 +111,11 @@ Case pilot_of(const Case& c, ModelKind kind, bool axisymmetric) {
     return out;
 }
 
-std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymmetric) {
-    const Case simple = pilot_of(c, kind, axisymmetric);
+std::optional<SimplerModel> compared(const Problem& c, ModelKind kind, bool axisymmetric) {
     std::optional<TrialRun> trial;
     try {
-        trial.emplace(simple, TrialLimits{axisymmetric ? most_rows : most_rows_of_surface, most_seconds, true});
+        trial.emplace(pilot_of(c, kind, axisymmetric),
+                      TrialLimits{axisymmetric ? most_rows : most_rows_of_surface, most_seconds, true});
     } catch (const SolveError&) {
         return {};
     }
@@ -114,8 +128,8 @@ std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymm
         return SimplerModel{kind, HUGE_VAL, HUGE_VAL, trial->seconds};
     const double length2 =
         may_have_period(c.shape) ? trial->r_max * trial->r_max : trial->area / (4 * std::numbers::pi);
-    const double viscosity = 1 / (c.model.Re * length2), gamma = motion_law(c.model).friction;
-    const double tau = model_entry(c.model.kind).inertia ? 1 / (gamma + viscous * viscosity) : 0;
+    const double viscosity = 1 / (c.model.Re * length2), gamma = c.law.friction;
+    const double tau = c.law.inertia != 0 ? 1 / (gamma + viscous * viscosity) : 0;
     const double factor = kind == ModelKind::overdamped ? 1 + slower * viscosity / gamma : 1;
     const double at_end = energy_at(path, (path.end() - tau) / factor) - path.energies().back();
     return SimplerModel{kind, (lag(path, tau) + lead(path, factor)) / s.reference_energy, at_end / s.reference_energy,
@@ -123,12 +137,12 @@ std::optional<SimplerModel> compared(const Case& c, ModelKind kind, bool axisymm
 }
 
 // Why a path does not tell; empty if it does.
-std::string untold(const Case& c, const Choice& choice) {
-    const MotionLaw law = motion_law(c.model);
+std::string untold(const Problem& c, const Choice& choice) {
+    const MotionLaw& law = c.law;
     if (c.velocity.initial != InitialVelocity::rest) return "the case gives a velocity";
     if (law.reservoir || law.free_period || !law.without_loads())
         return "loads, a reservoir or a free period act on the membrane";
-    if (c.energy.H0_varies() && c.tier != Tier::axisym) return "energy.H0 varies";
+    if (c.energy.H0_varies() && !c.is_axisymmetric()) return "energy.H0 varies";
     if (!choice.axisymmetric && !choice.start->resizable()) return "the start brings its own triangles";
     return {};
 }
@@ -137,53 +151,57 @@ std::string two_digits(double value) {
     return fmt::format("{:.2g}", value);
 }
 
-}  // namespace
-
-SimplerModels simpler_models(const Case& c) {
-    if (!model_entry(c.model.kind).viscous) return {{}, "no model is simpler"};
-    const Choice choice = c.tier == Tier::axisym ? Choice{} : choice_for(c);
+// By trial runs of these models: of an axisymmetric start in tier axisym, while no mode m > 0 grows if the case has
+// another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a start
+// brings its own triangles, or a trial run does not come to its end. Where nothing moves the simplest is the only one.
+SimplerModels simpler_models(const Problem& c) {
+    if (c.law.viscosity == 0) return {{}, "no model is simpler"};
+    const Choice choice = c.is_axisymmetric() ? Choice{} : choice_for(c);
     if (std::string why = untold(c, choice); !why.empty()) return {{}, std::move(why)};
     SimplerModels out;
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes}) {
-        if (kind == c.model.kind || (kind == ModelKind::overdamped && !(motion_law(c.model).friction > 0))) continue;
+        if (kind == c.model.kind || (kind == ModelKind::overdamped && !(c.law.friction > 0))) continue;
         const auto one = compared(c, kind, choice.axisymmetric);
         if (one && std::isinf(one->on_the_way)) return {{}, "the fall of the energy speeds up, as where waves grow"};
         if (one) out.models.push_back(*one);
         if (one && one->rests) return out;
     }
     if (out.models.empty())
-        out.unknown = choice.axisymmetric && c.tier != Tier::axisym
+        out.unknown = choice.axisymmetric && !c.is_axisymmetric()
                           ? "trial runs of simpler models do not come to the end as axisymmetric ones"
                           : "trial runs of simpler models do not come to the end";
     return out;
 }
 
-ModelChoice choose_model(const Case& c) {
-    Case full = c;
-    if (c.model.kind == ModelKind::automatic) full.model.kind = ModelKind::fluid;
-    const auto simpler = simpler_models(full);
+}  // namespace
+
+ModelChoice choose_model(const Problem& given) {
+    Case full = given;
+    if (given.model.kind == ModelKind::automatic) full.model.kind = ModelKind::fluid;
+    const Problem c = full;
+    const auto simpler = simpler_models(c);
     if (!simpler.unknown.empty())
-        return {full.model.kind, "whether a simpler model does is unknown: " + simpler.unknown, true};
+        return {c.model.kind, "whether a simpler model does is unknown: " + simpler.unknown, true};
     for (const SimplerModel& m : simpler.models)
         if (m.rests || m.on_the_way <= c.accuracy.energy)
             return {m.kind,
                     m.rests ? fmt::format("nothing moves in a trial run of \"{}\"", model_entry(m.kind).name)
                             : fmt::format("the path of \"{}\" differs by about {} of E_ref from that of \"{}\"",
-                                          model_entry(m.kind).name, two_digits(m.on_the_way), name(full.model)),
+                                          model_entry(m.kind).name, two_digits(m.on_the_way), name(c.model)),
                     false, m.seconds};
     const SimplerModel& best = *std::ranges::min_element(simpler.models, {}, &SimplerModel::on_the_way);
-    return {full.model.kind,
+    return {c.model.kind,
             fmt::format("model \"{}\" would differ by about {} of E_ref on the way, by {} at the end",
                         model_entry(best.kind).name, two_digits(best.on_the_way), two_digits(best.at_end))};
 }
 
-ChosenCase with_model(const Case& c, const ModelChoice& choice) {
+ChosenCase with_model(const Problem& c, const ModelChoice& choice) {
     std::vector<std::string> sets = c.sets;
     sets.push_back(fmt::format("model.chosen={}", model_entry(choice.kind).name));
     return {parse_case(c.text, sets, c.path, inputs_of(c)), choice.reason, 0};
 }
 
-ChosenCase with_chosen_model(const Case& c) {
+ChosenCase with_chosen_model(const Problem& c) {
     if (c.model.kind != ModelKind::automatic) return {c, "", 0};
     const PauseWatch watch(c.time.limit, interrupted);
     const double before = watch.seconds();

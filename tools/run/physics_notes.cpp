@@ -14,16 +14,16 @@ namespace {
 
 constexpr double large = 3;  // of what the error may be
 
-std::string note(const Case& c, const std::string& key, const std::string& words) {
+std::string note(const Problem& c, const std::string& key, const std::string& words) {
     const auto place = c.places.find(key);
     return fmt::format("{}: note: {} {}", place == c.places.end() ? c.path : place->second, key, words);
 }
 
 // theory.md (5.14), (5.15): area, volume and length together keep the sum of the squares of all amplitudes, each with
 // its own weight.
-std::string frozen_wave(const Case& c) {
+std::string frozen_wave(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     if (!tube || !c.moves() || law.area_is_free() || !law.keeps_volume || law.free_period) return {};
     std::set<std::pair<int, int>> waves;
     for (const TubeMode& mode : tube->modes)
@@ -36,10 +36,11 @@ std::string frozen_wave(const Case& c) {
                             law.inextensible ? "reservoir" : "free"));
 }
 
-std::string sign_of_H0(const Case& c) {
+std::string sign_of_H0(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const auto* sphere = std::get_if<Sphere>(&c.shape);
-    if ((!tube && !sphere) || c.equilibrium || c.energy.H0_varies() || !(c.energy.H0 > 0)) return {};
+    if ((!tube && !sphere) || c.unknowns == Unknowns::equilibrium || c.energy.H0_varies() || !(c.energy.H0 > 0))
+        return {};
     const double H = tube ? -1 / tube->radius : -2 / sphere->radius;
     return note(c, "energy.H0",
                 fmt::format("= {:g} is positive, but H is negative on a {}: {} = {:.4g} here. H0 = {:.4g} would be "
@@ -47,7 +48,7 @@ std::string sign_of_H0(const Case& c) {
                             c.energy.H0, tube ? "tube" : "sphere", tube ? "-1/radius" : "-2/radius", H, H));
 }
 
-std::string renamed_key(const Case& c) {
+std::string renamed_key(const Problem& c) {
     if (!c.places.contains("discretisation.time_order")) return {};
     return note(
         c, "discretisation.time_order",
@@ -57,13 +58,13 @@ std::string renamed_key(const Case& c) {
 
 }  // namespace
 
-std::vector<std::string> physics_notes(const Case& c) {
+std::vector<std::string> physics_notes(const Problem& c) {
     std::vector<std::string> notes{frozen_wave(c), sign_of_H0(c), renamed_key(c)};
     std::erase(notes, "");
     return notes;
 }
 
-std::string balance_warning(const Case& c, const RunSummary& s, double identity_defect) {
+std::string balance_warning(const Problem& c, const RunSummary& s, double identity_defect) {
     const double part = std::abs(identity_defect) / s.reference_energy;
     const double allowed = std::max(c.accuracy.energy, s.error_is_known() ? s.estimated_error : 0);
     if (!(s.reference_energy > 0) || !(part > large * allowed)) return {};

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule {
 
 // Each with its place, for `check`, and for `run` before anything is computed.
-std::vector<std::string> physics_notes(const Case& c);
+std::vector<std::string> physics_notes(const Problem& c);
 
 // What a large residual of the energy balance means, the largest of the run; else empty.
-std::string balance_warning(const Case& c, const RunSummary& summary, double identity_defect);
+std::string balance_warning(const Problem& c, const RunSummary& summary, double identity_defect);
 
 }  // namespace tubule

@@ -8,7 +8,7 @@
 
 namespace tubule {
 
-TrialRun::TrialRun(const Case& c, const TrialLimits& limits) : limits_(limits) {
+TrialRun::TrialRun(const Problem& c, const TrialLimits& limits) : limits_(limits) {
     const auto engine = engine_for(c);
     series_ = engine->series_names();
     const auto begin = std::chrono::steady_clock::now();

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "common/run/energy_trace.hpp"
 #include "common/run/forecast.hpp"
 
@@ -23,7 +23,7 @@ struct TrialLimits {
 class TrialRun : public Pilot {
 public:
     // Runs the case. Throws as an engine and its run; Paused where a PauseWatch of this thread ends it.
-    TrialRun(const Case& c, const TrialLimits& limits);
+    TrialRun(const Problem& c, const TrialLimits& limits);
 
     void row(std::span<const double> values) override;
     void discard() override { energies = {}; }

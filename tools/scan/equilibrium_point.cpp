@@ -41,7 +41,7 @@ Outcome outcome_of_shape(const axisym::Equilibrium& shape, const ProfilePoints& 
 
 }  // namespace
 
-PointResult equilibrium_point(const Case& c, const std::function<bool()>& interrupted) {
+PointResult equilibrium_point(const Problem& c, const std::function<bool()>& interrupted) {
     Interruptible observer(interrupted);
     const auto [shape, modes] = axisym::find_shape(c, observer);
     PointResult p = unknown_point(0);
@@ -63,7 +63,7 @@ PointResult equilibrium_point(const Case& c, const std::function<bool()>& interr
         p[Measure::height] = measured.height;
         p[Measure::tension] = shape.sigma;
         p[Measure::pressure] = -shape.lambda;
-        const Loads loads = loads_at(motion_law(c.model), 0);
+        const Loads loads = loads_at(c.law, 0);
         p[Measure::free_energy] =
             shape.observed.energy + loads.energy(shape.observed.area, shape.observed.volume, shape.length);
     }

@@ -41,7 +41,7 @@ int column(const std::vector<std::string>& series, const char* name) {
 // Keeps the last row and the last frame, and ends the run when its fate is known.
 class Watch : public RunObserver {
 public:
-    Watch(const Case& c, const std::vector<std::string>& series, bool to_the_end,
+    Watch(const Problem& c, const std::vector<std::string>& series, bool to_the_end,
           const std::function<bool()>& interrupted)
         : interrupted_(interrupted) {
         for (const char* name : {"energy", "volume", "r_min", "r_max", "area"})
@@ -88,12 +88,12 @@ enum class Rest { here, on_its_way, on_a_saddle };
 // Whether a graph r(z) that hardly moves is at rest: the energy falls in no direction, and Newton's method sees the
 // stationary shape next to it so near that it is of the same kind. A wave that decays slowly fails the latter, for
 // Newton's step takes it away as a whole (or, where its rate vanishes, a third of it). What is no graph is believed.
-Rest rest_of(const Case& c, const Record& frame, double r_min, double r_max) {
+Rest rest_of(const Problem& c, const Record& frame, double r_min, double r_max) {
     if (kind_of(frame) != RecordKind::graph) return Rest::here;
     const axisym::GraphRestart state = axisym::graph_restart(frame);
     const int order = c.discretisation.order;
     const axisym::SplineSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
-    const axisym::Forms forms(space, c.energy, loads_at(motion_law(c.model), 0));
+    const axisym::Forms forms(space, c.energy, loads_at(c.law, 0));
     const Eigen::MatrixXd hessian = forms.hessian(state.coefficients), mass = forms.mass(state.coefficients);
     const std::optional<Eigenpairs> modes = eigenpairs(hessian, mass);
     if (!modes) return Rest::on_its_way;
@@ -115,7 +115,7 @@ double detail(const RunSummary& summary, std::string_view name) {
     return unknown;
 }
 
-PointResult summed_up(const Case& c, const RunSummary& s, const Watch& watch) {
+PointResult summed_up(const Problem& c, const RunSummary& s, const Watch& watch) {
     PointResult p;
     const EndShape end = watch.end(std::holds_alternative<Tube>(c.shape));
     const bool decided = watch.decided && s.stop.reason == Stop::interrupted;
@@ -136,10 +136,11 @@ PointResult summed_up(const Case& c, const RunSummary& s, const Watch& watch) {
 }
 
 // A run that ends as stationary without being at rest goes on from there, to where it really goes.
-PointResult computed(Case c, bool to_the_end, const std::function<bool()>& interrupted) {
-    c.time.output.clear();
+PointResult computed(Case given, bool to_the_end, const std::function<bool()>& interrupted) {
+    given.time.output.clear();
     double steps = 0;
     for (std::optional<Restart> from;;) {
+        const Problem c = given;
         const auto engine = engine_for(c);
         Watch watch(c, engine->series_names(), to_the_end, interrupted);
         const RunSummary summary = engine->run(watch, from ? &*from : nullptr);
@@ -151,9 +152,9 @@ PointResult computed(Case c, bool to_the_end, const std::function<bool()>& inter
         const Rest rest = rest_of(c, *watch.last_frame, r_min, r_max);
         if (rest == Rest::here) return p;
         if (rest == Rest::on_a_saddle)
-            c.time.stationary.reset();
+            given.time.stationary.reset();
         else
-            *c.time.stationary *= next_stationarity;
+            *given.time.stationary *= next_stationarity;
         from = Restart{std::move(*watch.last_frame)};
     }
 }
@@ -174,7 +175,7 @@ int stop_word(Stop reason) {
     return static_cast<int>(reason);
 }
 
-PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted) {
+PointResult run_point(const Problem& c, bool to_the_end, const std::function<bool()>& interrupted) {
     const PauseWatch watch(c.time.limit, interrupted);
     const double cpu = cpu_seconds();
     PointResult p;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 #include "tools/scan/outcome.hpp"
 
 namespace tubule {
@@ -59,14 +59,14 @@ int stop_word(Stop reason);
 
 // Runs a case. `to_the_end`: even where the outcome is known before. A run that `interrupted` ends has
 // Stop::interrupted and no result; other failures are outcomes, never thrown.
-PointResult run_point(const Case& c, bool to_the_end, const std::function<bool()>& interrupted);
+PointResult run_point(const Problem& c, bool to_the_end, const std::function<bool()>& interrupted);
 
 // A point that was not run.
 PointResult unknown_point(std::size_t point);
 std::vector<PointResult> unknown_points(std::size_t count);  // of a grid, in order
 
 // The shape that a case with [equilibrium] finds. Throws as the search.
-PointResult equilibrium_point(const Case& c, const std::function<bool()>& interrupted);
+PointResult equilibrium_point(const Problem& c, const std::function<bool()>& interrupted);
 
 // The result of a point whose keys are not a valid case.
 PointResult refused_point(const std::string& message);

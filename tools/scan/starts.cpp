@@ -19,11 +19,10 @@ bool is_of_start(const Axis& axis) {
 }
 
 // Whether all that is held has a value of its own, which the start does not change.
-bool holds_given_values(const Case& c) {
+bool holds_given_values(const Problem& c) {
     const EquilibriumChoices& e = *c.equilibrium;
-    const Held held = held_of(c);
-    if (held == Held::reduced_volume) return e.reduced_volume.has_value();
-    return (!holds_area(held) || e.area) && (!holds_volume(held) || e.volume || e.reduced_volume);
+    if (c.held == Held::reduced_volume) return e.reduced_volume.has_value();
+    return (!holds_area(c.held) || e.area) && (!holds_volume(c.held) || e.volume || e.reduced_volume);
 }
 
 bool at_rest(Outcome outcome) {
@@ -91,7 +90,7 @@ std::optional<std::size_t> start_axis(const Scan& scan) {
         found = a;
     }
     if (!found) return std::nullopt;
-    const Case c = scan.case_of(0);
+    const Problem c = scan.case_of(0);
     return c.equilibrium && holds_given_values(c) ? found : std::nullopt;
 }
 

@@ -35,9 +35,9 @@ bool only_k20(const Bending& energy) {
 
 // Whether its equilibria without energy are the surfaces of constant mean curvature H0, and of which period:
 // E = INT k20 (H-H0)^2 alone.
-std::optional<double> delaunay_period(const Case& c) {
+std::optional<double> delaunay_period(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     if (!tube || !law.unconstrained() || !law.without_loads()) return std::nullopt;
     const int waves = repeats(*tube);
     if (!only_k20(c.energy) || waves == 0) return std::nullopt;
@@ -46,11 +46,11 @@ std::optional<double> delaunay_period(const Case& c) {
 
 // Delaunay's unduloids of mean curvature H0 have periods between that of touching spheres of radius 2/|H0| and the
 // wave that is neutral on the tube of radius 1/|H0|.
-std::optional<double> longest_unduloid(const Case& c) {
+std::optional<double> longest_unduloid(const Problem& c) {
     const auto period = delaunay_period(c);
     return period ? std::optional(*period * std::abs(c.energy.H0) - 2 * std::numbers::pi) : std::nullopt;
 }
-std::optional<double> shortest_unduloid(const Case& c) {
+std::optional<double> shortest_unduloid(const Problem& c) {
     const auto period = delaunay_period(c);
     return period ? std::optional(*period * std::abs(c.energy.H0) - 4) : std::nullopt;
 }
@@ -58,10 +58,10 @@ std::optional<double> shortest_unduloid(const Case& c) {
 // The straight tube at rest. Gradient flow with free volume and without loads: radius 1/|H0|, if no term but k20
 // affects it. With loads that are constant and a radius that nothing keeps: where the radius of the start goes.
 // Otherwise the straight tube of the start; nothing if a fixed area and volume make the tension an unknown.
-std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
+std::optional<theory::UniformTube> tube_at_rest(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.equilibrium) return std::nullopt;
-    const MotionLaw law = motion_law(c.model);
+    const MotionLaw& law = c.law;
     if (law.loads_change()) return std::nullopt;
     const auto tension = theory::tension_of(law, c.energy, tube->radius);
     if (!tension) return std::nullopt;
@@ -82,7 +82,7 @@ std::optional<theory::UniformTube> tube_at_rest(const Case& c) {
 // What drives the waves of one m, of those that fit: -G of theory.md (5.8) of the one that is driven most. The models
 // differ in what they make of it, but not in its sign. For m = 0 those that repeat the cells of the start, as tier 1
 // does.
-std::optional<double> driven_most(const Case& c, int m) {
+std::optional<double> driven_most(const Problem& c, int m) {
     const auto tube = tube_at_rest(c);
     if (!tube) return std::nullopt;
     const auto& shape = std::get<Tube>(c.shape);
@@ -97,7 +97,7 @@ std::optional<double> driven_most(const Case& c, int m) {
     return std::abs(most) > 1e-12 * std::abs(G.q0) ? most : 0;  // without k42 they are neutral at q R = 1, not beyond
 }
 template <int m>
-std::optional<double> waves_around(const Case& c) {
+std::optional<double> waves_around(const Problem& c) {
     return driven_most(c, m);
 }
 
@@ -106,8 +106,8 @@ std::optional<double> waves_around(const Case& c) {
 struct Vesicle {
     double radius, reduced_volume;
 };
-std::optional<Vesicle> vesicle(const Case& c) {
-    if (!c.equilibrium || !std::holds_alternative<Sphere>(c.shape) || held_of(c) != Held::area_and_volume)
+std::optional<Vesicle> vesicle(const Problem& c) {
+    if (!c.equilibrium || !std::holds_alternative<Sphere>(c.shape) || c.held != Held::area_and_volume)
         return std::nullopt;
     const EquilibriumChoices& e = *c.equilibrium;
     if (!e.area || !(e.volume || e.reduced_volume) || !only_k20(c.energy)) return std::nullopt;
@@ -117,7 +117,7 @@ std::optional<Vesicle> vesicle(const Case& c) {
 
 // Vesicles end as two spheres that touch in a neck without size, where -H0 is the sum of their mean curvatures,
 // 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): docs/theory.md, section 8. `inside` -1: beside each other.
-std::optional<double> spheres_with_neck(const Case& c, double inside) {
+std::optional<double> spheres_with_neck(const Problem& c, double inside) {
     const auto v = vesicle(c);
     if (!v) return std::nullopt;
     // R1 = R cos a, R2 = R sin a; the reduced volume decreases from 1.
@@ -128,10 +128,10 @@ std::optional<double> spheres_with_neck(const Case& c, double inside) {
     const double neck = (inside / std::sin(low) - 1 / std::cos(low)) / v->radius;  // H0 of it
     return inside * (c.energy.H0 - neck);
 }
-std::optional<double> two_spheres(const Case& c) {
+std::optional<double> two_spheres(const Problem& c) {
     return spheres_with_neck(c, -1);
 }
-std::optional<double> sphere_in_sphere(const Case& c) {
+std::optional<double> sphere_in_sphere(const Problem& c) {
     return spheres_with_neck(c, 1);
 }
 
@@ -167,7 +167,7 @@ std::vector<ThresholdMap> threshold_maps(const Scan& scan) {
         maps.push_back({threshold.name, threshold.label, some_of(axes[0].size()), some_of(axes[1].size()), {}});
     for (const std::size_t i : maps.front().first)
         for (const std::size_t j : maps.front().second) {
-            std::optional<Case> c;
+            std::optional<Problem> c;
             try {
                 c = scan.case_of(nodes.point_of(i * axes[1].size() + j, 0));
             } catch (const CaseError&) {  // no case, no line

@@ -5,14 +5,15 @@
 #include <string>
 #include <vector>
 
+#include "common/case/problem.hpp"
 #include "tools/scan/description.hpp"
 
 namespace tubule {
 
 struct Threshold {
-    std::string name;                               // of its group in the file
-    std::string label;                              // in pictures
-    std::optional<double> (*value)(const Case& c);  // empty where it does not apply to the case
+    std::string name;                                  // of its group in the file
+    std::string label;                                 // in pictures
+    std::optional<double> (*value)(const Problem& c);  // empty where it does not apply to the case
 };
 
 // All that are known: to add one, see theory.cpp.

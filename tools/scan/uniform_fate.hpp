@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "common/case/case.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule {
 
@@ -16,7 +16,7 @@ struct TubeState {
 class UniformFate {
 public:
     // Empty where the relation does not apply: other models and shapes, a volume that is kept, an f with f_HK.
-    static std::optional<UniformFate> of(const Case& c);
+    static std::optional<UniformFate> of(const Problem& c);
 
     // Whether the waves are small, in amplitude and in energy, and each that the symmetry of the start allows decays
     // relative to the radius, by a margin, at every radius from here to the one where the tube rests.
