@@ -546,7 +546,6 @@ class Drawing(Folder):
         self.same(TUBE)
 
     def test_surfaces(self):
-        self.same(SURFACE, kind="balance")
         self.same(SURFACE, kind="cuts")
 
     def test_scans(self):
