@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "common/solve/pause.hpp"
-#include "surface3d/mesh/reference_triangle.hpp"
 
 namespace tubule::surface3d {
 
@@ -121,12 +120,16 @@ TriangleMesh node_triangles(const CurvedMesh& mesh, int images) {
     return flat;
 }
 
+Tabulation at_nodes(int order, int of_order) {
+    std::vector<QuadraturePoint> points;
+    for (const auto& [i, j, l] : lattice(of_order))
+        points.push_back({static_cast<double>(j) / of_order, static_cast<double>(l) / of_order, 0});
+    return Tabulation(order, points);
+}
+
 CurvedMesh with_order(const CurvedMesh& mesh, int order) {
     CurvedMesh out = flat_mesh(corner_triangles(mesh), order);
-    std::vector<QuadraturePoint> points;
-    for (const auto& [i, j, l] : lattice(order))
-        points.push_back({static_cast<double>(j) / order, static_cast<double>(l) / order, 0});
-    const Tabulation table(mesh.order, points);
+    const Tabulation table = at_nodes(mesh.order, order);
     for (int cell = 0; cell < out.triangles(); ++cell) {
         if (cell % 1024 == 0) check_pause();
         Eigen::Matrix3Xd X(3, mesh.nodes_per_cell());

@@ -3,6 +3,7 @@
 
 #include "common/geometry/surface_point.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
+#include "surface3d/mesh/reference_triangle.hpp"
 #include "surface3d/mesh/triangle_mesh.hpp"
 
 namespace tubule::surface3d {
@@ -17,6 +18,9 @@ TriangleMesh corner_triangles(const CurvedMesh& mesh);
 // The flat triangles between the nodes, order^2 in each cell, those of a cell together; of a tube, which is cut open,
 // `images` periods.
 TriangleMesh node_triangles(const CurvedMesh& mesh, int images = 1);
+
+// The functions of P_order at the nodes of P_of_order.
+Tabulation at_nodes(int order, int of_order);
 
 // The interpolant of another order of the same triangles.
 CurvedMesh with_order(const CurvedMesh& mesh, int order);

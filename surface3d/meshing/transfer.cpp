@@ -6,6 +6,7 @@
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/fem/surface_space.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/remesh_sizes.hpp"
 
 namespace tubule::surface3d {
@@ -24,19 +25,12 @@ std::vector<CellNode> cells_of_nodes(const CurvedMesh& mesh) {
     return out;
 }
 
-Tabulation at_nodes(int order) {
-    std::vector<QuadraturePoint> points;
-    for (const auto& [i, j, l] : lattice(order))
-        points.push_back({static_cast<double>(j) / order, static_cast<double>(l) / order, 0});
-    return Tabulation(order, points);
-}
-
 }  // namespace
 
 std::vector<MeshPoint> places_of_nodes(const CurvedMesh& nodes, const CurvedMesh& on) {
     const ClosestPoint closest(on);
     const std::vector<CellNode> seen = cells_of_nodes(nodes);
-    const Tabulation table = at_nodes(nodes.order);
+    const Tabulation table = at_nodes(nodes.order, nodes.order);
     std::vector<MeshPoint> out(nodes.size());
     SharedPause pause;
     parallel_for(out.size(), [&](std::size_t i) {

@@ -126,10 +126,7 @@ VectorField MovingSurface::velocity(const MotionState& state, const MotionFields
 Eigen::VectorXd MovingSurface::pressure_at_nodes(const MotionState& state) const {
     const CurvedMesh& own = pressure_mesh_;
     if (own.order == mesh_.order) return state.p;
-    std::vector<QuadraturePoint> nodes;
-    for (const auto& [i, j, l] : lattice(mesh_.order))
-        nodes.push_back({static_cast<double>(j) / mesh_.order, static_cast<double>(l) / mesh_.order, 0});
-    const Tabulation table(own.order, nodes);
+    const Tabulation table = at_nodes(own.order, mesh_.order);
     Eigen::VectorXd out(mesh_.size());
     for (int cell = 0; cell < mesh_.triangles(); ++cell)
         for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
