@@ -1,5 +1,6 @@
 #include "surface3d/import/import_cgal.hpp"
 
+#include <CGAL/Eigen_matrix.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
 #include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
@@ -8,8 +9,11 @@
 #include <CGAL/alpha_wrap_3.h>
 
 #include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <vector>
+
+#include "common/solve/sparse.hpp"
 
 namespace tubule::surface3d::cgal {
 
@@ -54,6 +58,28 @@ TriangleMesh to(const Mesh& in) {
     return out;
 }
 
+// Solves the systems of fairing by KLU: Eigen's SparseLU, CGAL's default, takes longer to compile.
+struct FairingSolver {
+    using Matrix = CGAL::Eigen_sparse_matrix<double>;
+    using Vector = CGAL::Eigen_vector<double>;
+    using NT = double;
+    std::shared_ptr<SparseLu> lu = std::make_shared<SparseLu>();  // CGAL copies the solver
+
+    bool factor(const Matrix& A, double& scale) try {
+        scale = 1;
+        lu->factor(A.eigen_object());
+        return true;
+    } catch (const SolveError&) {
+        return false;
+    }
+    bool linear_solver(const Vector& B, Vector& X) try {
+        X = lu->solve(B);
+        return true;
+    } catch (const SolveError&) {
+        return false;
+    }
+};
+
 double boundary_length(const Mesh& mesh, Mesh::Halfedge_index of) {
     double length = 0;
     for (const auto h : CGAL::halfedges_around_face(of, mesh))
@@ -86,7 +112,7 @@ FilledHoles fill_holes(const TriangleMesh& in) {
         std::vector<Mesh::Face_index> faces;
         std::vector<Mesh::Vertex_index> vertices;
         pmp::triangulate_refine_and_fair_hole(mesh, border, std::back_inserter(faces), std::back_inserter(vertices),
-                                              CGAL::parameters::default_values());
+                                              CGAL::parameters::sparse_linear_solver(FairingSolver()));
         faces.empty() ? ++out.left : ++out.holes;
     }
     out.mesh = to(mesh);
