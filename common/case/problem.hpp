@@ -26,7 +26,7 @@ struct Problem : Case {
     MotionLaw law;    // without chosen loads: equilibria have their own
     Held held{};      // by an equilibrium
     Scheme scheme{};  // of a surface in motion
-    // Of a surface: 2, 3, 4. In motion the fourth is more accurate, the third suffices for a single shape
+    // Elements of a surface: 2, 3, 4. In motion the fourth is more accurate, the third suffices for a single shape
     // (docs/decisions/surface_motion.md).
     int element_order = 0;
     double begin_time = 0;  // of a surface that continues a motion of tier axisym

@@ -25,6 +25,24 @@ struct RunObserver {
     virtual void note(const std::string& /*words*/) {}  // a message to show at once
 };
 
+// Hands everything on.
+class PassingOn : public RunObserver {
+public:
+    explicit PassingOn(RunObserver& to) : to_(to) {}
+    void row(std::span<const double> values) override { to_.row(values); }
+    std::size_t mesh(const SurfaceCells& cells) override { return to_.mesh(cells); }
+    void frame(const std::function<Record()>& make) override { to_.frame(make); }
+    void checkpoint(const Record& state) override { to_.checkpoint(state); }
+    void discard() override { to_.discard(); }
+    void next_run(int number, int of) override { to_.next_run(number, of); }
+    void progress(double time, double energy, double step) override { to_.progress(time, energy, step); }
+    bool interrupted() override { return to_.interrupted(); }
+    void note(const std::string& words) override { to_.note(words); }
+
+private:
+    RunObserver& to_;
+};
+
 // Whether the run was stopped from outside, and can be resumed as if it had not been.
 inline bool can_go_on(Stop reason) {
     return reason == Stop::interrupted || reason == Stop::time_limit;
@@ -36,8 +54,9 @@ struct RunSummary {
     double reference_energy = 0;  // E_ref, theory.md (11.1): asked and estimated errors are relative to it
     double estimated_error = 0;   // of the energy, largest over the run, relative to E_ref; 1 where it is unknown
     bool as_accurate_as_asked = true;
-    int attempts = 1;  // how often the run began again with finer settings, plus one
-    int elements = 0;  // at the stop; of a tube over one period
+    int attempts = 1;     // how often the run began again with finer settings, plus one
+    int elements = 0;     // at the stop; of a tube over one period
+    int rough_steps = 0;  // of surfaces: those after which they are rough for their mesh
     std::vector<std::string> warnings;
     std::string effort;  // in words, such as "85 steps, 96 elements"
     About details;       // more of it, by name

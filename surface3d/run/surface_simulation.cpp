@@ -472,6 +472,7 @@ std::unique_ptr<StateView> SurfaceSimulation::at(double) {
 void SurfaceSimulation::summarise() {
     summary.details = {{"pairs", std::int64_t{memory_.settings.pair}}};
     if (!scheme_) return;
+    summary.rough_steps = memory_.count.rough;
     warn_of_drift();
     const int nodes = static_cast<int>(state_.X.cols());
     summary.effort = fmt::format("{} steps ({} rejected), {} triangles of order {}, {} nodes", memory_.count.steps,

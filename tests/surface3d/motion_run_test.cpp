@@ -14,7 +14,6 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/coarser_run.hpp"
-#include "surface3d/run/motion_forecast.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/run.hpp"
@@ -159,17 +158,6 @@ end = 0.015
     EXPECT_GT(o.summary.estimated_error * o.summary.reference_energy, 1.37 * defect);
     const std::vector<double> errors = o.series("energy_error"), defects = o.series("identity_defect");
     for (std::size_t i = 0; i < errors.size(); ++i) EXPECT_GE(errors[i], 1.37 * std::abs(defects[i]));
-}
-
-TEST(MotionForecast, FinerRunsMayFollowForRoughFluids) {
-    const auto may_follow = [](const std::string& kind, const std::string& shape) {
-        const Case c = begin("[energy]\nk20 = 0.125\nk42 = 0.12\n[shape]\n" + shape + "[time]\nend = 0.005\n",
-                             {"model.kind=" + kind, "accuracy.energy=1e-3"})
-                           .c;
-        return forecast_motion(c, Start(c)).finer_runs;
-    };
-    EXPECT_TRUE(may_follow("fluid", "kind = \"capsule\"\nradius = 0.5\nlength = 1.0\n"));
-    EXPECT_FALSE(may_follow("fluid", "kind = \"ellipsoid\"\na = 1.3\nb = 1\nc = 0.8\n"));
 }
 
 TEST(MotionSettings, WhatHasSpedUpMayBeLate) {

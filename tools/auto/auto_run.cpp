@@ -134,7 +134,7 @@ public:
         : TierPart(file, std::move(map)), growth_(growth), end_(end) {}
     void row(std::span<const double> values) override {
         before.rows.push_back(map_(values));
-        file_.row(before.rows.back());
+        PassingOn::row(before.rows.back());
     }
     void frame(const std::function<Record()>& make) override {
         Record record = make();
@@ -145,11 +145,11 @@ public:
             write(std::move(record));
     }
     void write(Record record) {
-        file_.frame([&] { return record; });
+        TierPart::frame([&] { return record; });
         before.frames.push_back(std::move(record));
     }
     void discard() override {
-        file_.discard();
+        TierPart::discard();
         before = {};
         last.reset();
     }

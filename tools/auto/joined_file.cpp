@@ -64,9 +64,9 @@ Before axisymmetric_part(const Result& unfinished) {
 }
 
 void SurfacePart::discard() {
-    file_.discard();
-    for (const std::vector<double>& row : before_.rows) file_.row(row);
-    for (const Record& frame : before_.frames) file_.frame([&] { return frame; });
+    TierPart::discard();
+    for (const std::vector<double>& row : before_.rows) PassingOn::row(row);
+    for (const Record& frame : before_.frames) TierPart::frame([&] { return frame; });
 }
 
 }  // namespace tubule

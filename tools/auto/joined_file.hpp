@@ -37,20 +37,13 @@ struct Before {
 Before axisymmetric_part(const Result& unfinished);
 
 // A run in one tier, as a part of the file.
-class TierPart : public RunObserver {
+class TierPart : public PassingOn {
 public:
-    TierPart(RunObserver& file, RowMap map) : file_(file), map_(std::move(map)) {}
-    void row(std::span<const double> values) override { file_.row(map_(values)); }
-    std::size_t mesh(const SurfaceCells& cells) override { return file_.mesh(cells); }
-    void frame(const std::function<Record()>& make) override { file_.frame(make); }
-    void checkpoint(const Record& state) override { file_.checkpoint(state); }
-    void discard() override { file_.discard(); }
-    void next_run(int number, int of) override { file_.next_run(number, of); }
-    void progress(double time, double energy, double step) override { file_.progress(time, energy, step); }
-    bool interrupted() override { return file_.interrupted(); }
+    TierPart(RunObserver& file, RowMap map) : PassingOn(file), map_(std::move(map)) {}
+    void row(std::span<const double> values) override { PassingOn::row(map_(values)); }
+    void note(const std::string&) override {}  // notes are of the whole run
 
 protected:
-    RunObserver& file_;
     RowMap map_;
 };
 

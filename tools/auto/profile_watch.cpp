@@ -53,17 +53,17 @@ void ProfileWatch::frame(const std::function<Record()>& make) {
     Record record = make();
     look_at(record);
     record = with_amplitudes(std::move(record));
-    if (!only_for_rates_.contains(record.time)) file_.frame([&] { return record; });
+    if (!only_for_rates_.contains(record.time)) TierPart::frame([&] { return record; });
     last_frame_ = std::move(record);
 }
 
 void ProfileWatch::checkpoint(const Record& state) {
     look_at(state);
-    file_.checkpoint(with_amplitudes(state));
+    TierPart::checkpoint(with_amplitudes(state));
 }
 
 void ProfileWatch::discard() {
-    file_.discard();
+    TierPart::discard();
     growth_.forget();
     known_ = {};
     last_time_ = -1;

@@ -29,7 +29,7 @@ public:
     void frame(const std::function<Record()>& make) override;
     void checkpoint(const Record& state) override;
     void discard() override;
-    bool interrupted() override { return reached_ || file_.interrupted(); }
+    bool interrupted() override { return reached_ || TierPart::interrupted(); }
 
     const NoiseGrowth& growth() const { return growth_; }
     const RatesKnown& known() const { return known_; }

@@ -107,7 +107,7 @@ Checked checked(const std::string& path, const CheckOptions& options) {
         for (const std::string& note : physics_notes(given)) out.warnings.push_back(valid_utf8(note));
         const Problem c = chosen_case(given, options, out);
         out.chosen = chosen(c);
-        if (const std::string warning = engine_for(c)->warning(); !warning.empty())
+        if (const std::string warning = Engine(c).warning(); !warning.empty())
             out.warnings.push_back(fmt::format("{}: warning: {}", shown_path(path), warning));
         if (const auto ill_posed = ill_posed_start(c)) throw *ill_posed;
         if (!options.quick)

@@ -16,7 +16,6 @@
 #include "axisym/graph/graph_derivatives.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
-#include "common/result/durable_io.hpp"
 #include "common/result/record.hpp"
 #include "common/result/result.hpp"
 #include "common/result/start_frame.hpp"
@@ -31,11 +30,11 @@
 #include "tools/command/text.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/engine.hpp"
-#include "tools/run/failure.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/run/ill_posed_start.hpp"
 #include "tools/run/model_advice.hpp"
 #include "tools/run/physics_notes.hpp"
+#include "tools/run/run_to_end.hpp"
 
 namespace tubule {
 
@@ -103,29 +102,13 @@ namespace {
 class Recorder : public RunObserver {
 public:
     // `from`: the state that the run resumes from, or none.
-    Recorder(const Problem& c, ResultWriter& writer, const std::vector<std::string>& series, bool quiet,
-             const Record* from)
-        : case_(c),
-          writer_(writer),
-          defect_column_(static_cast<std::size_t>(std::ranges::find(series, "identity_defect") - series.begin())),
-          quiet_(quiet),
-          progress_(from ? from->time : 0, c.time.end, {.quiet = quiet}) {}
-    void row(std::span<const double> values) override {
-        writer_.row(values);
-        reached_ = values.front();
-        if (defect_column_ < values.size()) defect_ = std::max(defect_, std::abs(values[defect_column_]));
-    }
+    Recorder(const Problem& c, ResultWriter& writer, bool quiet, const Record* from)
+        : case_(c), writer_(writer), quiet_(quiet), progress_(from ? from->time : 0, c.time.end, {.quiet = quiet}) {}
+    void row(std::span<const double> values) override { writer_.row(values); }
     std::size_t mesh(const SurfaceCells& cells) override { return writer_.mesh(cells); }
-    void frame(const std::function<Record()>& make) override {
-        const Record record = make();
-        if (const std::string cost = frames_++ == 0 ? cost_of_frames(case_, record) : ""; !cost.empty()) note(cost);
-        writer_.frame(record);
-    }
+    void frame(const std::function<Record()>& make) override { writer_.frame(make()); }
     void checkpoint(const Record& state) override { writer_.checkpoint(state); }
-    void discard() override {
-        defect_ = 0;
-        writer_.discard();
-    }
+    void discard() override { writer_.discard(); }
     void next_run(int number, int of) override { progress_.next_run(number, of); }
     void progress(double time, double energy, double step) override { progress_(time, energy, step); }
     bool interrupted() override { return tubule::interrupted(); }
@@ -134,20 +117,11 @@ public:
         if (!quiet_) say(stderr, "{}{}: {}\n", wiped, case_.path, words);
     }
 
-    // The time of the last row, of this run.
-    std::optional<double> reached() const { return reached_; }
-    // The largest identity_defect until then.
-    double defect() const { return defect_; }
-
 private:
     const Problem& case_;
     ResultWriter& writer_;
-    std::size_t defect_column_;
-    double defect_ = 0;
     bool quiet_;
     Progress progress_;
-    std::optional<double> reached_;
-    int frames_ = 0;
 };
 
 bool has_rows(const std::filesystem::path& file) {
@@ -261,32 +235,6 @@ std::optional<Opened> open_result(const ChosenCase& c, const Engine& engine, con
     }
 }
 
-struct Ended {
-    RunSummary summary;
-    bool failed = false;  // by an exception
-};
-
-// A run that cannot go on is at its end, too: rows and frames until then are kept. Passes on bad input that is found
-// before there is a row, and errors of the disk: the file has what was written until then.
-Ended run_to_its_end(const Problem& c, const Engine& engine, Opened& result, Recorder& recorder) {
-    const auto failed = [&](const std::exception& error) {
-        return Ended{failed_run(c, error, recorder.reached()), true};
-    };
-    try {
-        Ended ended{engine.run(recorder, result.restart ? &*result.restart : nullptr,
-                               result.unfinished ? &*result.unfinished : nullptr)};
-        if (ended.summary.stop.reason == Stop::solver_failed) blame_extreme_numbers(c, ended.summary.stop);
-        return ended;
-    } catch (const durable::Error&) {
-        throw;
-    } catch (const CaseError& error) {
-        if (!result.writer.began()) throw;
-        return failed(error);
-    } catch (const std::exception& error) {
-        return failed(error);
-    }
-}
-
 // A frame at a time that lies behind cannot be written any more.
 void tell_missed_outputs(const Problem& c, const Result& result, double from) {
     if (const auto missed = missed_outputs(c, result, from); !missed.empty())
@@ -307,9 +255,9 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
     if (!c.input) c.input = current_input(c);
     PauseWatch watch(c.time.limit, tubule::interrupted);  // the start counts, too
     watch.discount(-chosen.seconds);
-    const auto engine = engine_for(c);
+    const Engine engine(c);
     const double before = watch.seconds();
-    std::optional<Opened> result = open_result(chosen, *engine, file, options.resume);
+    std::optional<Opened> result = open_result(chosen, engine, file, options.resume);
     if (!result) {
         if (!options.quiet) say(stdout, "{}: {} is complete, nothing to resume\n", c.path, file.string());
         return options.expect ? compare(c, file) : 0;
@@ -320,19 +268,17 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
     watch.discount(watch.seconds() - before);  // or a large result could never be resumed under a short limit
     if (!options.quiet && !result->restart)
         for (const std::string& note : physics_notes(c)) say(stderr, "{}\n", note);
-    if (const std::string warning = engine->warning(); !warning.empty() && !options.quiet)
+    if (const std::string warning = engine.warning(); !warning.empty() && !options.quiet)
         say(stderr, "{}: warning: {}\n", c.path, warning);
-    if (!options.quiet && !result->restart)
-        if (const auto forecast = engine->forecast_if_long())
+    if (!options.quiet && !result->restart && engine.start())
+        if (const auto forecast = forecast_if_long(c, *engine.start()))
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
     Ended ended;
     {
-        Recorder recorder(c, result->writer, engine->series_names(),
-                          options.quiet || c.unknowns == Unknowns::equilibrium,
+        Recorder recorder(c, result->writer, options.quiet || c.unknowns == Unknowns::equilibrium,
                           result->restart ? &result->restart->record : nullptr);
-        ended = run_to_its_end(c, *engine, *result, recorder);
-        if (const std::string off = balance_warning(c, ended.summary, recorder.defect()); !off.empty())
-            ended.summary.warnings.push_back(off);
+        ended = run_to_end(engine, recorder, result->restart ? &*result->restart : nullptr,
+                           result->unfinished ? &*result->unfinished : nullptr);
     }
     const RunSummary& summary = ended.summary;
     const double seconds = watch.seconds();

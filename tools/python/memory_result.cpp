@@ -4,27 +4,22 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <stdexcept>
 
 #include "common/case/read.hpp"
-#include "common/result/durable_io.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/run/engine.hpp"
-#include "tools/run/failure.hpp"
-#include "tools/run/forecast.hpp"
-#include "tools/run/physics_notes.hpp"
+#include "tools/run/run_to_end.hpp"
 
 namespace tubule {
 namespace {
 
 class Memory : public RunObserver {
 public:
-    Memory(const Problem& c, Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
-        : case_(c), result_(result), options_(options), writer_(writer) {}
+    Memory(Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+        : result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
         for (std::size_t i = 0; i < values.size(); ++i) result_.series.at(result_.series_names[i]).push_back(values[i]);
@@ -39,8 +34,6 @@ public:
     }
     void frame(const std::function<Record()>& make) override {
         result_.frames.push_back(make());
-        if (result_.frames.size() == 1)
-            if (const std::string cost = cost_of_frames(case_, result_.frames.back()); !cost.empty()) note(cost);
         if (writer_) writer_->frame(result_.frames.back());
     }
     void checkpoint(const Record& state) override {
@@ -64,31 +57,11 @@ public:
     }
 
 private:
-    const Problem& case_;
     Result& result_;
     const MemoryRunOptions& options_;
     std::optional<ResultWriter>& writer_;
     std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now();
 };
-
-RunSummary run_to_its_end(const Problem& c, const Engine& engine, const Result& result, RunObserver& observer) {
-    const auto reached = [&]() -> std::optional<double> {
-        const std::vector<double>& times = result.series.at("time");
-        return times.empty() ? std::nullopt : std::optional(times.back());
-    };
-    try {
-        RunSummary summary = engine.run(observer);
-        if (summary.stop.reason == Stop::solver_failed) blame_extreme_numbers(c, summary.stop);
-        return summary;
-    } catch (const durable::Error&) {
-        throw;
-    } catch (const CaseError&) {
-        throw;
-    } catch (const std::exception& error) {
-        if (!reached()) throw std::runtime_error(c.path + ": " + failure_of(c, error, {}).message);
-        return failed_run(c, error, reached());
-    }
-}
 
 }  // namespace
 
@@ -100,26 +73,22 @@ Result run_in_memory(const Problem& given, const MemoryRunOptions& options) {
                                     chosen.c.path, changed));
     if (!chosen.c.input) chosen.c.input = current_input(chosen.c);
     const Problem& c = chosen.c;
-    const auto engine = engine_for(c);
+    const Engine engine(c);
     Result result;
     result.case_text = kept_case(c);
     result.about = about_start();
     add_choice(result.about, chosen);
-    result.series_names = engine->series_names();
+    result.series_names = engine.series_names();
     for (const std::string& name : result.series_names) result.series[name];
     std::optional<ResultWriter> writer;
     if (options.output) {
         check_replaced(c, *options.output, options.overwrite);
         writer = ResultWriter::create(*options.output, result.case_text, result.about, result.series_names);
     }
-    Memory memory(c, result, options, writer);
-    RunSummary summary = run_to_its_end(c, *engine, result, memory);
-    if (const auto series = result.series.find("identity_defect"); series != result.series.end()) {
-        double defect = 0;
-        for (const double one : series->second) defect = std::max(defect, std::abs(one));
-        if (std::string off = balance_warning(c, summary, defect); !off.empty()) summary.warnings.push_back(off);
-    }
-    const About end = about_end(c, summary, watch.seconds());
+    Memory memory(result, options, writer);
+    const Ended ended = run_to_end(engine, memory);
+    if (ended.failed && !ended.reached) throw std::runtime_error(c.path + ": " + ended.summary.stop.message);
+    const About end = about_end(c, ended.summary, watch.seconds());
     result.about.insert(result.about.end(), end.begin(), end.end());
     if (writer && writer->began()) writer->finish(end);
     return result;

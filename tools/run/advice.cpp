@@ -9,7 +9,6 @@
 #include "common/run/run.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/choice.hpp"
-#include "tools/run/forecast.hpp"
 #include "tools/run/model_advice.hpp"
 #include "tools/run/trial_run.hpp"
 
@@ -42,11 +41,6 @@ void choose_tier(const Problem& c, const Forecast& expected, Advice& out) {
     out.tier = "axisym";
     const bool of_surface = c.unknowns == Unknowns::moving_surface;
     out.seconds = of_surface ? forecast(c.of_profile(c.time.end, {})).seconds : expected.seconds;
-}
-
-// Two digits.
-std::string number(double value) {
-    return fmt::format("{:.2g}", value);
 }
 
 void choose_mesh(const Problem& c, const surface3d::Start& start, const Forecast& expected, Advice& out) {
@@ -84,7 +78,7 @@ std::optional<Advice> advice(const Problem& c, const Forecast& expected) {
 }
 
 std::string words(const Advice& a) {
-    const std::string time = a.seconds ? fmt::format(": some {} s", number(std::max(*a.seconds, 0.1))) : "";
+    const std::string time = a.seconds ? fmt::format(": some {:.2g} s", std::max(*a.seconds, 0.1)) : "";
     const std::string mesh = a.elements ? fmt::format("{} elements, ", *a.elements) : "";
     return fmt::format("tier {}, model {}, {}accuracy {:g}{}; {}", a.tier, a.model, mesh, a.accuracy, time, a.reason);
 }

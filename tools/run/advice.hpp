@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/case/problem.hpp"
-#include "common/run/forecast.hpp"
+#include "tools/run/forecast.hpp"
 
 namespace tubule {
 

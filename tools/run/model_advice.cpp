@@ -147,10 +147,6 @@ std::string untold(const Problem& c, const Choice& choice) {
     return {};
 }
 
-std::string two_digits(double value) {
-    return fmt::format("{:.2g}", value);
-}
-
 // By trial runs of these models: of an axisymmetric start in tier axisym, while no mode m > 0 grows if the case has
 // another tier, else on 80 triangles. Nothing is known where a velocity is given, loads or a reservoir act, a start
 // brings its own triangles, or a trial run does not come to its end. Where nothing moves the simplest is the only one.
@@ -186,13 +182,13 @@ ModelChoice choose_model(const Problem& given) {
         if (m.rests || m.on_the_way <= c.accuracy.energy)
             return {m.kind,
                     m.rests ? fmt::format("nothing moves in a trial run of \"{}\"", model_entry(m.kind).name)
-                            : fmt::format("the path of \"{}\" differs by about {} of E_ref from that of \"{}\"",
-                                          model_entry(m.kind).name, two_digits(m.on_the_way), name(c.model)),
+                            : fmt::format("the path of \"{}\" differs by about {:.2g} of E_ref from that of \"{}\"",
+                                          model_entry(m.kind).name, m.on_the_way, name(c.model)),
                     false, m.seconds};
     const SimplerModel& best = *std::ranges::min_element(simpler.models, {}, &SimplerModel::on_the_way);
     return {c.model.kind,
-            fmt::format("model \"{}\" would differ by about {} of E_ref on the way, by {} at the end",
-                        model_entry(best.kind).name, two_digits(best.on_the_way), two_digits(best.at_end))};
+            fmt::format("model \"{}\" would differ by about {:.2g} of E_ref on the way, by {:.2g} at the end",
+                        model_entry(best.kind).name, best.on_the_way, best.at_end)};
 }
 
 ChosenCase with_model(const Problem& c, const ModelChoice& choice) {

@@ -4,22 +4,20 @@
 #include <chrono>
 
 #include "common/solve/pause.hpp"
-#include "tools/run/engine.hpp"
 
 namespace tubule {
 
-TrialRun::TrialRun(const Problem& c, const TrialLimits& limits) : limits_(limits) {
-    const auto engine = engine_for(c);
-    series_ = engine->series_names();
+TrialRun::TrialRun(const Engine& engine, const TrialLimits& limits) : limits_(limits), series_(engine.series_names()) {
     const auto begin = std::chrono::steady_clock::now();
     begin_ = std::clock();
-    summary = engine->run(*this);
-    seconds = std::min(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), since_begin());
+    summary = engine.run(*this);
+    seconds = std::min(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), since(begin_));
+    cpu_of_steps = since(first_row_);
     pause_if_due();
 }
 
 void TrialRun::row(std::span<const double> values) {
-    ++rows_;
+    if (rows_++ == 0) first_row_ = std::clock();
     const auto value = [&](const char* name) {
         const auto column = static_cast<std::size_t>(std::ranges::find(series_, name) - series_.begin());
         return column < values.size() ? values[column] : 0;

@@ -12,8 +12,7 @@
 #include "common/case/read.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/dense.hpp"
-#include "tools/run/engine.hpp"
-#include "tools/run/failure.hpp"
+#include "tools/run/run_to_end.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
 namespace tubule {
@@ -141,9 +140,9 @@ PointResult computed(Case given, bool to_the_end, const std::function<bool()>& i
     double steps = 0;
     for (std::optional<Restart> from;;) {
         const Problem c = given;
-        const auto engine = engine_for(c);
-        Watch watch(c, engine->series_names(), to_the_end, interrupted);
-        const RunSummary summary = engine->run(watch, from ? &*from : nullptr);
+        const Engine engine(c);
+        Watch watch(c, engine.series_names(), to_the_end, interrupted);
+        const RunSummary summary = engine.run(watch, from ? &*from : nullptr);
         PointResult p = summed_up(c, summary, watch);
         p[Measure::steps] = steps += p[Measure::steps];
         if (summary.stop.reason != Stop::stationary || !watch.last_frame) return p;

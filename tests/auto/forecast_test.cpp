@@ -1,12 +1,15 @@
-// What a pilot run tells of the whole run.
-#include "common/run/forecast.hpp"
+// What a trial run tells of the whole run.
+#include "tools/run/forecast.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "common/case/read.hpp"
+#include "tools/run/trial_run.hpp"
+
 namespace tubule {
-namespace forecast_test {
+namespace {
 
 Pilot pilot(int steps, double first, double growth) {
     Pilot out;
@@ -28,5 +31,15 @@ TEST(Pilot, CollapsesWhereItsStepsBecomeFarShorterThanTheyWere) {
     EXPECT_TRUE(pilot(10, 0.01, 0.5).has_collapsed());
 }
 
-}  // namespace forecast_test
+TEST(MotionForecast, FinerRunsMayFollowForRoughFluids) {
+    const auto may_follow = [](const std::string& kind, const std::string& shape) {
+        const std::string text =
+            "tier = \"surface3d\"\n[energy]\nk20 = 0.125\nk42 = 0.12\n[shape]\n" + shape + "[time]\nend = 0.005\n";
+        return forecast(parse_case(text, {"model.kind=" + kind, "accuracy.energy=1e-3"}, "case.toml")).finer_runs;
+    };
+    EXPECT_TRUE(may_follow("fluid", "kind = \"capsule\"\nradius = 0.5\nlength = 1.0\n"));
+    EXPECT_FALSE(may_follow("fluid", "kind = \"ellipsoid\"\na = 1.3\nb = 1\nc = 0.8\n"));
+}
+
+}  // namespace
 }  // namespace tubule

@@ -1,0 +1,125 @@
+#include "tools/run/run_to_end.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <string>
+
+#include "common/case/read.hpp"
+#include "common/result/durable_io.hpp"
+#include "tools/run/forecast.hpp"
+#include "tools/run/physics_notes.hpp"
+
+namespace tubule {
+namespace {
+
+// Beyond this, and below its inverse, fourth powers and their products with a modulus need not be finite.
+constexpr double extreme = 1e50;
+
+// Numbers of a case beyond that, "key = value", joined by commas.
+std::string extreme_numbers(const toml::node& node, const std::string& key) {
+    std::string found;
+    const auto add = [&](const std::string& more) {
+        if (!more.empty()) found += (found.empty() ? "" : ", ") + more;
+    };
+    const auto under = [&](std::string_view name) {
+        return key.empty() ? std::string(name) : fmt::format("{}.{}", key, name);
+    };
+    if (const toml::table* table = node.as_table())
+        for (const auto& [name, value] : *table) add(extreme_numbers(value, under(name.str())));
+    if (const toml::array* list = node.as_array())
+        for (std::size_t i = 0; i < list->size(); ++i) add(extreme_numbers((*list)[i], under(std::to_string(i))));
+    if (node.is_number()) {
+        const double size = std::abs(node.value<double>().value());
+        if (size > extreme || (size > 0 && size < 1 / extreme))
+            return fmt::format("{} = {}", key, node.value<double>().value());
+    }
+    return found;
+}
+
+// Replaces the message of a run that failed where numbers of the case are so large or small that their powers and
+// products need not be finite.
+void blame_extreme_numbers(const Problem& c, StopReport& stop) {
+    const std::string numbers = extreme_numbers(toml::parse(effective_toml(c)), "");
+    if (numbers.empty()) return;
+    stop.message = fmt::format("the numbers of the case are too large or too small to compute with: {}", numbers);
+    stop.advice = "choose units in which they are nearer to 1";
+}
+
+// Hands everything on, and keeps what the end is reported by.
+class Watched : public PassingOn {
+public:
+    Watched(const Engine& engine, RunObserver& to) : PassingOn(to), case_(engine.problem()) {
+        const std::vector<std::string> series = engine.series_names();
+        defect_column_ = static_cast<std::size_t>(std::ranges::find(series, "identity_defect") - series.begin());
+    }
+    void row(std::span<const double> values) override {
+        PassingOn::row(values);
+        reached = values.front();
+        if (defect_column_ < values.size()) defect = std::max(defect, std::abs(values[defect_column_]));
+    }
+    void frame(const std::function<Record()>& make) override {
+        if (std::exchange(has_frame_, true)) return PassingOn::frame(make);
+        const Record record = make();
+        if (const std::string cost = cost_of_frames(case_, record); !cost.empty()) note(cost);
+        PassingOn::frame([&] { return record; });
+    }
+    void discard() override {
+        defect = 0;
+        PassingOn::discard();
+    }
+
+    std::optional<double> reached;
+    double defect = 0;  // the largest identity_defect
+
+private:
+    const Problem& case_;
+    std::size_t defect_column_;
+    bool has_frame_ = false;
+};
+
+}  // namespace
+
+StopReport failure_of(const Problem& c, const std::exception& error, std::optional<double> reached) {
+    const std::string where = reached ? fmt::format("after t = {:.6g}", *reached) : "at the start";
+    StopReport stop{Stop::solver_failed, reached.value_or(0), fmt::format("{} ({})", error.what(), where),
+                    "try another accuracy.energy or discretisation.elements, or a smoother shape"};
+    if (dynamic_cast<const std::bad_alloc*>(&error)) {
+        stop.message = fmt::format("memory ran out {}", where);
+        stop.advice = "ask for less accuracy (accuracy.energy) or fewer elements (discretisation.elements)";
+    }
+    blame_extreme_numbers(c, stop);
+    return stop;
+}
+
+Ended run_to_end(const Engine& engine, RunObserver& observer, const Restart* restart, const Result* unfinished) {
+    const Problem& c = engine.problem();
+    Watched watched(engine, observer);
+    Ended out;
+    const auto fail = [&](const std::exception& error) {
+        out.summary.stop = failure_of(c, error, watched.reached);
+        out.summary.estimated_error = 1;
+        out.summary.warnings.emplace_back("the error is unknown");
+        out.failed = true;
+    };
+    try {
+        out.summary = engine.run(watched, restart, unfinished);
+        if (out.summary.stop.reason == Stop::solver_failed) blame_extreme_numbers(c, out.summary.stop);
+    } catch (const durable::Error&) {
+        throw;
+    } catch (const CaseError& error) {
+        if (!watched.reached) throw;
+        fail(error);
+    } catch (const std::exception& error) {
+        fail(error);
+    }
+    out.reached = watched.reached;
+    if (std::string off = balance_warning(c, out.summary, watched.defect); !off.empty())
+        out.summary.warnings.push_back(std::move(off));
+    return out;
+}
+
+}  // namespace tubule
