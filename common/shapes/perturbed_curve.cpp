@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <memory>
 #include <stdexcept>
@@ -33,42 +32,33 @@ Polynomial difference(const Polynomial& p, const Polynomial& q) {
     return out;
 }
 
-// p(a + b w)
-Polynomial substituted(const Polynomial& p, double a, double b) {
-    Polynomial out{};
-    for (std::size_t k = p.size(); k-- > 0;) out = times(a, b, out), out[0] += p[k];
-    return out;
-}
-
-// The polynomials through the values nearest to point i, in (x - x_i) / scale; periodic: the last point is the first
-// one, of x greater by 1.
+// Newton's polynomials through the values nearest to a point; periodic: the last point is the first one, of x greater
+// by 1.
 struct LocalFit {
-    double scale = 0;
-    std::array<Polynomial, 2> polynomial{};
+    std::array<double, nearest> x;
+    std::array<std::array<double, nearest>, 2> divided;  // differences
+
+    // On [from, from + h].
+    Polynomial on(double from, double h, int f) const {
+        Polynomial out{divided[f][nearest - 1]};
+        for (int k = nearest - 1; k-- > 0;) out = times(from - x[k], h, out), out[0] += divided[f][k];
+        return out;
+    }
 };
 LocalFit local_fit(const std::vector<double>& x, const std::vector<Pair>& values, bool periodic, int i) {
     const int n = static_cast<int>(x.size());
     int first = i - nearest / 2;
     if (!periodic) first = std::clamp(first, 0, n - nearest);
-    std::array<double, nearest> away;
-    std::array<Pair, nearest> value;
     LocalFit out;
     for (int k = 0; k < nearest; ++k) {
         const int index = first + k, turn = index < 0 ? -1 : index > n - 1 ? 1 : 0;
         const int point = index - turn * (n - 1);
-        away[k] = x[point] + turn - x[i];
-        value[k] = values[point];
-        out.scale = std::max(out.scale, std::abs(away[k]));
+        out.x[k] = x[point] + turn;
+        for (int f = 0; f < 2; ++f) out.divided[f][k] = values[point][f];
     }
-    Eigen::Matrix<double, nearest, nearest> powers;
-    Eigen::Matrix<double, nearest, 2> right;
-    for (int k = 0; k < nearest; ++k) {
-        for (int j = 0; j < nearest; ++j) powers(k, j) = std::pow(away[k] / out.scale, j);
-        right.row(k) << value[k][0], value[k][1];
-    }
-    const Eigen::Matrix<double, nearest, 2> coefficients = powers.partialPivLu().solve(right);
-    for (int f = 0; f < 2; ++f)
-        for (int j = 0; j < nearest; ++j) out.polynomial[f][j] = coefficients(j, f);
+    for (auto& d : out.divided)
+        for (int level = 1; level < nearest; ++level)
+            for (int k = nearest - 1; k >= level; --k) d[k] = (d[k] - d[k - 1]) / (out.x[k] - out.x[k - level]);
     return out;
 }
 
@@ -80,8 +70,7 @@ CurveFunctions blended(const std::vector<double>& x, const std::vector<Pair>& va
         const double h = x[i + 1] - x[i];
         auto& both = out.polynomial.emplace_back();
         for (int f = 0; f < 2; ++f) {
-            const Polynomial start = substituted(low.polynomial[f], 0, h / low.scale),
-                             end = substituted(high.polynomial[f], -h / high.scale, h / high.scale);
+            const Polynomial start = low.on(x[i], h, f), end = high.on(x[i], h, f);
             // They agree in value at the points, and the blend 3 w^2 - 2 w^3 is flat there: second derivatives join.
             const Polynomial turn = times(0, 1, times(0, 1, times(3, -2, difference(end, start))));
             for (std::size_t k = 0; k < turn.size(); ++k) both[f][k] = start[k] + turn[k];
