@@ -332,15 +332,6 @@ TEST(VaryingH0, refusals) {
     EXPECT_SAYS(refused(tube, {"energy.H0=\"log(z - 1)\""}), "energy.H0 is no number where");
     EXPECT_SAYS(refused(tube, {"energy.H0=\"-1 - 0.1*area\""}),
                 "energy.H0 must be the same at both ends of the period");
-    EXPECT_SAYS(refused(tube, {"model.volume=fixed", "model.period=free"}),
-                "energy.H0 must be a number with model.period = \"free\"");
-    EXPECT_SAYS(refused(tube, {"discretisation.parametrisation=even"}),
-                "discretisation.parametrisation must be \"material\" or absent where energy.H0 varies");
-    const std::string cell = two_domains + "[equilibrium]\n";
-    EXPECT_SAYS(refused(cell, {"energy.H0=\"z\""}), "energy.H0 must be a formula of area alone");
-    EXPECT_SAYS(refused(cell, {"equilibrium.modes=1"}), "energy.H0 must be a number with equilibrium.modes");
-    EXPECT_SAYS(refused(cell, {"equilibrium.branch={vary = \"energy.H0\", to = 1.0, step = 0.1}"}),
-                "energy.H0 must be a number where the branch varies it");
     EXPECT_SAYS(refused("[energy]\nk20 = 0.5\nH0 = \"-1 + 0.1*sin(2*pi*area)\"\n[shape]\nkind = \"tube\"\nradius = "
                         "1.0\nlength = 8.0\n[equilibrium]\n"),
                 "energy.H0 must be mirror-symmetric");

@@ -175,7 +175,7 @@ TEST(Distance, OfTubes) {
     const Distance d = distance(one, other);
     EXPECT_NEAR(d.hausdorff, 0.2, 1e-14);
     EXPECT_NEAR(d.l2, 0.2, 1e-14);
-    EXPECT_NEAR(d.size, 1, 1e-14);
+    EXPECT_NEAR(d.size, 1, 1e-13);
     // A wave is nowhere farther than its amplitude from its cylinder, and that far at its crests.
     EXPECT_NEAR(distance(wave(0.1, 2), one).hausdorff, 0.1, 1e-8);
     EXPECT_NEAR(distance(one, wave(0.1, 2, 0.3)).hausdorff, 0.1, 1e-8);

@@ -186,29 +186,5 @@ TEST(EnsembleRuns, AFreePeriodGoesOnWithANewMesh) {
     EXPECT_NEAR(o.last("area") / o.series("area").front(), 1, 1e-8);
 }
 
-std::string refusal(const std::vector<std::string>& sets) {
-    try {
-        begin(wavy, sets);
-    } catch (const CaseError& error) {
-        return error.what();
-    }
-    return "";
-}
-
-TEST(EnsembleRuns, WhatASchemeDoesNotHaveIsRefused) {
-    const std::vector<std::string> paper{"model.kind=fluid", "discretisation.scheme=paper", "discretisation.step=1e-3",
-                                         "model.volume=free"};
-    const auto with = [&](const std::string& set) {
-        std::vector<std::string> sets = paper;
-        sets.push_back(set);
-        return refusal(sets);
-    };
-    EXPECT_EQ(refusal(paper), "");
-    EXPECT_NE(with("model.pressure=1").find("must not be \"paper\" with model.pressure"), std::string::npos);
-    EXPECT_NE(with("model.area=reservoir").find("must not be \"paper\" with model.area"), std::string::npos);
-    // And what a shape does not have.
-    EXPECT_NE(refusal({"model.volume=fixed", "model.period=free"}).find("only a tube has a period"), std::string::npos);
-}
-
 }  // namespace ensembles_run_test
 }  // namespace tubule::surface3d

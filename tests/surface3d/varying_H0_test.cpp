@@ -195,7 +195,6 @@ TEST(VaryingH0, refusals) {
     says({"energy.H0=\"log(z)\""}, "energy.H0 is no number at (");
     says({"shape={kind = \"tube\", radius = 1.0, length = 4.0}"},
          "energy.H0 must repeat itself with the period 4 along z");
-    says({"discretisation.relaxation=0.1"}, "discretisation.relaxation must be absent where energy.H0 varies");
 }
 
 }  // namespace varying_H0_test
