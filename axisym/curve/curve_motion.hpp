@@ -1,4 +1,4 @@
-// Laws of motion of a profile curve as one differential-algebraic system F(y, y') = 0:
+// Laws of motion of a profile curve as one differential-algebraic system in y and y':
 // theory.md (4.10), (4.11), (4.12), (4.13), (4.14).
 #pragma once
 
@@ -74,7 +74,7 @@ public:
     void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
     const SplineSpace& pressures() const { return pressure_; }
 
-    // F(t, y, rate). False where r <= 0 at a quadrature point: try a smaller step.
+    // The residual F of the system. False where r <= 0 at a quadrature point: try a smaller step.
     bool residual(double t, const double* y, const double* rate, double* F) const;
     // dF/dy + cj dF/drate, into the values of a matrix with pattern().
     void jacobian(double t, const double* y, const double* rate, double cj, double* values) const;

@@ -163,7 +163,7 @@ H0ByArea::H0ByArea(const CurveSpace& space, const Bending& bending, const double
     area_ = areas.sum();
     const RunningSums sums(splines);
     const Eigen::MatrixXd below = sums.up_to(areas);
-    Eigen::VectorXd push(points);  // area times f_H0 dH0/da
+    Eigen::VectorXd push(points);  // area times f_H0 dH0/dalpha
     double mean = 0;
     H0_.value.resize(packs), H0_.tension.resize(packs);
     for (int i = 0; i < packs; ++i) {

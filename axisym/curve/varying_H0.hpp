@@ -26,8 +26,8 @@ Eigen::MatrixXd partial_sums(int points);
 // H0 at the parameters, as the formula has it on the curve x. Throws std::invalid_argument where that is no number.
 VaryingH0 fix_H0(const CurveSpace& space, const Formula& formula, const Eigen::VectorXd& x);
 
-// The functional INT f(H, K; H0(a)) dS, where a is the part of the whole area that is below a point: the formula's
-// `area`.
+// The functional INT f(H, K; H0(alpha)) dS, where alpha is the part of the whole area that is below a point: the
+// formula's `area`.
 class H0ByArea {
 public:
     H0ByArea(const CurveSpace& space, const Bending& bending, const double* x);
@@ -41,7 +41,7 @@ private:
     const double* x_;
     VaryingH0 H0_;
     double area_ = 0;                                // of what is solved for
-    std::vector<double> weight_, label_, in_, in2_;  // of each point: its area and a; dH0/da, d2H0/da2
+    std::vector<double> weight_, label_, in_, in2_;  // of each point: its area, alpha, dH0/dalpha, d2H0/dalpha2
     std::vector<SlopeInH0<Pack>> f0_;
 };
 

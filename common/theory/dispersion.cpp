@@ -190,9 +190,9 @@ Growth growth(const UniformTube& tube, const MotionLaw& law, double q, int m) {
     // The radius (m = 0) or the position (m = 1), which are conserved.
     const bool rigid = q == 0 && m < 2;
     if (law.inertia == 0) return {{rigid || G == 0 ? 0.0 : -mobility(tube, law, q, m) * G}};
-    // theory.md (5.12), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a = s +
-    // gamma, s [(a A + B)(a + D) - C] + Q R^2 G (a + D) = 0. Without C the factor a + D belongs to a swirl without a
-    // wave.
+    // theory.md (5.12), times a + mu Q: with A = Q R^2 + 1, B = 4 mu q^2, C = 4 mu^2 q^2 (m/R)^2, D = mu Q and a =
+    // omega + gamma, omega [(a A + B)(a + D) - C] + Q R^2 G (a + D) = 0. Without C the factor a + D belongs to a swirl
+    // without a wave.
     const double mu = law.viscosity, gamma = law.friction, A = Q * R * R + 1, B = 4 * mu * q * q, D = mu * Q,
                  C = 4 * mu * mu * q * q * m * m / (R * R), F = rigid ? 0.0 : Q * R * R * G;
     if (C == 0) return {quadratic_roots(A, gamma * A + B, F)};

@@ -1,7 +1,7 @@
 // Small waves on straight tubes and on spheres: exact linear theory for any density f(H, K), theory.md 5, theory.md 6.
 //
-// A tube is r = R + a cos(q z + m theta), a sphere r = R + a Y_l^m, with a(t) = a(0) exp(s t). Density, its derivatives
-// and the radius are those of the unperturbed surface.
+// A tube is r = R + a cos(q z + m theta), a sphere |X| = R + a Y_l^m, with a(t) = a(0) exp(omega t). Density, its
+// derivatives and the radius are those of the unperturbed surface.
 #pragma once
 
 #include <complex>
@@ -50,7 +50,7 @@ std::optional<double> radius_at_rest(const MotionLaw& law, const UniformTube& tu
 // Sigma of theory.md (5.20): (f + f_H/R + sigma0) R^2/f_HH. Not finite where f_HH = 0.
 double reduced_tension(const UniformTube& tube);
 
-// G of theory.md (5.8) as a polynomial of q: the gradient flow's -s, and what drives the other models. A wave grows
+// G of theory.md (5.8) as a polynomial of q: the gradient flow's -omega, and what drives the other models. A wave grows
 // where G < 0.
 struct Stiffness {
     double q4 = 0, q2 = 0, q0 = 0;

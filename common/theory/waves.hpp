@@ -25,7 +25,7 @@ struct WaveState {
 //   or
 //     it keeps SUM Z a^2 constant, theory.md (5.14), and is returned; the tube's own tension is ignored.
 //   The radius stays. In gradient flow that keeps neither area nor volume it drifts under the tension and the pressure
-//     of t = 0, theory.md (5.3); amplitudes are multiplied by exp INT s dt.
+//     of t = 0, theory.md (5.3); amplitudes are multiplied by exp INT omega dt.
 //   With inertia and m >= 1: the swirl that goes with a wave begins at rest and is followed as a third unknown.
 // The equations neglect squares of amplitudes. Throws std::invalid_argument for invalid waves (n = m = 0,
 // repeated, all without amplitude, infinitely fast), SolveError if the radius vanishes or the integrator fails.

@@ -37,7 +37,7 @@ Eigen::VectorXd weights(const SurfaceSpace& space, const CurvedMesh& mesh, const
 struct System {
     Eigen::SparseMatrix<double> L;                    // (grad phi_i, grad phi_j)
     std::array<Eigen::SparseMatrix<double>, 3> flux;  // (nu_d phi_i, phi_j)
-    VectorField pull;                                 // -(a grad X, grad Z)
+    VectorField pull;                                 // -(beta grad X, grad Z)
 };
 
 System assemble(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& normal,
@@ -106,9 +106,9 @@ void meet_flux(const System& system, const Projection& project, const VectorFiel
     }
 }
 
-// The tangential part of r: r - (m nu, Z), with m such that nothing is left along the nodal normals. Without m, testing
-// with nodal tangents alone, the curvature vector of the mesh, which is not exactly normal, would move nodes
-// indefinitely: a mesh at rest would deform.
+// The tangential part of r: r - (m nu, Z), with the multiplier m such that nothing is left along the nodal normals.
+// Without m, testing with nodal tangents alone, the curvature vector of the mesh, which is not exactly normal, would
+// move nodes indefinitely: a mesh at rest would deform.
 VectorField without_multiplier(const System& system, const Projection& project, const VectorField& normal,
                                const AlongSurface& along_surface, VectorField r) {
     for (int sweep = 0; sweep < sweeps; ++sweep) {

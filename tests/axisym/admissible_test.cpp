@@ -15,7 +15,8 @@ namespace tubule::axisym {
 namespace admissible_test {
 
 TEST(ShapeIntegrals, areThoseOfClosedForms) {
-    // Capsule: H = -1/r on the cylinder of length l, -2/r on the spheres. Torus: INT H^2 and INT K^2 by theory.md 12.
+    // Capsule: H = -1/r on the cylinder of length l, -2/r on the spheres. Torus: INT H^2 and INT K^2 by theory.md
+    // (7.1).
     const double r = 1.006, l = 3.181;
     const ShapeEnergy capsule = bending_energy(meridian(Capsule{r, l}), bending(0, 0, 0.1853));
     const double exact = 0.1853 * (2 * pi * r * l * std::pow(1 / r, 4) + 4 * pi * r * r * std::pow(2 / r, 4));

@@ -85,8 +85,8 @@ TEST(ModeStability, convergesWithTheOrderOfTheEnergy) {
 }
 
 TEST(ModeStability, tube) {
-    // Exact: gradient flow s = -[F2 Z^2 + (f + F1/R + sigma) Z - 2 F1 q^2/R + 2 k42 q^4/R^2], overdamped Q R^2/(Q R^2 +
-    // 1) of that, theory.md (5.8), (5.9); twice for each q > 0.
+    // Exact: gradient flow omega = -[F2 Z^2 + (f + F1/R + sigma) Z - 2 F1 q^2/R + 2 k42 q^4/R^2], overdamped
+    // Q R^2/(Q R^2 + 1) of that, theory.md (5.8), (5.9); twice for each q > 0.
     const Law law;
     const double R = 0.8, length = 3, h = -1 / R - law.H0;
     const double b0 = -(law.f(h) + law.F1(h) / R) / R, lambda = b0 - law.sigma / R;
@@ -113,8 +113,8 @@ TEST(ModeStability, tube) {
 }
 
 TEST(ModeStability, stokesFlow) {
-    // Exact: theory.md (6.6), (5.10), G = -s of the gradient flow with tension: sphere s = -Lam G/[gamma (Lam +
-    // 4) + 4 mu L/R^2]; tube s = -Q R^2 G / {gamma (Q R^2 + 1) + 4 mu q^2 - 4 mu^2 q^2 (m/R)^2/(gamma + mu Q)}.
+    // Exact: theory.md (6.6), (5.10), G = -omega of the gradient flow with tension: sphere omega = -Lam G/[gamma (Lam +
+    // 4) + 4 mu L/R^2]; tube omega = -Q R^2 G / {gamma (Q R^2 + 1) + 4 mu q^2 - 4 mu^2 q^2 (m/R)^2/(gamma + mu Q)}.
     const Law law;
     for (const double gamma : {0.0, 0.8}) {
         const double mu = 0.6;

@@ -100,7 +100,7 @@ struct Waves {
     ModelKind model;
     double Q(int k) const { return std::pow(2 * pi * (k + 1) / length, 2); }
     double c(int k) const { return Q(k) - 1; }
-    // -s of the gradient flow, theory.md (5.6): h = -1, f = k20, F1 = -2 k20, F2 = 2 k20, R = 1, H0 = 0.
+    // -omega of the gradient flow, theory.md (5.6): h = -1, f = k20, F1 = -2 k20, F2 = 2 k20, R = 1, H0 = 0.
     double G(int k) const {
         const double Z = c(k), q2 = Q(k);
         return 2 * k20 * Z * Z + (k20 - 2 * k20) * Z + 4 * k20 * q2 + 2 * k42 * q2 * q2;

@@ -222,7 +222,7 @@ std::vector<double> equally_spaced(double end, int n) {
 }
 
 TEST(Growth, fittedToRunsAtThePreferredRadius) {
-    // H0 = -1/R, radius at rest: s = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], theory.md (5.27): grows for k42 < 0,
+    // H0 = -1/R, radius at rest: omega = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], theory.md (5.27): grows for k42 < 0,
     // neutral at q R = 1 for k42 = 0, decays for k42 > 0. Amplitudes stay below 3e-5 of R, so that their squares are
     // below 1e-9.
     for (const auto& [k42, length, end] : {std::tuple{-0.1, 2 * pi, 5.0}, {0.05, 2 * pi, 10.0}, {0.0, 9.0, 6.0}}) {

@@ -195,9 +195,9 @@ const std::string two_domains =
     "[energy]\nk20 = 0.5\nH0 = \"-2 - tanh((area - 0.6)/0.1)\"\n[shape]\nkind = \"sphere\"\nradius = 1.0\n";
 
 TEST(VaryingH0, aCellOfTwoDomainsRests) {
-    // Independent computation: the shape equations with H0(a) and the multiplier of a' = 2 pi r as a boundary value
-    // problem in the tangent angle, r and their momenta, by collocation with a tolerance of 1e-9 (scipy's solve_bvp);
-    // energy 4.3320484329, height 2.1703008982, largest radius 0.93862710.
+    // Independent computation: the shape equations with H0 of the area below, whose slope is 2 pi r, as a boundary
+    // value problem in the tangent angle, r and their momenta, by collocation with a tolerance of 1e-9 (scipy's
+    // solve_bvp); energy 4.3320484329, height 2.1703008982, largest radius 0.93862710.
     const Outcome o = run_text(two_domains + "[model]\nvolume = \"free\"\n[equilibrium]\n[accuracy]\nenergy = 1e-9\n");
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     EXPECT_NEAR(o.last("energy"), 4.3320484329, 1e-7);

@@ -202,7 +202,7 @@ double error_of_waves(const Bending& energy, const Model& model, const std::vect
 }
 
 TEST(TubeFlow, WavesAlongAndAroundFollowLinearTheory) {
-    // theory.md (5.7), the radius drifting: the exact multiplier is exp INT s dt.
+    // theory.md (5.7), the radius drifting: the exact multiplier is exp INT omega dt.
     const double a = 1e-4;
     const std::vector<Phased> waves{{{1, 0, a}}, {{1, 1, a}}, {{1, 2, a}}, {{2, 0, a}}, {{0, 2, a}}};
     double error[2];

@@ -137,7 +137,7 @@ Eigen::Matrix<Complex, 5, 5> equations(const UniformTube& tube, const MotionLaw&
     const double R = tube.radius, mu = law.viscosity, gamma = law.friction;
     const Complex i(0, 1), z = i * q, y = i * (m / R), inertia = law.inertia * s + gamma;
     Eigen::Matrix<Complex, 5, 5> A = Eigen::Matrix<Complex, 5, 5>::Zero();
-    // p0 Z a and s_a a together are -G a, G with the tension.
+    // p0 Z a and omega_a a together are -G a, G with the tension.
     A.row(0) << -inertia - 2 * mu / (R * R), 0, -2 * mu / R * y, 1 / R, -stiffness(tube, m)(q);
     A.row(1) << 0, -inertia + 2 * mu * z * z + mu * y * y, mu * y * z, -z, 0;
     A.row(2) << 2 * mu / R * y, mu * y * z, -inertia + 2 * mu * y * y + mu * z * z, -y, 0;
@@ -198,7 +198,7 @@ TEST(Dispersion, modelsAgreeInTheirLimits) {
                      other = growth(tube, law_of(kind, 2, 0.3), 0.7, -1);
         for (std::size_t i = 0; i < one.roots.size(); ++i) EXPECT_EQ(one.roots[i], other.roots[i]);
     }
-    // theory.md (5.11): m = 0, gamma = 0: s = -Re R^2 G/4.
+    // theory.md (5.11): m = 0, gamma = 0: omega = -Re R^2 G/4.
     EXPECT_NEAR(growth(tube, law_of(ModelKind::stokes, 2, 0), 0.7, 0).rate(),
                 -2 * 0.8 * 0.8 / 4 * stiffness(tube, 0)(0.7), 1e-12);
     // A ring wave is not sheared: without friction nothing resists it.
@@ -263,7 +263,7 @@ TEST(Thresholds, tubeAtItsPreferredRadius) {
     EXPECT_NEAR(stiffness(neutral, 0)(1 / neutral.radius), 0, 1e-15);
     EXPECT_GT(stiffness(tube_of(0, -1, 0.01), 0)(1 / neutral.radius), 0);
     EXPECT_TRUE(growing_bands(tube_of(0, -1, 0.01), 0).empty());
-    // theory.md (5.27): s = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], largest at x = 1/(1 + beta).
+    // theory.md (5.27): omega = -(2 k20/R^4)[(1 + beta) x^2 - 2 x + 1], largest at x = 1/(1 + beta).
     const UniformTube grows = tube_of(0, -1, -0.2);
     ASSERT_EQ(growing_bands(grows, 0).size(), 1u);
     const auto fastest = fastest_wave(grows, law_of(ModelKind::gradient_flow), 0);
@@ -412,8 +412,8 @@ TEST(Ensembles, tellTheTensionAndWhereARadiusGoes) {
 }
 
 TEST(Waves, aDriftingTube) {
-    // theory.md (7.12): R^4 = R0^4 + 4 k20 t for H0 = 0. The amplitude: s = -(k20/R^4)[2 (x - 1)^2 - (x - 1) + 4 x], x
-    // = q^2 R^2, by Simpson's rule over the exact R(t).
+    // theory.md (7.12): R^4 = R0^4 + 4 k20 t for H0 = 0. The amplitude: omega = -(k20/R^4)[2 (x - 1)^2 - (x - 1) + 4
+    // x], x = q^2 R^2, by Simpson's rule over the exact R(t).
     const UniformTube tube{bending(0.2), 1};
     const double length = 7, end = 2, q = 2 * pi / length;
     const auto radius = [](double t) { return std::pow(1 + 0.8 * t, 0.25); };
