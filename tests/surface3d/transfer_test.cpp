@@ -62,7 +62,7 @@ Missed missed(int n, int m, int order) {
 }
 
 TEST(Transfer, HasTheOrderOfInterpolationAndTheEnergyAnOrderAboveThree) {
-    // P_k interpolates with an error of order k + 1; of the jump of the energy: docs/theory.md, table of section 10.
+    // P_k interpolates with an error of order k + 1; of the jump of the energy: docs/verification.md.
     for (const int order : {2, 3, 4}) {
         SCOPED_TRACE(order);
         const Missed coarse = missed(6, 4, order), fine = missed(12, 8, order);
