@@ -116,7 +116,7 @@ std::optional<Vesicle> vesicle(const Problem& c) {
 }
 
 // Vesicles end as two spheres that touch in a neck without size, where -H0 is the sum of their mean curvatures,
-// 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): docs/theory.md, section 8. `inside` -1: beside each other.
+// 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): theory.md 8. `inside` -1: beside each other.
 std::optional<double> spheres_with_neck(const Problem& c, double inside) {
     const auto v = vesicle(c);
     if (!v) return std::nullopt;
