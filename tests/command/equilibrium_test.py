@@ -81,16 +81,19 @@ class Equilibrium(ProgramTest):
 
     def test_pictures(self):
         case = self.write("branch_cell.toml", CASE + BRANCH)
-        for length in (2, 3, 4):
-            self.tubule("equilibrium", "--quiet", case, "--set", f"shape.length={length}.0", "-o", f"l{length}.hdf")
+        under_k40 = ("energy.k42=0.0", "energy.k40=0.12", "equilibrium.branch.vary=energy.k40")
+        for key, changes in (("k42", ()), ("k40", under_k40)):
+            for length in (2, 3, 4):
+                sets = [word for change in (f"shape.length={length}.0", *changes) for word in ("--set", change)]
+                self.tubule("equilibrium", "--quiet", case, *sets, "-o", f"{key}_l{length}.hdf")
         single = self.write("single.toml", CASE)
-        for k42 in (0, 0.06, 0.12):
+        for k42, k40 in ((0, 0), (0.06, 0), (0.12, 0), (0, 0.02), (0, 0.06)):
             for i, length in enumerate((2.0, 2.5)):
-                sets = ("--set", f"energy.k42={k42}", "--set", f"shape.length={length}")
-                self.tubule("equilibrium", "--quiet", single, *sets, "-o", f"length_{k42:g}_{i:02}.hdf")
+                sets = ("--set", f"energy.k42={k42}", "--set", f"energy.k40={k40}", "--set", f"shape.length={length}")
+                self.tubule("equilibrium", "--quiet", single, *sets, "-o", f"length_{k42:g}_{k40:g}_{i:02}.hdf")
         for script, inputs, words in (
             ("tubular", [self.folder], ("l = 4", "distance to the capsule")),
-            ("vesicles", [self.folder / "l2.hdf", self.folder / "l3.hdf"], ("reduced volume", "bifurcation")),
+            ("vesicles", [self.folder / "k42_l2.hdf", self.folder / "k42_l3.hdf"], ("reduced volume", "bifurcation")),
         ):
             picture = self.folder / f"{script}.svg"
             done = subprocess.run(["/usr/bin/python3", "-B", PLOT, FIGURES / f"{script}.py", *inputs, "-o", picture], capture_output=True, text=True)
