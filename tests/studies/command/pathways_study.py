@@ -2,7 +2,7 @@
 """Does a membrane with K^2 or (H - H0)^4 come to rest sooner, and sooner than one that is only stiffer?
 
 pathways_study.py TUBULE [FOLDER]. The paper's tube in gradient flow, its tubular cells and its perturbed sphere as fluids. Prints the
-table of docs/paper.md: the times after which 10 % and 1 % of the excess E + E_kin - E(at rest) are left for good. "stiffer" has k20 +
+times of docs/paper.md: the times after which 10 % and 1 % of the excess E + E_kin - E(at rest) are left for good. "stiffer" has k20 +
 k42/R^2 instead of k42: on a sphere of radius R small deformations then have the same stiffness. Results are kept in FOLDER, and
 not computed again.
 """
