@@ -2,7 +2,7 @@
 
 #include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_run.hpp"
-#include "axisym/graph/graph_frame.hpp"
+#include "axisym/graph/graph_output.hpp"
 #include "axisym/graph/graph_run.hpp"
 
 namespace tubule::axisym {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "axisym/curve/curve_measures.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 
 namespace tubule::axisym {
 namespace {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "axisym/curve/curve_measures.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"

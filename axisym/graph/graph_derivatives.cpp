@@ -1,6 +1,6 @@
 #include "axisym/graph/graph_derivatives.hpp"
 
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 
 namespace tubule::axisym {
 

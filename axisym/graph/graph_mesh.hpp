@@ -1,14 +1,56 @@
-// Everything that belongs to one mesh of a graph.
+// How fine a run of a graph is: the part of the tube that is computed, its meshes and all that belongs to one of them.
 #pragma once
 
 #include <array>
 #include <functional>
 #include <vector>
 
-#include "axisym/graph/graph_error_transport.hpp"
-#include "axisym/graph/graph_settings.hpp"
+#include "axisym/graph/carried_error.hpp"
+#include "axisym/graph/graph_forms.hpp"
+#include "axisym/splines/spline_space.hpp"
+#include "common/case/problem.hpp"
 
 namespace tubule::axisym {
+
+constexpr double stated_over_computed = 1.8;  // error stated / error computed by the transport
+
+// The asked accuracy sets it, a failed attempt tightens it.
+struct GraphSettings {
+    double time_tolerance = 0;
+    double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
+    bool free_time = true, free_mesh = true;
+    bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
+    bool rosenbrock = false;  // Rosenbrock's method of long steps instead of IDA
+};
+
+GraphSettings first_graph_settings(const Problem& c, bool rosenbrock);
+
+// After attempt number `attempt`, whose error (absolute) was beyond what is allowed.
+GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& error, double allowed, int attempt);
+
+// The smallest part of the tube that determines it: a period divided by the common waves of its modes,
+// halved if the modes are even about a plane. The flow keeps both symmetries exactly, and so does the
+// reduced problem. With `symmetry` off: the whole period.
+Cell cell_of(const Tube& tube, bool symmetry);
+
+// Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by the
+// present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the same
+// grading at most `most`.
+std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+                                   int fewest, int most);
+
+// The same by division of the present elements: the new space contains the old one. Ends early, before the end of the
+// cell, where there would be more than `most`.
+std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+                                   int most);
+
+// The defect of each element that the flow from x will soon develop: the largest over x itself and single
+// linearly implicit Euler steps from it, whose sizes span six decades up to `span`. A start is often smooth and
+// grows its sharpest features within its first instants.
+std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span);
+
+// Breaks of n equal elements.
+std::vector<double> uniform_breaks(const Cell& cell, int n);
 
 constexpr int most_graph_elements = 4000;  // of one cell
 

@@ -1,13 +1,13 @@
 // A case of tier "axisym" whose profile is a graph r(z): the gradient flow of tubes, in its fastest form.
 #pragma once
 
-#include "axisym/graph/graph_series.hpp"
+#include "axisym/graph/graph_output.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule::axisym {
 
 // As run(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
-// (graph_error_transport.hpp); where that exceeds the accuracy asked, it starts again with finer settings.
+// (carried_error.hpp); where that exceeds the accuracy asked, it starts again with finer settings.
 RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart = nullptr);
 
 }  // namespace tubule::axisym

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "axisym/graph/graph_derivatives.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/integration/ida_integrator.hpp"
 #include "axisym/integration/rosenbrock_integrator.hpp"
 #include "common/run/energy_checks.hpp"
@@ -107,7 +107,7 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     ErrorTransport& transport = mesh_->transport;
     transport.total = transport.space().project(shape) - transport.space().prolong(mesh_->space, x);
     make_integrator(x, mesh_->forms.rate(x), 0, 0);
-    error_.transport(*mesh_, now_.o);  // so far that of the first mesh
+    error_.transport(mesh_->transport, now_.o);  // so far that of the first mesh
     past_.energy_start = now_.o.free_energy;
 }
 
@@ -144,9 +144,9 @@ GraphLimits GraphSimulation::limits() const {
 
 // Transports the error; the reason to stop if it exceeds the tolerance and finer settings would help.
 std::optional<StopReport> GraphSimulation::transport_error() {
-    error_.transport(*mesh_, now_.o);
+    error_.transport(mesh_->transport, now_.o);
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
-    gave_up = settings_.may_give_up && error_.is_curable(settings_, allowed);
+    gave_up = settings_.may_give_up && error_.is_curable(allowed, settings_.free_mesh, settings_.free_time);
     if (!gave_up) return std::nullopt;  // the report below is not shown: a finer run replaces this one
     return StopReport{Stop::resolution_lost, integrator_->time(), "the error exceeds the requested accuracy", ""};
 }
@@ -155,7 +155,7 @@ std::optional<StopReport> GraphSimulation::transport_error() {
 // run returns to the last good state.
 std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
     const double rise = o.free_energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
-    if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.transport(*mesh_, o);
+    if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.transport(mesh_->transport, o);
     if (rise <= std::max(asked, stated_over_computed * error_.now())) {
         error_.largest = std::max(error_.largest, rise / stated_over_computed);
         good_.least_energy = std::min(good_.least_energy, o.free_energy);

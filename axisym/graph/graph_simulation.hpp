@@ -6,11 +6,10 @@
 #include <optional>
 #include <utility>
 
-#include "axisym/graph/graph_error.hpp"
-#include "axisym/graph/graph_frame.hpp"
+#include "axisym/graph/carried_error.hpp"
 #include "axisym/graph/graph_guards.hpp"
 #include "axisym/graph/graph_mesh.hpp"
-#include "axisym/graph/graph_series.hpp"
+#include "axisym/graph/graph_output.hpp"
 #include "axisym/integration/effort.hpp"
 #include "axisym/integration/step_integral.hpp"
 #include "axisym/integration/time_integrator.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"

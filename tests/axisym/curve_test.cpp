@@ -7,7 +7,7 @@
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"

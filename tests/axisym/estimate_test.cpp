@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 

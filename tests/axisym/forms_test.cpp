@@ -6,7 +6,7 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/axisym/series.hpp"

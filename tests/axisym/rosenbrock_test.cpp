@@ -6,7 +6,7 @@
 #include <random>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/integration/rosenbrock_integrator.hpp"
 #include "axisym/integration/step_integral.hpp"
 #include "axisym/splines/band_lu.hpp"

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/splines/spline_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"

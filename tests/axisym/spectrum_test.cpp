@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "axisym/equilibrium/profile_modes.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/case/read.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/theory/dispersion.hpp"

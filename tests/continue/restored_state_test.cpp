@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "axisym/curve/curve_frame.hpp"
-#include "axisym/graph/graph_frame.hpp"
+#include "axisym/graph/graph_output.hpp"
 #include "axisym/run.hpp"
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"

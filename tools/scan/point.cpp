@@ -8,7 +8,7 @@
 #include <span>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_frame.hpp"
+#include "axisym/graph/graph_output.hpp"
 #include "common/case/read.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/dense.hpp"

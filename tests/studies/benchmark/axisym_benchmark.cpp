@@ -4,7 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include "axisym/graph/graph_forms.hpp"
-#include "axisym/graph/graph_start.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "tests/studies/benchmark/figure_case.hpp"
 
 namespace tubule::axisym {

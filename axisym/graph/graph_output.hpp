@@ -1,13 +1,32 @@
-// A profile as a record of the result file: what readers need, and what a run needs to resume.
+// What a run of a graph writes: a row of series each step, and frames: a profile as a record of the result file, with
+// what readers need, and what a run needs to resume.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
+#include "axisym/graph/graph_mesh.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "axisym/splines/spline_space.hpp"
 #include "common/result/result.hpp"
+#include "common/series/table.hpp"
 
 namespace tubule::axisym {
+
+// Input of a row.
+struct GraphRow {
+    double time;
+    const Observation& o;
+    const double* x;
+    const GraphMesh& stage;
+    const TimeIntegrator& flow;
+    long newton_iterations;
+    double identity_defect, energy_error;
+    int elements;
+    double wall_seconds;
+};
+
+SeriesTable<GraphRow> graph_series(const Problem& c);
 
 // Everything a run carries from one step to the next, except the integrator's history.
 struct GraphRestart {

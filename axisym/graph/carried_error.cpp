@@ -1,6 +1,7 @@
-#include "axisym/graph/graph_error_transport.hpp"
+#include "axisym/graph/carried_error.hpp"
 
 namespace tubule::axisym {
+
 namespace {
 
 std::vector<double> halved(const std::vector<double>& breaks) {
@@ -113,6 +114,33 @@ ErrorTransport::EnergyError ErrorTransport::energy_error(double energy) const {
     const Eigen::VectorXd fine = prolongation_ * on_coarse_.state + total, coarse = on_coarse_.state + temporal;
     const double of_all = fine_.free_energy(fine) - energy;
     return {of_all, of_all - (coarse_.free_energy(coarse) - energy)};
+}
+
+namespace {
+
+// Measured choices: docs/decisions/graphs.md. The error is transported after this number of steps, or when the
+// logarithm of the dissipation has changed by this.
+constexpr int error_steps = 8;
+constexpr double error_change = 0.25;
+
+}  // namespace
+
+bool GraphError::due(const Observation& o, bool rosenbrock) {
+    const double change = std::abs(std::log(o.dissipation / dissipation_last_));
+    return ++steps_since_ >= error_steps || rosenbrock || !(change < error_change);
+}
+
+void GraphError::transport(ErrorTransport& transport, const Observation& o) {
+    if (steps_since_ > 0) transport.advance();
+    latest = transport.energy_error(o.free_energy);
+    begin(o);
+    largest = std::max(largest, now());
+}
+
+bool GraphError::is_curable(double allowed, bool free_mesh, bool free_time) const {
+    const double of_time = std::abs(latest.total - latest.spatial);
+    return now() > allowed &&
+           ((free_mesh && std::abs(latest.spatial) > 0.4 * allowed) || (free_time && of_time > 0.4 * allowed));
 }
 
 }  // namespace tubule::axisym

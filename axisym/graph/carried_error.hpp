@@ -5,6 +5,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/integration/time_integrator.hpp"
@@ -66,8 +69,30 @@ private:
     Level on_fine_, on_coarse_;
     void add_residual(double weight);
     double elapsed_ = 0;
-    double sampled_ =
-        0;  // sum of the weights of samples within steps; the rest of `elapsed_` has the residual of its end
+    double sampled_ = 0;  // weights of samples within steps; the rest of `elapsed_` has the residual of its end
+};
+
+// The error of the energy along a run, computed at intervals.
+class GraphError {
+public:
+    // The transport begins anew with this observation.
+    void begin(const Observation& o) { dissipation_last_ = o.dissipation, steps_since_ = 0; }
+    // Whether to transport the error after a step: after each long step of a one-step method, or when some short ones
+    // of backward differences have changed the shape.
+    bool due(const Observation& o, bool rosenbrock);
+    void transport(ErrorTransport& transport, const Observation& o);
+    // Whether it exceeds what is allowed, for a reason that a finer mesh or a smaller tolerance in time remedies, where
+    // they are free.
+    bool is_curable(double allowed, bool free_mesh, bool free_time) const;
+
+    double now() const { return std::abs(latest.total); }
+
+    ErrorTransport::EnergyError latest;
+    double largest = 0;
+
+private:
+    double dissipation_last_ = 0;
+    int steps_since_ = 0;
 };
 
 }  // namespace tubule::axisym
