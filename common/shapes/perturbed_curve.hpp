@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "common/shapes/curve.hpp"
@@ -26,12 +27,19 @@ std::array<S, 2> value_at(const CurveFunctions& functions, const S& x) {
     const std::vector<double>& breaks = functions.x;
     const auto above = std::upper_bound(breaks.begin() + 1, breaks.end() - 1, scalar_part(x));
     const std::size_t i = above - breaks.begin() - 1;
-    const S w = (x - breaks[i]) * (1 / (breaks[i + 1] - breaks[i]));
+    const double turn = 1 / (breaks[i + 1] - breaks[i]), w = (scalar_part(x) - breaks[i]) * turn;
     std::array<S, 2> out;
-    for (int f = 0; f < 2; ++f) {
-        const auto& c = functions.polynomial[i][f];
-        out[f] = S(c[CurveFunctions::terms - 1]);
-        for (int k = CurveFunctions::terms - 2; k >= 0; --k) out[f] = out[f] * w + c[k];
+    for (int f = 0; f < 2; ++f) {  // by Horner's rule for the value and two derivatives, and not in jets
+        double p = 0, p1 = 0, half_p2 = 0;
+        for (int k = CurveFunctions::terms - 1; k >= 0; --k) {
+            half_p2 = half_p2 * w + p1;
+            p1 = p1 * w + p;
+            p = p * w + functions.polynomial[i][f][k];
+        }
+        if constexpr (std::is_same_v<S, double>)
+            out[f] = p;
+        else
+            out[f] = chain(x, p, p1 * turn, 2 * half_p2 * turn * turn);
     }
     return out;
 }
