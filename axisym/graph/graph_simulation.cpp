@@ -152,11 +152,15 @@ std::optional<StopReport> GraphSimulation::transport_error() {
 }
 
 // In gradient flow the energy cannot rise: a rise is an error. Where it exceeds the known error and the tolerance, the
-// run returns to the last good state.
+// run returns to the last good state. So it does where the path of a long step leaves the membrane between its ends.
 std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
-    const double rise = o.free_energy - good_.least_energy, asked = case_.accuracy.energy * summary.reference_energy;
+    const double asked = case_.accuracy.energy * summary.reference_energy;
+    double rise = o.free_energy - good_.least_energy, on_path = rise;
+    for (const auto& [t, seen] : seen_) on_path = std::fmax(on_path, seen.free_energy - good_.least_energy);
     if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.transport(mesh_->transport, o);
-    if (rise <= std::max(asked, stated_over_computed * error_.now())) {
+    const double known = std::max(asked, stated_over_computed * error_.now());
+    if (on_path > std::max(known, hopeless_error * summary.reference_energy)) rise = on_path;
+    if (rise <= known) {
         error_.largest = std::max(error_.largest, rise / stated_over_computed);
         good_.least_energy = std::min(good_.least_energy, o.free_energy);
         return std::nullopt;
@@ -317,6 +321,7 @@ struct GraphSimulation::View : StateView {
     double t, error;
     Eigen::VectorXd x, v;
     Observation o;
+    bool on_path = false;  // within a step, where a shorter one failed
 
     View(const GraphSimulation& r, double time) : run(r), t(time), x(r.mesh_->space.size()), v(x.size()) {}
     std::vector<double> row(double wall_seconds) const override { return run.row(t, error, o, x.data(), wall_seconds); }
@@ -333,6 +338,12 @@ std::unique_ptr<StateView> GraphSimulation::at(double t) {
     } else {
         integrator_->state_within_step(t, out->x.data(), out->v.data());
         out->o = mesh_->look(out->x.data(), out->v.data(), nullptr);
+        // Where the flow is degenerate a shorter step may fail unseen: then the path, on which the step was accepted.
+        if (!(out->o.free_energy <= good_.least_energy + hopeless_error * summary.reference_energy)) {
+            integrator_->interpolate(t, out->x.data(), out->v.data());
+            out->o = mesh_->look(out->x.data(), out->v.data(), nullptr);
+            out->on_path = true;
+        }
         out->error = std::max(error_before_, error_.now());
     }
     return out;
@@ -351,7 +362,9 @@ void GraphSimulation::write_path(double from, double until, RunOutput& out) {
         const double lost = std::abs(o.free_energy + dissipated(t) - good_.balance);
         const double both = error + lost / stated_over_computed;
         if (lost > allowed || stated_over_computed * both > asked) {
-            if (&seen_[path_points.size() / 2].first == &t) out.row(t, at(t)->row(out.seconds()));
+            if (&seen_[path_points.size() / 2].first != &t) continue;
+            if (const auto state = at(t); !static_cast<const View&>(*state).on_path)
+                out.row(t, state->row(out.seconds()));
         } else {
             error_.largest = std::max(error_.largest, both);
             integrator_->interpolate(t, x.data(), v.data());
