@@ -25,6 +25,36 @@ Curve spheroid(double reduced_volume, bool prolate) {
     return meridian(Ellipsoid{a, a, a * q});
 }
 
+Curve pear(double reduced_volume) {
+    if (!(reduced_volume > std::sqrt(0.5) && reduced_volume < 1))
+        throw std::invalid_argument(fmt::format("two spheres cannot have a reduced volume of {}", reduced_volume));
+    double low = 0, high = pi / 4;  // radii cos a, sin a
+    for (int k = 0; k < 60; ++k) {
+        const double a = (low + high) / 2;
+        (std::pow(std::cos(a), 3) + std::pow(std::sin(a), 3) > reduced_volume ? low : high) = a;
+    }
+    const double R1 = std::cos(low), R2 = std::sin(low), neck = 0.25 * R2;
+    // The circle of the neck is as wide as the neck itself and touches both spheres.
+    const double middle = 2 * neck, up = std::sqrt((R1 + neck) * (R1 + neck) - middle * middle),
+                 down = std::sqrt((R2 + neck) * (R2 + neck) - middle * middle);
+    const double turn1 = pi - std::atan2(middle, up), turn2 = pi - std::atan2(middle, down);
+    const double first = R1 * turn1, second = neck * (turn1 + turn2 - pi), third = R2 * turn2,
+                 total = first + second + third;
+    Curve m;
+    m.seams = {first / total, (first + second) / total};
+    m.at = [=](double t) {
+        const double s = t * total;
+        const auto on_circle = [&](double r, double z, double radius, double angle, double sign) {
+            return std::array{r + radius * std::sin(angle), sign * total * std::cos(angle),
+                              z - radius * std::cos(angle), sign * total * std::sin(angle)};
+        };
+        if (s <= first) return on_circle(0, 0, R1, s / R1, 1);  // angles from the south pole
+        if (s >= first + second) return on_circle(0, up + down, R2, pi - (total - s) / R2, 1);
+        return on_circle(middle, up, neck, turn1 - pi - (s - first) / neck, -1);
+    };
+    return m;
+}
+
 Curve bowl(double thickness, double opening) {
     if (!(thickness > 0 && thickness < 1 && opening > 0 && opening < pi))
         throw std::invalid_argument("a bowl needs a thickness between 0 and 1 and an opening between 0 and pi");

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/graph/graph_mesh.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
@@ -18,6 +19,8 @@
 namespace tubule::axisym {
 namespace {
 
+constexpr double closed_neck =
+    0.003;                         // radius, over that of the sphere of the same area, below which no search goes on
 constexpr double rounding = 1e-9;  // of the reduced volume of a sphere to begin with
 
 const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
@@ -420,14 +423,14 @@ private:
     int elements_ = 0;
 };
 
-// A mesh for the shape found on the present one. The jumps that the defect is read from underestimate
-// the error on a coarse mesh: take at least half as many elements again.
+// A mesh for the state on the present one. The jumps that the defect is read from underestimate the error on a coarse
+// mesh: where a shape was `found`, take at least half as many elements again.
 std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
-                                int max_elements) {
+                                int max_elements, bool found) {
     const int elements = space.splines().elements();
     const std::vector<double> breaks = adapted_breaks(space.splines(), defect, 0.1 * allowed,
-                                                      std::max(coarsest / space.images(), elements), max_elements);
-    const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (elements + 1) / 2);
+                                                      std::max(coarsest, elements / 4) / space.images(), max_elements);
+    const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (found ? (elements + 1) / 2 : 0));
     return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
 }
 
@@ -477,6 +480,82 @@ bool begins_at_sphere(const Constraints& goal, const CurveObservation& start) {
     return reduced_volume(start.area, start.volume) > 1 - near && wanted < 1 - near;
 }
 
+// The radius of the narrowest neck of a closed curve; infinite where it has none.
+double neck_radius(const CurveSpace& space, const Eigen::VectorXd& x) {
+    double narrowest = HUGE_VAL;
+    if (space.topology() != Topology::cell) return narrowest;
+    constexpr int per_element = 4;
+    const std::vector<double>& breaks = space.splines().breaks();
+    double before = 0, here = 0;
+    for (std::size_t e = 0; e + 1 < breaks.size(); ++e)
+        for (int i = 0; i < per_element; ++i) {
+            const double r = space.evaluate(x, breaks[e] + (breaks[e + 1] - breaks[e]) * (i + 1) / per_element).r;
+            if (here > 0 && here <= before && here < r) narrowest = std::min(narrowest, here);
+            before = here, here = r;
+        }
+    return narrowest;
+}
+
+// Counts the axisymmetric directions that lower the energy twice: by the second variation of the curve's coefficients,
+// and by that of the energy in normal displacements. A mesh that does not resolve the shape may have a minimum where
+// the energy has none; the counts differ then. Directions whose eigenvalue is zero up to the error count as either.
+struct DirectionCount {
+    int by_coefficients = 0, by_displacements = 0;
+    bool agrees = true;
+};
+
+DirectionCount count_directions(const StationaryProblem& problem, const StationarySystem& system,
+                                const Eigen::VectorXd& u, const Equilibrium& shape, double accuracy) {
+    const double per_area = std::max(accuracy, 1e-9) * shape.reference_energy / shape.observed.area;
+    const auto count = [](const auto& values, double below) {
+        return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v < below; }));
+    };
+    const Eigen::VectorXd values = system.variation(u).eigenvalues;
+    DirectionCount out;
+    out.by_coefficients = count(values, 0.0);
+    if (problem.free_period || problem.bending.H0_varies())
+        return out;  // displacements keep the period; H0 is constant
+    const double of_coefficient = per_area / static_cast<double>(values.size()),
+                 of_rate = per_area / shape.observed.area;
+    const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false};
+    std::vector<double> rates = ModeStability(problem, shape).rates(0, gradient_flow, out.by_coefficients + 2).rates;
+    for (double& rate : rates) rate = -rate;
+    out.by_displacements = count(rates, 0.0);
+    out.agrees = count(values, -of_coefficient) <= count(rates, of_rate) &&
+                 count(rates, -of_rate) <= count(values, of_coefficient);
+    return out;
+}
+
+// Whether the search ends on this mesh, and how; `out` is the state there and what is known of it.
+std::optional<std::pair<Stop, std::string>> verdict(const StationaryProblem& problem, const StationarySystem& system,
+                                                    const Eigen::VectorXd& u, bool found,
+                                                    const EquilibriumSettings& settings, Equilibrium& out) {
+    const int elements = out.space->splines().elements();
+    if (const double radius = found ? HUGE_VAL : neck_radius(*out.space, out.x);
+        radius < closed_neck * std::sqrt(out.observed.area / (4 * pi)))
+        return {{Stop::resolution_lost, fmt::format("a neck closes: its radius is {:.2g}", radius)}};
+    std::string unknown = std::isfinite(out.estimated_error)
+                              ? fmt::format("the error of the energy is still {:.1e}", out.estimated_error)
+                              : "the error of the energy is not known yet";
+    if (out.estimated_error <= settings.accuracy) {
+        if (const auto where = self_intersection(*out.space, out.x)) {
+            const CurveSample p = out.space->evaluate(out.x, (*where)[0]);
+            return {{Stop::self_intersection,
+                     fmt::format("the stationary shape intersects itself or crosses the axis at r = {:.4g}, z = {:.4g}",
+                                 p.r, p.z)}};
+        }
+        const DirectionCount directions = count_directions(problem, system, u, out, settings.accuracy);
+        out.negative_directions = directions.by_coefficients;
+        if (directions.agrees) return {{Stop::finished, ""}};
+        unknown = fmt::format(
+            "the stability is undetermined: the energy falls in {} directions by the coefficients of the profile, in "
+            "{} by normal displacements",
+            directions.by_coefficients, directions.by_displacements);
+    }
+    if (elements < settings.max_elements) return std::nullopt;
+    return {{Stop::resolution_lost, fmt::format("with {} elements, {}", elements, unknown)}};
+}
+
 // Newton on meshes that follow the shape found on the one before, until their energies agree.
 Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveSpace> space, Eigen::VectorXd u,
                   double gauge, const EquilibriumSettings& settings) {
@@ -505,7 +584,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         found = settle(system, u, !found, settings, out);
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);
-        if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 4)) break;
+        if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 7)) break;
         std::vector<double> defect;
         out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
         out.observed = system.forms().observe(x, &defect);
@@ -516,21 +595,10 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
-        if (out.estimated_error <= settings.accuracy) {
-            if (const auto where = self_intersection(*space, x)) {
-                const CurveSample p = space->evaluate(x, (*where)[0]);
-                return end(Stop::self_intersection,
-                           fmt::format("the stationary shape intersects itself or crosses the axis at r = {:.4g}, "
-                                       "z = {:.4g}",
-                                       p.r, p.z));
-            }
-            return end(Stop::finished, "");
-        }
-        if (elements >= settings.max_elements)
-            return end(Stop::resolution_lost, fmt::format("with {} elements, the error of the energy is still {:.1e}",
-                                                          elements, out.estimated_error));
+        if (auto ended = verdict(problem, system, u, found, settings, out))
+            return end(ended->first, std::move(ended->second));
         const auto finer = space_like(
-            *space, next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements),
+            *space, next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements, found),
             settings.degree);
         Eigen::VectorXd next(finer->size() + 3);
         next << finer->prolong(*space, x), u.tail(3);
@@ -551,11 +619,6 @@ double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
     if (problem.free_period || shape.length == 0) return problem.loads.force;
     const CurveForms forms(*shape.space, problem.bending);
     return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda}, shape.x) / shape.length;
-}
-
-int negative_directions(const StationaryProblem& problem, const Equilibrium& shape) {
-    const StationarySystem system(shape.space, problem, shape.gauge);
-    return static_cast<int>((system.variation(unknowns(shape)).eigenvalues.array() < 0).count());
 }
 
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& start,

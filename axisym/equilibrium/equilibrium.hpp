@@ -96,6 +96,8 @@ struct Equilibrium {
     double length = 0;                                 // of the period, 0 of a cell
     double reference_energy = 0, estimated_error = 0;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
+    // Axisymmetric displacements, under what is held, that lower the energy: 0 at a minimum. Of a shape that was found.
+    int negative_directions = 0;
     // finished; or why this is not an equilibrium: solver_failed, resolution_lost, self_intersection.
     Stop stop = Stop::solver_failed;
     std::string message;
@@ -114,9 +116,6 @@ Eigen::VectorXd unknowns(const Equilibrium& shape);
 
 // The axial force of a tube at rest, theory.md (3.19): given, or what holds its period.
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
-
-// Axisymmetric displacements, up to the constraints, that lower the energy: 0 at a minimum.
-int negative_directions(const StationaryProblem& problem, const Equilibrium& shape);
 
 // The same grading with another number of elements.
 std::vector<double> regraded(const std::vector<double>& breaks, int elements);

@@ -89,7 +89,9 @@ double start_of(int parameter, const StationaryProblem& p) {
 Curve start_of(Family family, double reduced, double area) {
     // Spheres have no family: nearly all of them are found from a little below.
     const double v = std::min(reduced, largest_of_family);
-    const Curve shape = family == Family::stomatocyte ? bowl(0.3, 2.3) : spheroid(v, family == Family::prolate);
+    const Curve shape = family == Family::stomatocyte ? bowl(0.3, 2.3)
+                        : family == Family::pear      ? pear(std::max(v, 0.72))
+                                                      : spheroid(v, family == Family::prolate);
     return scaled(shape, std::sqrt(area / area_and_volume(shape)[0]));
 }
 
@@ -273,8 +275,10 @@ public:
         if (task_.set) task_.set(problem, point.parameter);
         std::vector<ModeRates> modes;
         if (const auto last = c_.equilibrium->modes) {
+            const bool known = e.stop == Stop::finished;
             const ModeStability stability(problem, e);
-            for (int m = first_mode(c_); m <= *last; ++m) modes.push_back(stability.rates(m, c_.law));
+            for (int m = first_mode(c_); m <= *last; ++m)
+                modes.push_back(known ? stability.rates(m, c_.law) : ModeRates{.m = m});
         }
         observer_.row(row(point, problem, modes));
         observer_.frame([&] { return frame(point, modes); });
@@ -317,7 +321,8 @@ private:
             out.arrays.push_back({"H0", {H0.size()}, std::move(H0)});
         }
         for (const ModeRates& mode : modes)
-            out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
+            if (!mode.shape.empty())
+                out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
         return out;
     }
 
@@ -359,6 +364,21 @@ std::string advice_for(Stop stop) {
     }
 }
 
+bool meets(const Constraints& held, const CurveObservation& o) {
+    const auto is = [](const std::optional<double>& wanted, double value) {
+        return !wanted || std::abs(value / *wanted - 1) < 0.01;
+    };
+    return is(held.area, o.area) && is(held.volume, o.volume) &&
+           is(held.reduced_volume, reduced_volume(o.area, o.volume));
+}
+
+std::optional<theory::LimitShape> limit_of(const Task& task) {
+    const Constraints& held = task.problem.constraints;
+    const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
+    if (!closed || !held.area || !held.volume) return std::nullopt;
+    return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);
+}
+
 // Writes the shape, or those of the branch, and says how it ended.
 StopReport find_shapes(const Task& task, Writer& write) {
     const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
@@ -366,7 +386,7 @@ StopReport find_shapes(const Task& task, Writer& write) {
         BranchPoint only;
         only.shape = first;
         only.parameter = task.branch.from;
-        if (first.stop == Stop::finished) only.index = negative_directions(task.problem, first);
+        only.index = first.stop == Stop::finished ? first.negative_directions : -1;
         if (first.observed.area > 0 && std::isfinite(first.observed.energy)) write(only);
         return {first.stop, 0, first.stop == Stop::finished ? "the shape is stationary" : first.message,
                 advice_for(first.stop)};
@@ -394,7 +414,8 @@ void check_equilibrium(const Problem& c) {
 CaseShape find_shape(const Problem& c, RunObserver& observer) {
     const RunClock clock(c.time, observer);
     const Task task = task_of(c);
-    CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}};
+    CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}, limit_of(task), false};
+    out.meets_constraints = meets(task.problem.constraints, out.shape.observed);
     if (out.shape.stop == Stop::finished && c.equilibrium->modes)
         out.modes = mode_stability(task.problem, out.shape, *c.equilibrium->modes, c.law);
     return out;
@@ -414,6 +435,12 @@ RunSummary run_equilibrium(const Problem& c, RunObserver& observer) {
     }
     RunSummary s;
     if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
+    if (const auto limit = limit_of(task);
+        limit && !task.set && stop.reason == Stop::finished && limit->energy < write.last().observed.energy)
+        s.warnings.push_back(
+            fmt::format("a vesiculated limit has less energy, {:.6g} for {:.6g}: {}, joined by necks that shrink to "
+                        "points. This shape is at best a local minimum",
+                        limit->energy, write.last().observed.energy, described(*limit)));
     s.energy = write.last().observed.energy;
     s.reference_energy = write.last().reference_energy;
     s.elements = write.count() > 0 ? elements_of(write.last()) : 0;

@@ -1,12 +1,14 @@
 // A case with [equilibrium]: a stationary shape, or a branch of them, as rows and frames of a result.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/problem.hpp"
 #include "common/run/run.hpp"
+#include "common/theory/vesiculation.hpp"
 
 namespace tubule::axisym {
 
@@ -23,7 +25,9 @@ RunSummary run_equilibrium(const Problem& c, RunObserver& observer);
 // The shape of a case without a branch, with the growth rates of its modes, and nothing written.
 struct CaseShape {
     Equilibrium shape;
-    std::vector<ModeRates> modes;  // of a shape that was found, if asked for
+    std::vector<ModeRates> modes;             // of a shape that was found, if asked for
+    std::optional<theory::LimitShape> limit;  // of a cell whose area and volume are held
+    bool meets_constraints;                   // area and volume to a percent, of a last state, too
 };
 CaseShape find_shape(const Problem& c, RunObserver& observer);
 

@@ -19,7 +19,7 @@ namespace tubule {
 enum class Held { area_and_volume, area, volume, reduced_volume, nothing };
 
 // Families of vesicles, by which the search may begin instead of at the shape of the case.
-enum class Family { prolate, oblate, stomatocyte };
+enum class Family { prolate, oblate, stomatocyte, pear };
 
 // What a branch is followed in: the moduli by the number of their term, or these.
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
@@ -92,7 +92,10 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
     k.number("volume", e.volume, {.above = 0});
     k.number("reduced_volume", e.reduced_volume, {.above = 0, .to = 1});
     k.choice("family", e.family,
-             {{"prolate", Family::prolate}, {"oblate", Family::oblate}, {"stomatocyte", Family::stomatocyte}});
+             {{"prolate", Family::prolate},
+              {"oblate", Family::oblate},
+              {"stomatocyte", Family::stomatocyte},
+              {"pear", Family::pear}});
     k.flag("descend", e.descend);
     k.integer("modes", e.modes, {.from = model.free_period ? 1.0 : 0.0, .to = 100});
     const Held held = e.held.value_or(default_held(model));

@@ -187,7 +187,7 @@ TEST(VaryingH0, aTubeOfTwoHalvesRestsAsDelaunaySurfaces) {
     EXPECT_LT(o.last("energy"), 1e-9);
     const Delaunay found(o);
     EXPECT_LT(found.curvature, 1e-5);
-    EXPECT_LT(std::max(found.low, found.high), 1e-5);
+    EXPECT_LT(std::max(found.low, found.high), 5e-5);  // where H0 changes the mesh is finer than here
     EXPECT_GT(found.rounder, 0.1);
 }
 

@@ -46,6 +46,17 @@ class Equilibrium(ProgramTest):
         self.tubule("equilibrium", case, "--quiet", "-o", "other.hdf")
         self.assertIn("other.hdf", self.files())
 
+    def test_spheres_joined_by_points_are_named(self):
+        """Closed form, theory.md (8.11): spheres of the radii cos a and sin a."""
+        case = Path(__file__).parents[2] / "cases/vesicle.toml"
+        sets = ["--set", "energy.H0=-3.0", "--set", "equilibrium.reduced_volume=0.8", "--overwrite", "-o", self.result]
+        out, _ = self.tubule("equilibrium", case, *sets, "--set", 'equilibrium.family="prolate"')
+        self.assertIn("a vesiculated limit has less energy, 10.6916 for 12.9073: spheres of the radii", out)
+        out, _ = self.tubule("equilibrium", case, *sets, "--set", 'equilibrium.family="pear"')
+        self.assertNotIn("vesiculated", out)
+        out, _ = self.tubule("equilibrium", case, *sets, "--set", 'equilibrium.family="prolate"', "--set", "energy.k42=0.01")
+        self.assertNotIn("vesiculated", out)  # K^2 keeps necks open
+
     def test_minus_zero_is_zero(self):
         # The volume is free, so no pressure acts; the file has it as -0.
         case = Path(__file__).parents[2] / "cases/equilibrium_two_domains.toml"

@@ -101,6 +101,21 @@ class Found(EquilibriaTest):
         self.assertEqual({entry["value"] for entry in document["equal_energies"]}, set(found.values()))
         self.assertEqual({entry["key"] for entry in document["equal_energies"]}, {VOLUME})
 
+    def test_pears_and_vesiculated_limits(self):
+        """Energies of limits: scipy.optimize.brentq for R^2 + r^2 = 1, R^3 + r^3 = v."""
+        self.scan("vesicle.toml", f'--over={FAMILY}="prolate","pear"', f"--over={VOLUME}=0.77,0.8,0.9", f"--over={H0}=-2.8,-3.4",
+                  "--set=accuracy.energy=1e-4", "-o", "scan.hdf")  # fmt: skip
+        rows = list(csv.DictReader(io.StringIO(self.tubule("show", "scan.hdf", "--csv")[0])))
+        row = {(r[FAMILY].strip('"'), float(r[VOLUME]), float(r[H0])): r for r in rows}
+        self.assertEqual(row["pear", 0.77, -2.8]["outcome"], "pear")
+        self.assertAlmostEqual(float(row["pear", 0.77, -2.8]["limit_energy"]), 6.305364038013985, delta=1e-9)
+        self.assertEqual(row["pear", 0.8, -3.4]["outcome"], "failed")
+        self.assertGreater(float(row["pear", 0.8, -3.4]["free_energy"]), float(row["pear", 0.8, -3.4]["limit_energy"]))
+        lines = self.tubule("show", "scan.hdf")[0].splitlines()
+        self.assertEqual([line.strip() for line in lines[-2:]], ["vvl", "pll"])  # the upper line is that of H0 = -3.4
+        self.tubule("plot", "scan.hdf", "-o", "map.svg")
+        self.assertIn("vesiculated limit is lower (2)", (self.folder / "map.svg").read_text())
+
     def test_spheres_with_a_neck(self):
         """Spheres of the radii cos a and sin a have the area of one of radius 1. Seifert's limits: -H0 = 1/R1 +- 1/R2."""
         a = 0.5

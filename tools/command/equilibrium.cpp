@@ -31,10 +31,12 @@ Text table_of(const Result& result) {
     add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
+        const int negative = static_cast<int>(value("negative_directions", i));
+        const bool known = negative >= 0;  // not of a state that is no equilibrium
         if (branch) add(out, "{:>14.9g}  ", value("parameter", i));
         add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("tension", i),
-            value("pressure", i), value("height", i), value("r_max", i), value("negative_directions", i));
-        if (modes) {
+            value("pressure", i), value("height", i), value("r_max", i), known ? fmt::to_string(negative) : "?");
+        if (modes && known) {
             int fastest = 0;
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)
                 if (value(fmt::format("growth_{}", m), i) > value(fmt::format("growth_{}", fastest), i)) fastest = m;

@@ -37,12 +37,14 @@ void add_map(std::string& out, const ScanResult& result) {
         if (a != starts) axes.push_back(&result.scan.axes[a]);
     if (axes.size() != 2 || axes[0]->size() > 160) return;
     add(out, "\nright: {}; up: {}{}\n", axes[0]->keys.front(), axes[1]->keys.front(),
-        starts ? "; the shapes of least energy" : "");
+        starts ? "; the shapes of least energy, v where a vesiculated limit is lower" : "");
     for (std::size_t j = axes[1]->size(); j-- > 0;) {
         add(out, "    ");
         for (std::size_t i = 0; i < axes[0]->size(); ++i) {
             const std::size_t node = i * axes[1]->size() + j, start = best_start(nodes, node, result.points);
-            out += letters[static_cast<std::size_t>(result.points[nodes.point_of(node, start)].outcome)];
+            const PointResult& best = result.points[nodes.point_of(node, start)];
+            const bool vesiculated = starts && best[Measure::limit_energy] < best[Measure::free_energy];
+            out += vesiculated ? 'v' : letters[static_cast<std::size_t>(best.outcome)];
         }
         add(out, "\n");
     }

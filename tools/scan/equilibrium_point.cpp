@@ -43,13 +43,14 @@ Outcome outcome_of_shape(const axisym::Equilibrium& shape, const ProfilePoints& 
 
 PointResult equilibrium_point(const Problem& c, const std::function<bool()>& interrupted) {
     Interruptible observer(interrupted);
-    const auto [shape, modes] = axisym::find_shape(c, observer);
+    const auto [shape, modes, limit, meets_constraints] = axisym::find_shape(c, observer);
     PointResult p = unknown_point(0);
     p.stop = stop_word(shape.stop);
     p.message = shape.stop == Stop::finished ? "the shape is stationary" : shape.message;
     p[Measure::energy_error] = shape.estimated_error;
     p[Measure::E_ref] = shape.reference_energy;
     p[Measure::elements] = shape.space->images() * shape.space->splines().elements();
+    if (limit) p[Measure::limit_energy] = limit->energy;
     const bool tube = std::holds_alternative<Tube>(c.shape);
     ProfilePoints profile;
     if (shape.stop == Stop::finished || shape.stop == Stop::self_intersection) {
@@ -63,10 +64,10 @@ PointResult equilibrium_point(const Problem& c, const std::function<bool()>& int
         p[Measure::height] = measured.height;
         p[Measure::tension] = shape.sigma;
         p[Measure::pressure] = -shape.lambda;
-        const Loads loads = loads_at(c.law, 0);
-        p[Measure::free_energy] =
-            shape.observed.energy + loads.energy(shape.observed.area, shape.observed.volume, shape.length);
     }
+    if (meets_constraints)
+        p[Measure::free_energy] =
+            shape.observed.energy + loads_at(c.law, 0).energy(shape.observed.area, shape.observed.volume, shape.length);
     for (const axisym::ModeRates& mode : modes)
         if (!mode.rates.empty()) p[Measure::growth] = std::fmax(p[Measure::growth], mode.rates.front());
     const EndShape end{tube, p[Measure::r_min], p[Measure::r_max], p[Measure::area], p[Measure::volume]};

@@ -14,7 +14,9 @@
 namespace tubule {
 
 // At the last state, but for energy_error, which is that of the whole run. What a run does not tell is not a number.
-// height to free_energy are those of an equilibrium; growth is the largest rate of all m, with equilibrium.modes.
+// height to limit_energy are those of an equilibrium: growth is the largest rate of all m, with equilibrium.modes,
+// limit_energy that of the lowest vesiculated limit (common/theory). Searches that failed have the energy of their last
+// state where it has the area and the volume that are held.
 enum class Measure {
     energy,
     time,
@@ -29,14 +31,16 @@ enum class Measure {
     pressure,
     growth,
     free_energy,
+    limit_energy,
     steps,
     elements,
     wall_seconds,
     cpu_seconds
 };
-inline constexpr std::array measure_names{
-    "energy",  "time",     "energy_error", "E_ref",       "r_min", "r_max",    "area",         "volume",     "height",
-    "tension", "pressure", "growth",       "free_energy", "steps", "elements", "wall_seconds", "cpu_seconds"};
+inline constexpr std::array measure_names{"energy",   "time",         "energy_error", "E_ref",        "r_min",
+                                          "r_max",    "area",         "volume",       "height",       "tension",
+                                          "pressure", "growth",       "free_energy",  "limit_energy", "steps",
+                                          "elements", "wall_seconds", "cpu_seconds"};
 inline constexpr std::size_t n_measures = measure_names.size();
 
 struct PointResult {

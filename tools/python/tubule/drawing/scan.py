@@ -56,12 +56,14 @@ QUANTITIES = {
     "pressure": "pressure",
     "growth": "largest growth rate",
     "free_energy": "energy with that of loads",
+    "limit_energy": "energy of the vesiculated limit",
     "steps": "steps",
     "elements": "elements",
     "wall_seconds": "wall time in s",
     "cpu_seconds": "CPU time in s",
 }
 AT_REST = ("uniform-tube", "unduloid", "sphere", "closed", "prolate", "oblate", "stomatocyte", "pear")
+KNOWN_OF_FAILED = 1e-4  # of E_ref: to this the energy where a search failed is known
 THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
 NAMES = {
     "equilibrium.reduced_volume": "reduced volume",
@@ -180,6 +182,11 @@ def differing(outcome):
     return pairs
 
 
+def is_lower(energy, than):
+    """Where an energy is known and less than another that may be unknown."""
+    return np.isfinite(energy) & ~(energy >= than)
+
+
 class Slice:
     """The part of a scan that is drawn: two axes or one, the others at one value each, and of several initial shapes the
     equilibrium of least energy."""
@@ -205,6 +212,7 @@ class Slice:
             self.points = {name: np.take_along_axis(data, best_of, starts)[index] for name, data in scan.points.items()}
         else:
             self.points = scan.at(cut)
+        self._lower_states()
         self.thresholds = [] if set(cut) - {starts} else scan.thresholds
         if starts is None:
             self._boundary(scan, cut, kept)
@@ -212,6 +220,23 @@ class Slice:
             self.boundary = differing(self.points["outcome"])
         where = ", ".join(f"{scan.axes[i].key} = {scan.axes[i].texts[place]}" for i, place in sorted(cut.items()))
         self.title = ": ".join(words for words in (scan.title, where) if words)
+
+    def _lower_states(self):
+        """Where spheres joined by points have less energy than any smooth shape found; and where the lowest state is not
+        known, since a search that failed had come to less, or nothing at all was found."""
+        at_rest = [k for k, name in enumerate(self.names) if name in AT_REST]
+        found = np.isin(self.points["outcome"], at_rest)
+        self.vesiculated = self.unreached = np.zeros(found.shape, bool)
+        if not self.all_starts:
+            return
+        least = np.where(found, self.points["free_energy"], np.nan)
+        limit = self.points.get("limit_energy", np.full(found.shape, np.nan))  # older scans have none
+        lower = is_lower(limit, least)
+        unreached = (self.points["outcome"] > 0) & ~found & ~lower
+        for points in self.all_starts:
+            failed = (points["outcome"] > 0) & ~np.isin(points["outcome"], at_rest)
+            unreached |= failed & is_lower(points["free_energy"] + KNOWN_OF_FAILED * points["E_ref"], np.where(lower, limit, least))
+        self.vesiculated, self.unreached = lower & ~unreached, unreached
 
     def _boundary(self, scan, cut, kept):
         """What the scan has found of it, with the places on the sides of cells where it was refined."""
@@ -241,7 +266,8 @@ def draw_borders(part, panel):
     crossed = {tuple(np.ravel_multi_index(end, part.shape) for end in ends) for *ends, _, _, _, lowest in part.equal if lowest}
     for number, pair in enumerate(part.boundary):
         (i, j), (k, _) = (np.unravel_index(end, part.shape) for end in pair)
-        if tuple(pair) not in crossed:
+        hatched = [part.vesiculated.flat[end] or part.unreached.flat[end] for end in pair]
+        if tuple(pair) not in crossed and not all(hatched):
             lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])] if k > i else [(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
         if len(part.crossings):
             value = part.crossings[number]
@@ -273,22 +299,20 @@ def draw_equal_energies(part, panel):
     return handles
 
 
-def draw_lost_starts(part, panel):
-    """Dots where the search from one of the initial shapes found no equilibrium: one of lower energy may be missing there."""
-    at_rest = [k for k, name in enumerate(part.names) if k == 0 or name in AT_REST]
-    lost = np.any([~np.isin(points["outcome"], at_rest) for points in part.all_starts] or [np.zeros(part.shape, bool)], axis=0)
-    if not lost.any():
-        return []
-    i, j = np.nonzero(lost)
-    look = {"color": "0.35", "marker": ".", "markersize": 2.5, "linestyle": ""}
-    panel.plot(part.axes[0].values[i], part.axes[1].values[j], **look)
-    return [Line2D([], [], label=f"a start leads to no shape ({lost.sum()})", **look)]
+def draw_hatches(part, panel):
+    handles = []
+    for where, hatch, label in ((part.vesiculated, "////", "vesiculated limit is lower"), (part.unreached, "xxxx", "not reached")):
+        if where.any():
+            cells = np.ma.masked_where(~where, np.ones(part.shape))
+            panel.pcolor(*(axis.borders() for axis in part.axes), cells.T, hatch=hatch, facecolor="none", edgecolor="0.5", linewidth=0)
+            handles.append(Patch(facecolor="none", edgecolor="0.5", linewidth=0.4, hatch=hatch, label=f"{label} ({where.sum()})"))
+    return handles
 
 
 def draw_cells(part, quantity, panel):
     """The colour of each point's cell."""
     if quantity == "outcome":
-        shown = np.ma.masked_equal(part.points["outcome"].astype(float), 0)
+        shown = np.ma.masked_where((part.points["outcome"] == 0) | part.vesiculated | part.unreached, part.points["outcome"].astype(float))
         look = {"cmap": ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names]),
                 "norm": BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))}  # fmt: skip
     else:
@@ -302,7 +326,7 @@ def draw_cells(part, quantity, panel):
 def draw_map(part, quantity, panel):
     axes = part.axes
     draw_cells(part, quantity, panel)
-    handles = draw_borders(part, panel) + draw_lost_starts(part, panel)
+    handles = draw_borders(part, panel) + draw_hatches(part, panel)
     for dashes, (label, first, second, height) in zip(THRESHOLD_DASHES, part.thresholds):
         panel.contour(axes[0].values[first], axes[1].values[second], height.T, [0], colors="#c0392b", linestyles=[dashes], linewidths=1.2)
         handles.append(Line2D([], [], color="#c0392b", linestyle=dashes, label=label))
@@ -369,7 +393,7 @@ def figure_of(path, quantity="", slices=(), confirmed=None):
     patches = [
         Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
         for k, name in enumerate(part.names)
-        if of_outcomes and k > 0 and (count := int((part.points["outcome"] == k).sum()))
+        if of_outcomes and k > 0 and (count := int(((part.points["outcome"] == k) & ~part.vesiculated & ~part.unreached).sum()))
     ]
     figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(0.72 if of_outcomes else 0.84, 0.92))
     return figure
