@@ -46,10 +46,11 @@ template <int Order, Added added = Added::any, bool varies = true>
 Jet<Pack, 5, Order> functional_density(const Bending& bending, const PointH0& H0, const Weights& w, const Local& at) {
     using J = Jet<Pack, 5, Order>;
     J sum;
-    if (w.energy != 0 || w.area != 0) {
+    if (w.energy != 0 || w.area != 0 || w.M != 0) {
         const auto p = at.point<Order>();
         const auto of = [&](const CurvatureJet<Pack>& f) {
-            return w.energy * chain(p.H, p.K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
+            return chain(p.H, p.K, w.energy * f.f + w.M * p.H.v, w.energy * f.H + w.M, w.energy * f.K, w.energy * f.HH,
+                         w.energy * f.HK, w.energy * f.KK);
         };
         if constexpr (varies) {
             J tension;
@@ -370,7 +371,8 @@ Eigen::SparseMatrix<double> CurveForms::hessian(const Weights& weights, const Ei
 
 double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const {
     const CurveObservation o = observe(x);
-    return weights.energy * o.energy + weights.area * o.area + weights.volume * o.volume + weights.gauge * o.gauge;
+    return weights.energy * (o.energy - o.energy_alpha) + weights.area * o.area + weights.volume * o.volume +
+           weights.gauge * o.gauge + weights.M * o.M;
 }
 
 Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
@@ -406,6 +408,18 @@ Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
     return out;
 }
 
+double CurveForms::M(const double* x) const {
+    const SplineSpace& splines = space_.splines();
+    Pack sum{0.0};
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(space_, e, g, x);
+            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
+            sum += load(splines.basis(e, g).weight) * p.area * p.H;
+        }
+    return images_ * stdx::reduce(sum);
+}
+
 bool CurveForms::admissible(const Eigen::VectorXd& x) const {
     const SplineSpace& splines = space_.splines();
     for (int e = 0; e < splines.elements(); ++e)
@@ -436,7 +450,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     const int n = splines.elements();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     CurveObservation o;
-    Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0};
+    Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0}, M{0.0};
     std::vector<Pack> terms(count_terms(bending_), Pack(0.0));
     std::vector<double> stiffness(n, 0.0);
     for (int e = 0; e < n; ++e)
@@ -446,7 +460,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
             const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
             const Pack weight = load(basis.weight), dA = weight * p.area, speed = 1.0 / p.inverse_speed;
             const Pack q = stretching(at.r1, at.r2, at.z1, at.z2);
-            area += dA;
+            area += dA, M += dA * p.H;
             volume += pi * weight * at.r * at.r * at.z1;
             gauge += 0.5 * weight * q * q;
             length += weight * speed;
@@ -473,6 +487,8 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     o.volume = images_ * stdx::reduce(volume);
     o.gauge = images_ * stdx::reduce(gauge);
     o.length = images_ * stdx::reduce(length);
+    o.M = images_ * stdx::reduce(M);
+    o.energy = o.energy_alpha = area_difference_energy(bending_, o.M);
     for (const Pack& term : terms) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
     o.domain = domain(x);
     if (defect) *defect = spline_defect(x, stiffness);
@@ -521,7 +537,8 @@ double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
             const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
             for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
         }
-    return std::max(std::abs(observe(x).energy), images_ * magnitude);
+    const CurveObservation o = observe(x);
+    return std::max(std::abs(o.energy), images_ * magnitude + o.energy_alpha);
 }
 
 }  // namespace tubule::axisym

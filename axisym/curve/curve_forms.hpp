@@ -16,20 +16,22 @@ namespace tubule::axisym {
 
 struct VaryingH0;  // of packs, which depend on the machine's registers: not for those who include this
 
-// The functional energy E + area A + volume V + gauge J of the whole cell or period, by its weights.
-//   E = INT f(H, K) dS        V = INT pi r^2 z' ds
+// The functional energy INT f dS + area A + volume V + gauge J + M M of the whole cell or period, by its weights.
+//   f = f(H, K)        V = INT pi r^2 z' ds        M = INT H dS
 //   J = 1/2 INT (d log g/ds)^2 ds, g = |X'|, theory.md (4.9)
-// E, A and V do not depend on the parametrisation; J vanishes for one in proportion to arc length, which every shape
-// has. So E + alpha J has the stationary shapes of E, and a Hessian that is regular along the curve.
+// All but J do not depend on the parametrisation; J vanishes for one in proportion to arc length, which every shape
+// has. So E + c J has the stationary shapes of E, and a Hessian that is regular along the curve. Of the energy of area
+// differences, alpha/2 (M - M0)^2, the gradient is that of alpha (M - M0) M: a weight that whoever solves chooses.
 struct Weights {
-    double energy = 0, area = 0, volume = 0, gauge = 0;
+    double energy = 0, area = 0, volume = 0, gauge = 0, M = 0;
 };
 
 // Diagnostics of a curve, over the whole cell or period; extremes over the quadrature points. Many fields: a list of
 // measurements, found in one pass, that share no rule.
 struct CurveObservation {
-    double energy = 0;
+    double energy = 0;                // with that of area differences
     std::vector<double> energy_term;  // of each term, see term_names()
+    double energy_alpha = 0, M = 0;   // theory.md (2.19)
     double area = 0, volume = 0, gauge = 0;
     double length = 0;                                                  // of the meridian
     double r_min = std::numeric_limits<double>::infinity(), s_min = 0;  // not a pole, but possibly near one
@@ -75,6 +77,7 @@ public:
     double stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const;
     // INT dX . dX dS, into the pattern(): the product of displacements that a descent is measured with.
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
+    double M(const double* x) const;  // INT H dS
 
     // r > 0, |X'| > 0 and the energy defined at all quadrature points.
     bool admissible(const Eigen::VectorXd& x) const;

@@ -68,10 +68,13 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
             const double H0 = bending.H0_varies() ? evaluate(*bending.H0_formula, variables) : bending.H0;
             for_each_value_at(bending, H0, p.H, p.K,
                               [&](std::size_t k, double value) { sum.energy_term[k] += m.images() * value * dA[i]; });
+            sum.M += m.images() * p.H * dA[i];
             sum.magnitude += m.images() * magnitude(bending, H0, p.H, p.K) * dA[i];
         }
         below += dA.sum();
     });
+    sum.energy = sum.energy_alpha = area_difference_energy(bending, sum.M);
+    sum.magnitude += sum.energy_alpha;
     for (const double term : sum.energy_term) sum.energy += term;
     return sum;
 }

@@ -110,11 +110,29 @@ struct Bending {
     double H0 = 0;
     std::vector<EnergyTerm> terms = {};
     std::shared_ptr<const Formula> H0_formula = {};  // of the place on the initial shape: see H0_variables.hpp
+    // Area-difference elasticity, theory.md (2.19): alpha/2 (M - M0)^2 beside INT f dS, where M = INT H dS. Absent:
+    // none.
+    std::optional<double> alpha = {};
+    double M0 = 0;
+    double mu = 0;  // densities are f + mu H: see with_M(); but not in kernels that are made for fewer terms
 
     bool H0_varies() const { return H0_formula != nullptr; }
     // From points of a profile instead of the case: a formula of the area alone, in both tiers.
     bool H0_from_points() const { return H0_varies() && H0_formula->text.empty(); }
 };
+
+// alpha/2 (M - M0)^2 and its derivatives in M.
+inline double area_difference_energy(const Bending& bending, double M) {
+    return bending.alpha.value_or(0) / 2 * (M - bending.M0) * (M - bending.M0);
+}
+inline double area_difference_force(const Bending& bending, double M) {
+    return bending.alpha.value_or(0) * (M - bending.M0);
+}
+// The energy whose densities exert the forces of the whole on a shape with this M: f + alpha (M - M0) H.
+inline Bending with_M(Bending bending, double M) {
+    bending.mu = area_difference_force(bending, M);
+    return bending;
+}
 
 // The terms together are counted: first those of the list, then those of the case.
 inline std::size_t count_terms(const Bending& bending) {
@@ -226,8 +244,8 @@ void add_powers(const EnergyTerm& term, const T& x, const T& K, CurvatureJet<T>&
     sum.KK += (term.modulus * b * (b - 1)) * (p * q2);
 }
 
-// The density and its derivatives in H and K, summed over the terms in use, at a point with this H0: a number, or as
-// many as H.
+// The density and its derivatives in H and K, summed over the terms in use and mu H, at a point with this H0: a number,
+// or as many as H.
 template <class T, Added added = Added::any, class T0>
 CurvatureJet<T> density_at(const Bending& bending, const T0& H0, const T& H, const T& K) {
     CurvatureJet<T> h, k, sum;
@@ -237,6 +255,7 @@ CurvatureJet<T> density_at(const Bending& bending, const T0& H0, const T& H, con
         if (bending.k[i] != 0) sum = sum + bending.k[i] * term.value(h, k, H0);
     });
     if constexpr (added == Added::none) return sum;
+    if constexpr (added == Added::any) sum.f += bending.mu * H, sum.H += T(bending.mu);
     for (const EnergyTerm& term : bending.terms) {
         if (term.modulus == 0) continue;
         if constexpr (added == Added::any)
