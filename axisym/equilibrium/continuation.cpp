@@ -25,7 +25,7 @@ public:
     Follower(const StationaryProblem& problem, const Equilibrium& start, const SetParameter& set,
              const BranchSettings& settings)
         : problem_(problem), set_(set), settings_(settings), range_(std::abs(settings.to - settings.from)) {
-        place_.w.resize(start.x.size() + 4);
+        place_.w.resize(start.x.size() + StationarySystem::numbers + 1);
         place_.w << unknowns(start), settings.from;
         size_ = std::sqrt(start.observed.area);
         system_ = std::make_unique<StationarySystem>(start.space, problem, start.gauge);
@@ -101,7 +101,7 @@ private:
         system_->set_problem(problem_at(parameter));
         return system_->residual(u);
     }
-    // [F_u F_parameter; row]. Moduli and constraints enter F linearly, H0 as a polynomial of low degree.
+    // [F_u F_parameter; row]. Moduli, alpha, M0 and constraints enter F linearly, H0 as a polynomial of low degree.
     Eigen::SparseMatrix<double> matrix(const Eigen::VectorXd& w, const Eigen::VectorXd& row) {
         const int n = static_cast<int>(w.size()) - 1;
         const double h = 1e-4 * range_;
@@ -261,7 +261,7 @@ private:
         system_->set_problem(problem);
         Equilibrium& e = out.shape;
         e.space = system_->space_handle(), e.x = curve(place.w), e.gauge = system_->gauge();
-        e.sigma = place.w[n], e.lambda = place.w[n + 1];
+        e.sigma = place.w[n], e.lambda = place.w[n + 1], e.mu = place.w[system_->mu()];
         std::vector<double> defect;
         e.observed = system_->forms().observe(e.x, &defect);
         e.length = e.space->length(e.x.data());
@@ -301,9 +301,10 @@ private:
         const int n = system_->space().size(), m = finer->size();
         const Eigen::VectorXd y = finer->prolong(system_->space(), x);
         const Eigen::VectorXd ahead = finer->prolong(system_->space(), x + place_.tangent.head(n));
-        Place moved{Eigen::VectorXd(m + 4), Eigen::VectorXd(m + 4)};
-        moved.w << y, place_.w.tail(4);
-        moved.tangent << ahead - y, place_.tangent.tail(4);
+        constexpr int others = StationarySystem::numbers + 1;
+        Place moved{Eigen::VectorXd(m + others), Eigen::VectorXd(m + others)};
+        moved.w << y, place_.w.tail(others);
+        moved.tangent << ahead - y, place_.tangent.tail(others);
         const auto old = std::move(system_);
         system_ = std::make_unique<StationarySystem>(finer, old->problem(), old->gauge());
         place_ = moved;

@@ -79,7 +79,11 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
 }
 
 Weights StationarySystem::lagrangian(const Eigen::VectorXd& u) const {
-    return {.energy = 1, .area = u[sigma()], .volume = u[lambda()], .gauge = gauge_};
+    return {.energy = 1,
+            .area = u[sigma()],
+            .volume = u[lambda()],
+            .gauge = gauge_,
+            .M = problem_.bending.alpha ? u[mu()] : 0};
 }
 
 Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
@@ -87,8 +91,8 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
     const CurveObservation o = forms_.observe(x);
-    Eigen::VectorXd F = Eigen::VectorXd::Zero(n + 3);
-    F.head(n) = u[n + 2] * place_;
+    Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
+    F.head(n) = u[n + 3] * place_;
     forms_.add_gradient(lagrangian(u), x.data(), F.data());
     if (problem_.free_period) F[n - 1] -= problem_.loads.force * space_->images();
     if (c.reduced_volume) {
@@ -98,7 +102,8 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
         F[n] = c.area ? o.area - *c.area : u[n] - problem_.loads.tension;
         F[n + 1] = c.volume ? o.volume - *c.volume : u[n + 1] + problem_.loads.pressure;
     }
-    F[n + 2] = space_->topology() == Topology::cell ? place_.dot(x) : u[n + 2];
+    F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
+    F[n + 3] = space_->topology() == Topology::cell ? place_.dot(x) : u[n + 3];
     return F;
 }
 
@@ -108,8 +113,10 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
     const Eigen::VectorXd x = u.head(n);
     Eigen::SparseMatrix<double> hessian = forms_.hessian(lagrangian(u), x);
     if (damping != 0) hessian += damping * forms_.mass(x);
-    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x);
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3, n), corner = Eigen::MatrixXd::Zero(3, 3);
+    const Eigen::VectorXd columns[]{forms_.gradient({.area = 1}, x), forms_.gradient({.volume = 1}, x), slope_of_M(x),
+                                    place_};
+    const auto& [area, volume, M, place] = columns;
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(numbers, n), corner = Eigen::MatrixXd::Zero(numbers, numbers);
     if (c.reduced_volume) {
         const CurveObservation o = forms_.observe(x);
         rows.row(0) = 2 * u[n] * area + 3 * u[n + 1] * volume;
@@ -120,28 +127,33 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
         if (c.volume) rows.row(1) = volume;
         corner(0, 0) = c.area ? 0 : 1, corner(1, 1) = c.volume ? 0 : 1;
     }
+    rows.row(2) = -problem_.bending.alpha.value_or(0) * M, corner(2, 2) = 1;
     if (space_->topology() == Topology::cell)
-        rows.row(2) = place_;
+        rows.row(3) = place;
     else
-        corner(2, 2) = 1;
+        corner(3, 3) = 1;
 
-    // Columns in order, each with the rows of the Hessian and then all three others, zeros included.
-    Eigen::SparseMatrix<double> J(n + 3, n + 3);
-    J.reserve(hessian.nonZeros() + 6 * n + 9);
+    // Columns in order, each with the rows of the Hessian and then all others, zeros included.
+    Eigen::SparseMatrix<double> J(size(), size());
+    J.reserve(hessian.nonZeros() + 2 * numbers * n + numbers * numbers);
     for (int j = 0; j < n; ++j) {
         J.startVec(j);
         for (Eigen::SparseMatrix<double>::InnerIterator it(hessian, j); it; ++it)
             J.insertBack(it.row(), j) = it.value();
-        for (int i = 0; i < 3; ++i) J.insertBack(n + i, j) = rows(i, j);
+        for (int i = 0; i < numbers; ++i) J.insertBack(n + i, j) = rows(i, j);
     }
-    for (int j = 0; j < 3; ++j) {
-        const Eigen::VectorXd& column = j == 0 ? area : j == 1 ? volume : place_;
+    for (int j = 0; j < numbers; ++j) {
         J.startVec(n + j);
-        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = column[i];
-        for (int i = 0; i < 3; ++i) J.insertBack(n + i, n + j) = corner(i, j);
+        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = columns[j][i];
+        for (int i = 0; i < numbers; ++i) J.insertBack(n + i, n + j) = corner(i, j);
     }
     J.finalize();
     return J;
+}
+
+// Zero where nothing depends on it.
+Eigen::VectorXd StationarySystem::slope_of_M(const Eigen::VectorXd& x) const {
+    return problem_.bending.alpha ? forms_.gradient({.M = 1}, x) : Eigen::VectorXd::Zero(x.size());
 }
 
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
@@ -160,7 +172,9 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
     Eigen::MatrixXd hessian = forms_.hessian(lagrangian(u), x);
-    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x);
+    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x),
+                          M = slope_of_M(x);
+    hessian += problem_.bending.alpha.value_or(0) * M * M.transpose();
     Eigen::MatrixXd fixed(n, 0);
     const auto fix = [&](const Eigen::VectorXd& functional) {
         fixed.conservativeResize(n, fixed.cols() + 1);
@@ -285,21 +299,25 @@ private:
         constexpr double farthest = 0.05;  // for the sake of area and volume
         const int n = system_.space().size();
         Attempt out;
+        system_.set_mu(u_);
         try {
             const Eigen::SparseMatrix<double> J = system_.jacobian(u_, damping_);
             lu_.factor(J);
             const Eigen::VectorXd F = system_.residual(u_);
             Eigen::VectorXd force = F, off = F;
-            force.tail(3).setZero(), off.head(n).setZero();
+            force.tail(system_.numbers).setZero(), off.head(n).setZero();
             const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
             const double off_before = constraint_error(F), part = std::min(1.0, farthest / relative(back));
             const Eigen::VectorXd step = down + part * back, dx = step.head(n);
-            const double curvature = dx.dot(J.topLeftCorner(n, n) * dx);
+            Eigen::VectorXd within = Eigen::VectorXd::Zero(u_.size());
+            within.head(n) = dx, within[system_.mu()] = step[system_.mu()];
+            const double curvature = dx.dot((J * within).head(n));
             if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
             out.predicted = curvature / 2;
             out.to = u_ + step;
             for (int k = 0; k < 2; ++k) {
                 if (!system_.forms().admissible(head(out.to))) return out;
+                system_.set_mu(out.to);
                 Eigen::VectorXd still = system_.residual(out.to) - (1 - part) * off;
                 still.head(n).setZero();
                 out.to.head(n) -= lu_.solve(still).head(n);
@@ -586,7 +604,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         if (system.forms().admissible(x)) last = system.forms().observe(x);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 7)) break;
         std::vector<double> defect;
-        out.x = x, out.sigma = u[n], out.lambda = u[n + 1];
+        out.x = x, out.sigma = u[system.sigma()], out.lambda = u[system.lambda()], out.mu = u[system.mu()];
         out.observed = system.forms().observe(x, &defect);
         out.length = space->length(x.data());
         if (!found) compare.restart();
@@ -600,8 +618,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const auto finer = space_like(
             *space, next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements, found),
             settings.degree);
-        Eigen::VectorXd next(finer->size() + 3);
-        next << finer->prolong(*space, x), u.tail(3);
+        Eigen::VectorXd next(finer->size() + system.numbers);
+        next << finer->prolong(*space, x), u.tail(system.numbers);
         space = finer, u = next;
     }
     return end(Stop::solver_failed, why_none(problem.constraints, first, last, out.iterations));
@@ -610,15 +628,16 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
 }  // namespace
 
 Eigen::VectorXd unknowns(const Equilibrium& shape) {
-    Eigen::VectorXd u(shape.x.size() + 3);
-    u << shape.x, shape.sigma, shape.lambda, 0;
+    Eigen::VectorXd u(shape.x.size() + StationarySystem::numbers);
+    u << shape.x, shape.sigma, shape.lambda, shape.mu, 0;
     return u;
 }
 
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
     if (problem.free_period || shape.length == 0) return problem.loads.force;
     const CurveForms forms(*shape.space, problem.bending);
-    return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda}, shape.x) / shape.length;
+    return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda, .M = shape.mu}, shape.x) /
+           shape.length;
 }
 
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& start,
@@ -631,10 +650,11 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
         std::make_shared<CurveSpace>(start.topology, equal_breaks(std::max(settings.elements, coarsest) / images),
                                      settings.degree, settings.degree - 1, start.length, problem.free_period);
     const CurveForms forms(*space, problem.bending);
-    Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + 3), x = fit(*space, start);
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + StationarySystem::numbers), x = fit(*space, start);
     scale_to(forms, problem.constraints, x);
     u.head(space->size()) = x;
     u[space->size()] = problem.loads.tension, u[space->size() + 1] = -problem.loads.pressure;
+    u[space->size() + 2] = area_difference_force(problem.bending, forms.M(x.data()));
     return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }
 
@@ -644,8 +664,8 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     const CurveSpace& old = *nearby.space;
     const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
     const auto coarser = space_like(old, regraded(old.splines().breaks(), elements), settings.degree);
-    Eigen::VectorXd u(coarser->size() + 3);
-    u << coarser->prolong(old, nearby.x), nearby.sigma, nearby.lambda, 0;
+    Eigen::VectorXd u(coarser->size() + StationarySystem::numbers);
+    u << coarser->prolong(old, nearby.x), unknowns(nearby).tail(StationarySystem::numbers);
     const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);
     if (found.stop != Stop::solver_failed) return found;
     return solve(problem, nearby.space, unknowns(nearby), nearby.gauge, settings);

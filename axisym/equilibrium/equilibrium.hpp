@@ -37,11 +37,12 @@ struct Variation {
 };
 
 // The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve (the last of them the
-// rise of a free period), then sigma, lambda and the force that holds a whole cell in place along the axis (zero in the
-// end). `gauge` is the weight of the gauge
-// energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
+// rise of a free period), then sigma, lambda, mu = alpha (M - M0) and the force that holds a whole cell in place along
+// the axis (zero in the end). `gauge` is the weight of the gauge energy (CurveForms): the shape does not depend on it,
+// up to the error of the mesh.
 class StationarySystem {
 public:
+    static constexpr int numbers = 4;  // beside the curve
     // Throws as set_problem().
     StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
 
@@ -53,9 +54,12 @@ public:
     // values that no shape has, and where the period of the space is not free as the problem says.
     void set_problem(const StationaryProblem& problem);
     double gauge() const { return gauge_; }
-    int size() const { return space_->size() + 3; }
+    int size() const { return space_->size() + numbers; }
     int sigma() const { return space_->size(); }  // places in u
     int lambda() const { return space_->size() + 1; }
+    int mu() const { return space_->size() + 2; }
+    // Makes mu that of the curve.
+    void set_mu(Eigen::VectorXd& u) const { u[mu()] = area_difference_force(problem_.bending, forms_.M(u.data())); }
 
     // F(u), of size() numbers.
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
@@ -69,6 +73,7 @@ public:
 
 private:
     Weights lagrangian(const Eigen::VectorXd& u) const;
+    Eigen::VectorXd slope_of_M(const Eigen::VectorXd& x) const;
     double length(const Eigen::VectorXd& x) const { return space_->length(x.data()); }
 
     std::shared_ptr<const CurveSpace> space_;
@@ -90,7 +95,7 @@ struct EquilibriumSettings {
 struct Equilibrium {
     std::shared_ptr<const CurveSpace> space;
     Eigen::VectorXd x;
-    double sigma = 0, lambda = 0;
+    double sigma = 0, lambda = 0, mu = 0;
     double gauge = 0;
     CurveObservation observed;
     double length = 0;                                 // of the period, 0 of a cell

@@ -88,6 +88,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     const Vector n_r = space.r().project([&](double s) { return normal(s)[0]; });
     const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
     std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
+    const Bending bending = with_M(problem.bending, shape.observed.M);
     for (int e = 0; e < splines.elements(); ++e)
         for (int group = 0; group < splines.groups(); ++group) {
             const auto& b = splines.basis(e, group);
@@ -98,7 +99,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
             }
-            const J density = functional_density(problem.bending, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
+            const J density = functional_density(bending, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
@@ -212,7 +213,7 @@ int ModeStability::mirror(Parity parity) const {
 
 struct ModeStability::Forms {
     Matrix second_variation, mass, gradients, source;  // INT |grad f|^2, INT H f w
-    Vector area, volume, mean;
+    Vector area, volume, M, mean;
     Vector rigid[2];  // translation along or across the axis, tilt
 
     explicit Forms(int n)
@@ -222,6 +223,7 @@ struct ModeStability::Forms {
           source(second_variation),
           area(Vector::Zero(n)),
           volume(area),
+          M(area),
           mean(area),
           rigid{area, area} {}
 };
@@ -254,6 +256,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
             const Eigen::Vector3d Cv = p.weight * (C * v);
             forms.area[i] -= dS * p.H * p.along * v[0];
             forms.volume[i] += dS * p.along * v[0];
+            forms.M[i] -= 2 * dS * p.kappa_s * p.kappa_theta * p.along * v[0];
             forms.mean[i] += dS * v[0];
             for (int l = 0; l < 2; ++l) forms.rigid[l][i] += dS * p.along * motion[l] * v[0];
             for (int c = 0; c < width; ++c) {
@@ -351,6 +354,8 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
     const CurveSpace& space = *shape_.space;
     Matrix fixed(forms.mean.size(), 0);
     if (m == 0 && mirror(parity) >= 0) {
+        const double whole = 2 * pi * space.images();
+        forms.second_variation += whole * problem_.bending.alpha.value_or(0) * forms.M * forms.M.transpose();
         const Constraints& c = problem_.constraints;
         const bool flows = law.inextensible;
         if ((flows && !law.reservoir) || c.area) append(fixed, forms.area.normalized());
@@ -358,7 +363,6 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
         if (!law.inextensible && c.reduced_volume) {
             // V is fixed to a power of A: the multiplier of that, in the same units as those of area and volume.
             const double slope = 1.5 * shape_.observed.volume / shape_.observed.area;
-            const double whole = 2 * pi * space.images();
             append(fixed, (forms.volume - slope * forms.area).normalized());
             forms.second_variation -=
                 whole * shape_.lambda * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();

@@ -64,7 +64,9 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     const Eigen::LLT<Eigen::MatrixXd> factors(mass);
     const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
     e.sigma = sigma.value_or(0), e.lambda = volume ? 0 : -settings.pressure;
-    const Eigen::VectorXd force = scaled(forms.gradient({.energy = 1, .area = e.sigma, .volume = e.lambda}, e.x));
+    e.mu = area_difference_force(bending, e.observed.M);
+    const auto forces = [&] { return Weights{.energy = 1, .area = e.sigma, .volume = e.lambda, .M = e.mu}; };
+    const Eigen::VectorXd force = scaled(forms.gradient(forces(), e.x));
     Eigen::MatrixXd columns(force.size(), static_cast<Eigen::Index>(held.size()));
     for (std::size_t k = 0; k < held.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = scaled(held[k]);
     if (!held.empty()) {
@@ -73,7 +75,7 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
             const auto slope = [&](const Weights& weights) { return forms.stretch_slope(weights, e.x); };
             if (area && !sigma) append(balance.slopes, slope({.area = 1}));
             if (volume) append(balance.slopes, slope({.volume = 1}));
-            balance.wanted = *settings.force * shape.length - slope({.energy = 1, .area = e.sigma, .volume = e.lambda});
+            balance.wanted = *settings.force * shape.length - slope(forces());
         }
         const Eigen::VectorXd multipliers = multipliers_for(columns, force, balance);
         if (area && !sigma) e.sigma = multipliers[0];
@@ -82,9 +84,12 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     const double size = e.observed.length / (2 * pi), gauge = 0.01 * e.reference_energy;
     // A little resistance, for neutral modes: translations, and changes of size of a scale-invariant energy.
     const double resistance = 1e-3 * e.reference_energy / (e.observed.area * size * size);
+    Weights gauged = forces();
+    gauged.gauge = gauge;
+    const Eigen::VectorXd M = forms.gradient({.M = 1}, e.x);
     const Eigen::MatrixXd hessian =
-        Eigen::MatrixXd(forms.hessian({1, e.sigma, e.lambda, gauge}, e.x)) + resistance * mass;
-    const Eigen::VectorXd step = solve_dense(hessian, forms.gradient({1, e.sigma, e.lambda, 0}, e.x));
+        Eigen::MatrixXd(forms.hessian(gauged, e.x)) + resistance * mass + bending.alpha.value_or(0) * M * M.transpose();
+    const Eigen::VectorXd step = solve_dense(hessian, forms.gradient(forces(), e.x));
     unbalanced = std::sqrt(step.dot(mass * step) / e.observed.area) / size;
     e.stop = Stop::finished;
     return e;

@@ -18,7 +18,8 @@ CurvatureJet<double> on(const UniformTube& tube) {
     return density(tube.energy, -1 / tube.radius, 0.0);
 }
 CurvatureJet<double> on(const UniformSphere& sphere) {
-    return density(sphere.energy, -2 / sphere.radius, 1 / (sphere.radius * sphere.radius));
+    const double R = sphere.radius;
+    return density(with_M(sphere.energy, -8 * pi * R), -2 / R, 1 / (R * R));
 }
 
 // f + F1/R + sigma0: what multiplies Z.
@@ -94,6 +95,10 @@ double drag_of(const MotionLaw& law, double R, double q, int m) {
 }
 
 }  // namespace
+
+Bending on_tube(const Bending& energy, double length) {
+    return with_M(energy, -2 * pi * length);
+}
 
 double radius_rate(const UniformTube& tube) {
     const auto f = on(tube);
@@ -173,7 +178,9 @@ Stiffness stiffness(const UniformTube& tube, int m) {
 double stiffness(const UniformSphere& sphere, int l) {
     const double R = sphere.radius, L = l * (l + 1.0) - 2;
     const auto f = on(sphere);
-    return L / (R * R) * (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R)) + f.f - f.K / (R * R) + sphere.tension);
+    const double as_a_whole = l == 0 ? 16 * pi * sphere.energy.alpha.value_or(0) / (R * R) : 0;  // theory.md (2.21)
+    return L / (R * R) * (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R)) + f.f - f.K / (R * R) + sphere.tension) +
+           as_a_whole;
 }
 
 double mobility(const UniformTube& tube, const MotionLaw& law, double q, int m) {

@@ -15,7 +15,7 @@
 namespace tubule::theory {
 
 // A straight tube, and a sphere. The tension is sigma0 of theory.md (5.8). A gradient flow with a tension is that of
-// E + sigma0 A.
+// E + sigma0 A. With area-difference elasticity the energy of a tube is on_tube(), since the whole of it counts.
 struct UniformTube {
     Bending energy;
     double radius = 1, tension = 0;
@@ -24,6 +24,9 @@ struct UniformSphere {
     Bending energy;
     double radius = 1, tension = 0;
 };
+
+// An energy as it acts on straight tubes of this length, whatever their radius: M = -2 pi length.
+Bending on_tube(const Bending& energy, double length);
 
 // dR/dt of the gradient flow without tension.
 double radius_rate(const UniformTube& tube);

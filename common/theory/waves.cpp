@@ -200,7 +200,7 @@ std::vector<WaveState> waves_in_time(const UniformTube& tube, const MotionLaw& l
 std::optional<TubeStart> tube_start(const Problem& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
     if (!shape || c.equilibrium || c.energy.H0_varies()) return std::nullopt;
-    TubeStart start{{c.energy, shape->radius, 0}, shape->length, {}};
+    TubeStart start{{on_tube(c.energy, shape->length), shape->radius, 0}, shape->length, {}};
     std::map<std::pair<int, int>, std::complex<double>> sums;
     for (const TubeMode& mode : shape->modes)
         if (mode.n == 0 && mode.m == 0)
@@ -210,7 +210,7 @@ std::optional<TubeStart> tube_start(const Problem& c) {
     for (const auto& [wave, sum] : sums)
         if (std::abs(sum) > 0) start.waves.push_back({wave.first, wave.second, std::abs(sum), 0});
     const MotionLaw& law = c.law;
-    if (const auto tension = tension_of(law, c.energy, start.tube.radius))
+    if (const auto tension = tension_of(law, start.tube.energy, start.tube.radius))
         start.tube.tension = *tension;
     else if (!start.waves.empty())
         start.tube.tension = tension_of_waves(start.tube, law, start.length, start.waves);
@@ -234,7 +234,7 @@ std::optional<double> mean_rate(const Problem& c, int n, int m, double from, dou
     std::vector<Wave>& waves = start->waves;
     auto ours = std::find_if(waves.begin(), waves.end(), [&](const Wave& w) { return w.n == n && std::abs(w.m) == m; });
     if (ours == waves.end()) {
-        if (!tension_of(law, c.energy, start->tube.radius)) return std::nullopt;
+        if (!tension_of(law, start->tube.energy, start->tube.radius)) return std::nullopt;
         ours = waves.insert(ours, {n, m, 1, 0});
     }
     const auto at = ours - waves.begin();

@@ -140,7 +140,7 @@ std::optional<TubeSubject> tube_of(const Problem& c) {
     const Tube* shape = std::get_if<Tube>(&c.shape);
     if (!shape || c.equilibrium) return std::nullopt;
     TubeSubject out;
-    out.tube = {c.energy, shape->radius, 0};
+    out.tube = {theory::on_tube(c.energy, shape->length), shape->radius, 0};
     out.length = shape->length, out.end = c.time.end;
     for (const TubeMode& mode : shape->modes)
         if (mode.n == 0 && mode.m == 0)
@@ -168,7 +168,7 @@ std::optional<TubeSubject> tube_of(const Problem& c, const Record& frame) {
     const Curve profile = meridian(frame_curve(frame));
     if (profile.topology != Topology::tube || !(profile.length > 0)) return std::nullopt;
     TubeSubject out;
-    out.tube = {c.energy, axisym::mean_radius(profile), 0};
+    out.tube = {theory::on_tube(c.energy, profile.length), axisym::mean_radius(profile), 0};
     out.length = profile.length;
     for (int i = 0; i < 400; ++i)
         if (std::abs(profile.at(i / 400.0)[0] - out.tube.radius) > 1e-3 * out.tube.radius) return std::nullopt;

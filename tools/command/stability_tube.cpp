@@ -231,7 +231,8 @@ std::string moduli(const Bending& energy) {
     for (const EnergyTerm& term : energy.terms)
         text += term.formula ? fmt::format("{:g} ({}), ", term.modulus, term.formula->text)
                              : fmt::format("k{} = {:g}, ", term_name(term), term.modulus);
-    return text + fmt::format("H0 = {:g}", energy.H0);
+    text += fmt::format("H0 = {:g}", energy.H0);
+    return energy.alpha ? text + fmt::format(", alpha = {:g}, M0 = {:g}", *energy.alpha, energy.M0) : text;
 }
 
 std::string ill_posed_words(const UniformTube& tube) {

@@ -30,7 +30,7 @@ bool only_k20(const Bending& energy) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only = only && (std::string_view(term.key) == "k20" ? energy.k[i] > 0 : energy.k[i] == 0);
     });
-    return only && energy.terms.empty();
+    return only && energy.terms.empty() && !energy.alpha;
 }
 
 // Whether its equilibria without energy are the surfaces of constant mean curvature H0, and of which period:
@@ -63,9 +63,10 @@ std::optional<theory::UniformTube> tube_at_rest(const Problem& c) {
     if (!tube || c.equilibrium) return std::nullopt;
     const MotionLaw& law = c.law;
     if (law.loads_change()) return std::nullopt;
-    const auto tension = theory::tension_of(law, c.energy, tube->radius);
+    const Bending energy = theory::on_tube(c.energy, tube->length);
+    const auto tension = theory::tension_of(law, energy, tube->radius);
     if (!tension) return std::nullopt;
-    theory::UniformTube start{c.energy, tube->radius, *tension};
+    theory::UniformTube start{energy, tube->radius, *tension};
     if (law.keeps_volume || !law.area_is_free()) return start;
     if (law.reservoir || !law.without_loads()) {
         const auto radius = theory::radius_at_rest(law, start);
@@ -73,7 +74,7 @@ std::optional<theory::UniformTube> tube_at_rest(const Problem& c) {
         start.radius = *radius;
         return start;
     }
-    const theory::UniformTube rest{c.energy, 1 / std::abs(c.energy.H0), 0};
+    const theory::UniformTube rest{energy, 1 / std::abs(c.energy.H0), 0};
     const double k20 = c.energy.k[term_number("k20")], rounding = 1e-12 * std::abs(k20 * std::pow(c.energy.H0, 3));
     if (c.energy.H0 == 0 || k20 == 0 || std::abs(theory::radius_rate(rest)) > rounding) return std::nullopt;
     return rest;

@@ -29,7 +29,7 @@ std::optional<UniformFate> UniformFate::of(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || !c.is_axisymmetric() || c.unknowns == Unknowns::equilibrium) return std::nullopt;
     const MotionLaw& law = c.law;
-    if (!law.unconstrained() || !law.without_loads()) return std::nullopt;
+    if (!law.unconstrained() || !law.without_loads() || c.energy.alpha) return std::nullopt;
     for (const double H : {-3.0, -1.0, -0.3, 0.7})
         if (density<double>(c.energy, H, 0).HK != 0) return std::nullopt;
     int waves = 0;
