@@ -183,10 +183,11 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.volume = add(law.inextensible && law.keeps_volume && law.holds_volume, 1);
     const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
     at_.drift = add(law.inextensible && !held, 1);
+    at_.mu = add(bending.alpha.has_value(), 1);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
-    for (const int number :
-         {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume, at_.drift, at_.shift})
+    for (const int number : {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume,
+                             at_.drift, at_.mu, at_.shift})
         if (number >= 0) numbers_.push_back(number);
     parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},     {&space.r(), at_.u_r},
               {&space.z(), at_.u_z}, {&space.r(), at_.swirl}, {&pressure_, at_.p}};
@@ -260,7 +261,12 @@ Weights CurveMotion::force_weights(double t, const double* y) const {
     const double tension = at_.tension < 0 ? loads.tension : y[at_.tension];
     return {.energy = 1,
             .area = law_.inextensible ? 0 : tension,
-            .volume = at_.lambda < 0 ? -loads.pressure : y[at_.lambda]};
+            .volume = at_.lambda < 0 ? -loads.pressure : y[at_.lambda],
+            .M = at_.mu < 0 ? 0 : y[at_.mu]};
+}
+
+void CurveMotion::set_mu(Eigen::VectorXd& y) const {
+    if (at_.mu >= 0) y[at_.mu] = area_difference_force(forms_.bending(), forms_.M(y.data()));
 }
 
 // Weights of the velocity that moves the curve in addition to the flow.
@@ -328,6 +334,7 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     if (at_.volume >= 0) F[at_.volume] = V;
     if (at_.lambda >= 0 && !law_.inextensible) F[at_.lambda] = V;
     if (at_.lambda >= 0 && law_.inextensible) F[at_.lambda] = gradient_at({.volume = 1}, y).dot(velocity(y));
+    if (at_.mu >= 0) F[at_.mu] = y[at_.mu] - area_difference_force(forms_.bending(), forms_.M(y));
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
     F[at_.stretch] += gradient_at(force_weights(t, y), y).dot(stretched(y)) - law_.force.at(t) * space().length(y);
@@ -508,7 +515,7 @@ void CurveMotion::add_forms(double t, const double* y, double* values) const {
     for (std::size_t i = 0; i < entries.size(); ++i) values[curve_slots_[i]] += entries[i];
 }
 
-// Contributions of the multipliers of area and volume.
+// Contributions of the multipliers of area and volume, and of mu.
 void CurveMotion::add_numbers(const double* y, double* values) const {
     const int n = space().shape_size(), all = space().size();
     const auto add_border = [&](int at, int rows, int columns, const Eigen::VectorXd& slope) {
@@ -517,6 +524,14 @@ void CurveMotion::add_numbers(const double* y, double* values) const {
     };
     if (at_.area >= 0) add_border(at_.area, 0, 0, gradient_at({.area = 1}, y));
     if (at_.tension >= 0) add_border(at_.tension, 0, 0, gradient_at({.area = 1}, y));
+    if (at_.mu >= 0) {
+        const Eigen::VectorXd slope = gradient_at({.M = 1}, y);
+        const std::vector<int>& row = number_rows_.at(at_.mu);
+        const int column = pattern_.outerIndexPtr()[at_.mu] + (law_.inextensible ? at_.u_r : 0);
+        for (int i = 0; i < n; ++i) values[column + i] += slope[i];
+        for (int i = 0; i < all; ++i) values[row[i]] -= *forms_.bending().alpha * slope[i];
+        values[row[at_.mu]] += 1;
+    }
     if (at_.lambda < 0) return;
     const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
     if (!law_.inextensible) return add_border(at_.lambda, 0, 0, slope);
@@ -548,6 +563,7 @@ void CurveMotion::add_stretch(double t, const double* y, double cj, double* valu
     for (int i = 0; i < all; ++i) values[row[i]] += by_curve[i];
     if (at_.tension >= 0) values[row[at_.tension]] += gradient_at({.area = 1}, y).dot(along);
     if (at_.lambda >= 0) values[row[at_.lambda]] += gradient_at({.volume = 1}, y).dot(along);
+    if (at_.mu >= 0) values[row[at_.mu]] += gradient_at({.M = 1}, y).dot(along);
 }
 
 CurveMotion::Balance CurveMotion::balance(double t, const double* y, const double* rate) const {

@@ -38,6 +38,7 @@ struct MotionLayout {
     int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0
     int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
+    int mu = -1;                 // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
     int shift = -1;              // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
     int size = 0;
 };
@@ -74,6 +75,8 @@ public:
     void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
     const SplineSpace& pressures() const { return pressure_; }
 
+    // Sets the unknown mu of the curve of y, if there is one.
+    void set_mu(Eigen::VectorXd& y) const;
     // The residual F of the system. False where r <= 0 at a quadrature point: try a smaller step.
     bool residual(double t, const double* y, const double* rate, double* F) const;
     // dF/dy + cj dF/drate, into the values of a matrix with pattern().

@@ -138,6 +138,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
 
 Snapshot CurveSetup::with_exact_shape(Snapshot s) const {
     s.o.energy = start.bending.energy, s.o.energy_term = start.bending.energy_term;
+    s.o.energy_alpha = start.bending.energy_alpha, s.o.M = start.bending.M;
     s.o.area = start.area, s.o.volume = start.volume;
     s.free_energy = start.free_energy(motion->law());
     return s;
@@ -182,6 +183,7 @@ InitialState state_without_velocity(const CurveSetup& setup) {
     InitialState out;
     out.y = out.rate = Eigen::VectorXd::Zero(setup.motion->layout().size);
     out.y.head(setup.space->size()) = fit(*setup.space, ArcLength(setup.start.meridian));
+    setup.motion->set_mu(out.y);
     out.shown = out.y;
     return out;
 }
@@ -225,6 +227,7 @@ InitialState initial_state(const CurveSetup& setup) {
     const MotionLayout& at = setup.motion->layout();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(at.size);
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
+    setup.motion->set_mu(y);
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that

@@ -214,9 +214,12 @@ IntegratorCounters CurveSimulation::counters() const {
 void CurveSimulation::add_to_trace(double t) {
     const MotionLaw& law = setup_.motion->law();
     const Loads loads = loads_at(law, t);
-    const Eigen::VectorXd gradient = setup_.motion->forms().gradient(
-                              {.energy = 1, .area = loads.tension, .volume = -loads.pressure},
-                              setup_.curve(integrator_->x())),
+    const CurveForms& forms = setup_.motion->forms();
+    const Eigen::VectorXd gradient = forms.gradient({.energy = 1,
+                                                     .area = loads.tension,
+                                                     .volume = -loads.pressure,
+                                                     .M = area_difference_force(forms.bending(), now_.o.M)},
+                                                    setup_.curve(integrator_->x())),
                           moves = setup_.curve(integrator_->v());
     const double lengthens = law.free_period ? setup_.space->images() * moves[setup_.motion->layout().rise] : 0;
     trace.add(
