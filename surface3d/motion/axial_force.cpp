@@ -5,12 +5,13 @@
 namespace tubule::surface3d {
 
 double axial_force(const MovingSurface& surface, const MotionState& state, const MotionFields& fields,
-                   const VectorField& u, double tension, double pressure) {
+                   const VectorField& u, double M, double tension, double pressure) {
     const CurvedMesh mesh = surface.mesh(state);
     if (!(mesh.period > 0)) return 0;
     const SurfaceSpace& space = surface.space();
     const SurfaceLaw& law = surface.law();
     const Tabulation& table = space.tabulation();
+    const Bending bending = with_M(surface.bending(), M);
     Eigen::VectorXd p = Eigen::VectorXd::Constant(mesh.size(), -tension);
     if (law.inextensible && state.p.size() > 0) p = surface.pressure_at_nodes(state);
     Eigen::VectorXd of_cell(space.cells());
@@ -25,13 +26,13 @@ double axial_force(const MovingSurface& surface, const MotionState& state, const
             const CellColumns<3> grad = gradients(x, table, q);
             const auto phi = table.value.col(q);
             const double H = nodal_H.dot(phi), K = nodal_K.dot(phi);
-            const PointH0 H0(surface.bending(), gather_H0(space, fields.H0, cell), grad, phi, H, K);
+            const PointH0 H0(bending, gather_H0(space, fields.H0, cell), grad, phi, H, K);
             Eigen::Matrix<double, 3, 2> e;
             e << x.tangent[0].normalized(), x.normal.cross(x.tangent[0].normalized());
             const Eigen::Matrix2d B = e.transpose() * shape_operator(x, grad, normals) * e;
             const AxialStretch s = axial_stretch(e.row(2).transpose(), B, H, K);
             const Eigen::Vector3d along = e * s.along;
-            const CurvatureJet<double> f = density_at(surface.bending(), H0.value, H, K);
+            const CurvatureJet<double> f = density_at(bending, H0.value, H, K);
             const double strain = along.dot(U * (grad.transpose() * along)) + state.stretch * s.area * s.area;
             sum += table.weight[q] * x.area *
                    (f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + 2 * law.viscosity * strain);

@@ -54,4 +54,15 @@ Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const Vect
     });
 }
 
+double integral(const SurfaceSpace& space, const CurvedMesh& mesh, const Eigen::VectorXd& values) {
+    const Tabulation& table = space.tabulation();
+    return sum_over(space, mesh,
+                    [&](int cell) {
+                        return [&table, nodal = space.gather(values, cell)](const SurfacePoint<double>&, int q) {
+                            return Eigen::Vector2d(nodal.dot(table.value.col(q)), 0);
+                        };
+                    })
+        .area;
+}
+
 }  // namespace tubule::surface3d

@@ -15,5 +15,7 @@ Extent extent(const SurfaceSpace& space, const CurvedMesh& mesh);
 Extent extent_rate(const SurfaceSpace& space, const CurvedMesh& mesh, const VectorField& d);
 // And with z e_z, by which the period grows, too: theory.md (10.18).
 Extent stretch_rate(const SurfaceSpace& space, const CurvedMesh& mesh);
+// The integral of a function with these values at the nodes.
+double integral(const SurfaceSpace& space, const CurvedMesh& mesh, const Eigen::VectorXd& values);
 
 }  // namespace tubule::surface3d

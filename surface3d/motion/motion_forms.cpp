@@ -46,13 +46,14 @@ struct CellTables {
     Eigen::MatrixXd strain, divergence;   // D(v) as (11, 22, sqrt(2) 12), div_P v
 };
 
+// Many fields: the parts of the system that one cell adds to.
 struct CellWork {
     CellTables t;
     CellMatrix advection;                  // (c.grad phi_b, phi_a), c = u* - w* along the surface
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
-    Eigen::VectorXd rhs, flux, widening, load, force, row, column;
-    double own = 0, energy = 0;  // of a stretch
+    Eigen::VectorXd rhs, flux, widening, turning, load, force, row, column;
+    double own = 0, energy = 0, M = 0;  // of a stretch
 };
 
 class Assembler {
@@ -62,7 +63,7 @@ public:
         : space_(space),
           unknowns_(unknowns),
           law_(law),
-          bending_(bending),
+          bending_(with_M(bending, base.M)),
           base_(base),
           table_(space.tabulation()),
           pressure_table_(space.tabulation(unknowns.p < 0 ? 1 : unknowns.last_mesh().order)),
@@ -105,12 +106,12 @@ private:
     const SurfaceSpace& space_;
     const MotionUnknowns& unknowns_;
     const SurfaceLaw& law_;
-    const Bending& bending_;
+    const Bending bending_;
     const StepBase& base_;
     const Tabulation& table_;
     Tabulation pressure_table_;
     int n_, nv_, H_, K_, p_;                // nodes and velocities of a cell, first columns of its blocks
-    std::vector<Eigen::Vector2d> of_cell_;  // own and energy of a stretch: their sum does not depend on the threads
+    std::vector<Eigen::Vector3d> of_cell_;  // own, energy and M of a stretch: their sum does not depend on the threads
 };
 
 void Assembler::size(CellWork& work) const {
@@ -125,8 +126,8 @@ void Assembler::size(CellWork& work) const {
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
     work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.widening.setZero(w);
-    work.load.setZero(w), work.force.setZero(w);
-    if (law_.free_period) work.row.setZero(w), work.column.setZero(w), work.own = work.energy = 0;
+    work.turning.setZero(w), work.load.setZero(w), work.force.setZero(w);
+    if (law_.free_period) work.row.setZero(w), work.column.setZero(w), work.own = work.energy = work.M = 0;
 }
 
 Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColumns<3>& gradient,
@@ -258,6 +259,7 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
+        if (bending_.alpha) work.turning.head(nv_) += (s.dS * (s.B2 - s.trace * s.H)) * t.normal.row(q).transpose();
         if (!law_.inextensible) work.widening.head(nv_) -= (s.dS * s.H) * t.normal.row(q).transpose();
     }
     if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
@@ -377,6 +379,7 @@ void Assembler::add_stretch(const std::vector<Point>& at, CellWork& work) const 
         const AxialStretch by = axial_stretch(s.e.row(2).transpose(), s.B * s.e, s.H, s.K);
         const auto phi = t.phi.row(q).transpose();
         work.energy += s.dS * (s.f.H * by.H + s.f.K * by.K + s.f.f * by.area);
+        work.M += s.dS * (by.H + s.H * by.area);
         const auto add = [&](int first, double rate, double force, double value) {
             if (first < 0) return;
             work.column.segment(first, n_) -= (base_.te * s.dS * rate) * phi;
@@ -423,6 +426,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
         system.b[numbers[i]] += work.rhs[i];
         system.flux[numbers[i]] += work.flux[i];
         system.widening[numbers[i]] += work.widening[i];
+        system.turning[numbers[i]] += work.turning[i];
         system.pressure_load[numbers[i]] += work.load[i];
         system.force[numbers[i]] += work.force[i];
     }
@@ -431,14 +435,14 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
         system.stretch.row[numbers[i]] += work.row[i];
         system.stretch.column[numbers[i]] += work.column[i];
     }
-    of_cell_[cell] = {work.own, work.energy};
+    of_cell_[cell] = {work.own, work.energy, work.M};
 }
 
 void Assembler::sum_stretch(StepSystem& system) const {
     if (!law_.free_period) return;
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    for (const Eigen::Vector2d& of : of_cell_) sum += of;
-    system.stretch.own = sum[0], system.stretch.energy = sum[1];
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& of : of_cell_) sum += of;
+    system.stretch.own = sum[0], system.stretch.energy = sum[1], system.stretch.M = sum[2];
     system.stretch.rate = stretch_rate(space_, *base_.mesh);
 }
 
@@ -454,6 +458,7 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const S
     system.flux.setZero(unknowns.size());
     system.pressure_load.setZero(unknowns.size());
     system.widening.setZero(unknowns.size());
+    system.turning.setZero(unknowns.size());
     system.force.setZero(unknowns.size());
     if (law.free_period) system.stretch.row.setZero(unknowns.size()), system.stretch.column.setZero(unknowns.size());
     Assembler assembler(space, unknowns, law, bending, base);

@@ -34,6 +34,7 @@ struct StepBase {
     double curvature_stabilisation = 0;  // L_H is taken 1 + this * |B| (width of a triangle) times
     double tension = 0;  // expected: its part in the force changes with H at once, -tension (H - H*, v.nu)
     double stretch = 0;  // in X* - Xbar, of a free period
+    double M = 0;        // INT H of X*
     double supply = 0;   // expected div_P u of a membrane with inertia that a reservoir feeds: theory.md (3.18)
 };
 
@@ -43,6 +44,7 @@ struct StretchTerms {
     double own = 0;     // of e in its row
     double energy = 0;  // dE[z e_z], less what H and K in the row add to it
     Extent rate;        // of area, volume and period on X*
+    double M = 0;       // and of INT H
 };
 
 struct StepSystem {
@@ -51,6 +53,7 @@ struct StepSystem {
     Eigen::VectorXd flux;           // (u.nu, 1) = flux . unknowns: the column and the row of lambda
     Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
     Eigen::VectorXd widening;       // the rate of the area, -(H*, v.nu); of extensible membranes
+    Eigen::VectorXd turning;        // the rate of M = INT H, -(2 K, u.nu): theory.md (2.20)
     Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
     StretchTerms stretch;
     Eigen::SparseMatrix<double>
@@ -58,7 +61,8 @@ struct StepSystem {
 };
 
 // H and K at the end of the step are unknowns, coupled to u by their evolution equations: the bending force is implicit
-// in both: theory.md (10.5), (10.6), (10.7), (10.8).
+// in both. Of area differences it has what is known on X*, alpha (M - M0) with its M: theory.md (10.5), (10.6), (10.7),
+// (10.8).
 void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 

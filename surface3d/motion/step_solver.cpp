@@ -12,8 +12,8 @@ namespace {
 // 2, 3, 4; what little damps would grow in long steps.
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
-constexpr int most_carried = 20;     // of that, before it is factored
-constexpr int most_multipliers = 4;      // lambda, tension, supply, stretch
+constexpr int most_carried = 20;         // of that, before it is factored
+constexpr int most_multipliers = 5;      // lambda, tension, supply, stretch, mu
 // Measured: docs/decisions/energies.md.
 constexpr double least_evenness = 0.02;
 
@@ -40,6 +40,7 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
                   .tension = law.keeps_area ? stage.tension : law.tension.at(stage.time),
                   .stretch = stretch,
                   .supply = expected_supply(at, stage)};
+    if (surface_.bending().alpha) base.M = integral(surface_.space(), at, base.fields.H);
     StageSolution out;
     out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
     const Eigen::VectorXd x = solve(base, stage.time, rate, out);
@@ -142,7 +143,7 @@ void StepSolver::make_symmetric(const StepBase& base) {
 
 // With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
 // also a row: rigid motions; lambda; the tension of an area that is kept as a whole; the supply of a reservoir, whose
-// row is the mean of p; the stretch of a free period.
+// row is the mean of p; the stretch of a free period; how far alpha (M - M0) at the end differs from that of X*.
 Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Extent& rate, StageSolution& out) {
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
@@ -178,6 +179,12 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
         border.D(stretch, stretch) = s.own;
         if (lambda >= 0) border.D(lambda, stretch) = border.D(stretch, lambda) = s.rate.volume;
         if (tension >= 0) border.D(tension, stretch) = border.D(stretch, tension) = s.rate.area;
+    }
+    if (surface_.bending().alpha) {
+        const double unit = std::sqrt(*surface_.bending().alpha * base.te);  // in which all alpha are alike
+        const Eigen::Index mu = add_both(unit * system_.turning, unit * turned(base) / base.te);
+        border.D(mu, mu) = -1;
+        if (stretch >= 0) border.D(mu, stretch) = border.D(stretch, mu) = unit * system_.stretch.M;
     }
     border.C.conservativeResize(Eigen::NoChange, n), border.R.conservativeResize(Eigen::NoChange, n);
     border.D.conservativeResize(n, n), border.d.conservativeResize(n);
@@ -220,6 +227,21 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
+// M of X* less that to which the expected motion of the nodes and none of the surface would lead.
+double StepSolver::turned(const StepBase& base) const {
+    return paired(system_.turning, base.displacement - base.te * base.mesh_velocity, base.fields) +
+           base.te * system_.turning.head(base.velocity.size()).dot(base.velocity) + base.stretch * system_.stretch.M;
+}
+
+// A functional of velocities, such as the force, of v at the nodes; of its normal part where nothing flows.
+double StepSolver::paired(const Eigen::VectorXd& rows, const VectorField& v, const MotionFields& fields) const {
+    const int n = surface_.nodes();
+    if (!surface_.law().flows) return rows.head(n).dot(v.cwiseProduct(fields.normal).colwise().sum());
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum += rows.segment(i * n, n).dot(v.row(i));
+    return sum;
+}
+
 // -(b, d) and that of the loads, to first order the free energy that a correction takes.
 double StepSolver::work(const MovingSurface::Correction& by, const MotionState& at, const MotionFields& fields) const {
     const int n = surface_.nodes();
@@ -233,9 +255,7 @@ double StepSolver::work(const MovingSurface::Correction& by, const MotionState& 
         if (unknowns_.K >= 0) energy += s.row.segment(unknowns_.K, n).dot(fields.K);
         sum += by.stretch * energy;
     }
-    if (!law.flows) return sum - system_.force.head(n).dot(by.displacement.cwiseProduct(fields.normal).colwise().sum());
-    for (int i = 0; i < 3; ++i) sum -= system_.force.segment(i * n, n).dot(by.displacement.row(i));
-    return sum;
+    return sum - paired(system_.force, by.displacement, fields);
 }
 
 }  // namespace tubule::surface3d

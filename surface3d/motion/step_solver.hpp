@@ -54,6 +54,8 @@ private:
     double expected_supply(const CurvedMesh& at, const Stage& stage) const;
     Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     void make_symmetric(const StepBase& base);
+    double turned(const StepBase& base) const;
+    double paired(const Eigen::VectorXd& rows, const VectorField& v, const MotionFields& fields) const;
     double work(const MovingSurface::Correction& by, const MotionState& at, const MotionFields& fields) const;
 
     MovingSurface& surface_;

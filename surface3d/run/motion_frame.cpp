@@ -96,6 +96,9 @@ SeriesTable<MotionRow> motion_series(const Bending& energy) {
     });
     table.add_family("energy_<kl>", term_names(energy),
                      [](const MotionRow& r, std::size_t term) { return r.measures.bending.energy_term[term]; });
+    if (energy.alpha)
+        table.add({{"energy_alpha", [](const MotionRow& r) { return r.measures.bending.energy_alpha; }},
+                   {"M", [](const MotionRow& r) { return r.measures.bending.M; }}});
     table.add({
         {"free_energy", [](const MotionRow& r) { return r.measures.free_energy; }},
         {"work", [](const MotionRow& r) { return r.work; }},

@@ -233,6 +233,9 @@ SeriesTable<RestRow> rest_series(const Problem& c) {
     });
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const RestRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.alpha)
+        table.add({{"energy_alpha", [](const RestRow& r) { return r.o.energy_alpha; }},
+                   {"M", [](const RestRow& r) { return r.o.M; }}});
     table.add({
         {"area", [](const RestRow& r) { return r.o.area; }},
         {"volume", [](const RestRow& r) { return r.o.volume; }},

@@ -13,7 +13,7 @@ namespace tubule::surface3d {
 namespace {
 
 PaperModuli paper_moduli(const Bending& bending) {
-    if (const auto key = term_beyond_paper(bending); !key.empty())
+    if (const auto key = bending.alpha ? "energy.alpha" : term_beyond_paper(bending); !key.empty())
         throw std::invalid_argument(fmt::format("the paper's scheme has k20, k40 and k42, no {}", key));
     return {.k20 = bending.k[term_number("k20")],
             .k40 = bending.k[term_number("k40")],
