@@ -44,6 +44,10 @@ SetParameter setter(int parameter) {
     switch (parameter) {
         case vary_H0:
             return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
+        case vary_alpha:
+            return [](StationaryProblem& p, double value) { p.bending.alpha = value; };
+        case vary_M0:
+            return [](StationaryProblem& p, double value) { p.bending.M0 = value; };
         case vary_area:
             return [](StationaryProblem& p, double value) { p.constraints.area = value; };
         case vary_volume:
@@ -70,6 +74,10 @@ double start_of(int parameter, const StationaryProblem& p) {
     switch (parameter) {
         case vary_H0:
             return p.bending.H0;
+        case vary_alpha:
+            return *p.bending.alpha;
+        case vary_M0:
+            return p.bending.M0;
         case vary_area:
             return *c.area;
         case vary_volume:
@@ -230,6 +238,9 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.alpha)
+        table.add({{"energy_alpha", [](const ShapeRow& r) { return r.o.energy_alpha; }},
+                   {"M", [](const ShapeRow& r) { return r.o.M; }}});
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
                     return r.o.energy + r.problem.loads.energy(r.o.area, r.o.volume, r.point.shape.length);

@@ -23,7 +23,7 @@ enum class Family { prolate, oblate, stomatocyte, pear };
 
 // What a branch is followed in: the moduli by the number of their term, or these.
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
-                     vary_pressure = -6, vary_force = -7;
+                     vary_pressure = -6, vary_force = -7, vary_alpha = -8, vary_M0 = -9;
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -120,6 +120,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         for (std::size_t i = 0; i < count_terms(energy); ++i)
             parameters.emplace_back(term_key(energy, i), static_cast<int>(i));
         parameters.insert(parameters.end(), {{"energy.H0", vary_H0},
+                                             {"energy.alpha", vary_alpha},
+                                             {"energy.M0", vary_M0},
                                              {"equilibrium.area", vary_area},
                                              {"equilibrium.volume", vary_volume},
                                              {"equilibrium.reduced_volume", vary_reduced_volume},
@@ -133,6 +135,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
             const BranchChoices& b = e.branch;
             if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
+            if (*b.parameter == vary_alpha || *b.parameter == vary_M0)
+                return energy.alpha ? "" : "varies what the energy does not have: see energy.alpha";
             if (*b.parameter == vary_force)
                 return model.free_period ? "" : "varies a force at a fixed period: see model.period";
             if (*b.parameter == vary_tension || *b.parameter == vary_pressure) {

@@ -95,6 +95,8 @@ void keys(Keys& k, Bending& energy, Tier tier) {
         moduli += (moduli.empty() ? "" : ", ") + std::string(term.key);
     });
     k.number_or_formula("H0", energy.H0, energy.H0_formula, tier == Tier::surface3d ? H0_of_surface : H0_of_profile);
+    k.number("alpha", energy.alpha, {.from = 0});
+    k.number("M0", energy.M0);
     k.tables("term", energy.terms, [](auto& k, EnergyTerm& term) { keys(k, term); });
     for (std::size_t i = 0; i < energy.terms.size(); ++i) {
         energy.terms[i].entry = i;
@@ -315,6 +317,8 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_tension) return loads.tension;
     if (parameter == vary_pressure) return loads.pressure;
     if (parameter == vary_force) return loads.force;
+    if (parameter == vary_alpha) return c.energy.alpha;
+    if (parameter == vary_M0) return c.energy.M0;
     return parameter == vary_H0 ? c.energy.H0 : modulus(c.energy, parameter);
 }
 

@@ -26,8 +26,10 @@ inline constexpr std::array other_names{
     OtherName{"energy", " kappa_bar kappabar kbar k_bar kappa_g kg gaussian_modulus gaussian_rigidity ", "",
               "the Gaussian modulus bends no closed or periodic membrane; to count its energy, write [[energy.term]] "
               "with modulus, H = 0 and K = 1"},
-    OtherName{"energy", " c0 c_0 m0 h_0 spontaneous_curvature spontaneous ", "H0",
+    OtherName{"energy", " c0 c_0 h_0 spontaneous_curvature spontaneous ", "H0",
               "write H0 = -c0: spheres and tubes have H < 0, -2/R and -1/R, where papers have c0 > 0"},
+    OtherName{"energy", " delta_a0 deltaa0 da0 delta_a area_difference ", "M0",
+              "write M0 = -DeltaA0/D, with the distance D of the layers: M is the integral of H, negative on vesicles"},
     OtherName{"energy", " sigma tension surface_tension gamma ", "",
               "write model.tension, for a membrane whose area is free; what a fixed area needs is computed"},
     OtherName{"energy", " p pressure delta_p ", "",

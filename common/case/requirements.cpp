@@ -55,6 +55,8 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
                    const auto& H0 = p.energy.H0_formula;
                    return !p.equilibrium || (!uses(*H0, 1) && !uses(*H0, 2));
                }},
+    alpha{"energy.alpha", [](P p) { return p.energy.alpha.has_value(); }},
+    no_alpha{"an energy without energy.alpha", [](P p) { return !p.energy.alpha; }},
     no_modes{"a case without equilibrium.modes", [](P p) { return !p.equilibrium || !p.equilibrium->modes; }},
     other_branch{"a branch that does not vary it",
                  [](P p) { return !p.equilibrium || p.equilibrium->branch.parameter != vary_H0; }},
@@ -145,10 +147,10 @@ const std::vector<Requirement> rows{
     key("time.stationary", {motion}),
     key("time.integrator", {axisym, motion}),
     value(
-        "time.integrator", [](P p) { return p.time.integrator == Integrator::rosenbrock; }, {begun_as_graph},
+        "time.integrator", [](P p) { return p.time.integrator == Integrator::rosenbrock; }, {no_alpha, begun_as_graph},
         "omit it"),
     key("time.max_order", {axisym, motion, ida}),
-    value("discretisation.parametrisation", parametrised(Parametrisation::graph), {graph}),
+    value("discretisation.parametrisation", parametrised(Parametrisation::graph), {no_alpha, graph}),
     value("discretisation.parametrisation", parametrised(Parametrisation::even), {number_H0},
           "where H0 varies, points move with the membrane"),
     value("discretisation.parametrisation", parametrised(Parametrisation::material), {along}),
@@ -167,7 +169,8 @@ const std::vector<Requirement> rows{
     value("discretisation.scheme", scheme_without(&SchemeEntry::with_inertia), {no_inertia},
           "bending waves grow in its steps"),
     value("discretisation.scheme", scheme_without(&SchemeEntry::general),
-          {inextensible, resisted, as_begun, number_H0, few_terms}),
+          {inextensible, resisted, as_begun, number_H0, few_terms, no_alpha}),
+    key("energy.M0", {alpha}),
     number("energy.H0", [](P p) { return p.energy.H0_varies(); },
            {named_tier, time, fixed_period, no_modes, other_branch, H0_of_area}, {}),
 };

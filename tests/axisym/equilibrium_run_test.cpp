@@ -97,9 +97,12 @@ TEST(EquilibriumCase, refusals) {
     expect("vary = \"energy.k42\"\n", "", "14:1: equilibrium.branch needs vary: the key that changes along the branch");
     expect("step = 0.05\n", "",
            "14:1: equilibrium.branch needs to and step: the end of the branch and the distance between shapes");
+    expect("energy.k42", "energy.M0",
+           "14:1: equilibrium.branch varies what the energy does not have: see energy.alpha");
     expect("energy.k42", "energy.k43",
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
-           "\"energy.H0\", \"equilibrium.area\", \"equilibrium.volume\", \"equilibrium.reduced_volume\", "
+           "\"energy.H0\", \"energy.alpha\", \"energy.M0\", \"equilibrium.area\", \"equilibrium.volume\", "
+           "\"equilibrium.reduced_volume\", "
            "\"model.tension\", \"model.pressure\", \"model.force\", not \"energy.k43\"; did you mean 'energy.k40'?");
     const std::string varies = "14:1: equilibrium.branch varies a quantity that is not held fixed: see " + held;
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",

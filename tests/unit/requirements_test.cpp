@@ -71,10 +71,12 @@ const std::vector<Refused> refused{
     {moving, {"time.integrator=ida"}, "tier = \"axisym\""},
     {equilibrium, {"time.integrator=ida"}, "a motion, without [equilibrium]"},
     {axisym, {"model.kind=stokes", "time.integrator=rosenbrock"}, "a graph r(z): "},
+    {axisym, {"energy.alpha=1", "time.integrator=rosenbrock"}, "an energy without energy.alpha"},
     {moving, {"time.max_order=2"}, "tier = \"axisym\""},
     {equilibrium, {"time.max_order=2"}, "a motion, without [equilibrium]"},
     {axisym, {"time.integrator=rosenbrock", "time.max_order=2"}, "time.integrator = \"ida\""},
     {axisym, {"model.kind=fluid", "discretisation.parametrisation=graph"}, "a graph r(z): "},
+    {axisym, {"energy.alpha=1", "discretisation.parametrisation=graph"}, "an energy without energy.alpha"},
     {axisym, {H0_of_area, "discretisation.parametrisation=even"}, "a number energy.H0"},
     {axisym, {"discretisation.parametrisation=material"}, "a flow along the membrane"},
     {moving, {"discretisation.recovery=patch"}, "a single surface"},
@@ -98,6 +100,7 @@ const std::vector<Refused> refused{
      {"equilibrium.branch={vary=\"energy.H0\", to=1, step=0.1}", H0_of_area},
      "a branch that does not vary it"},
     {equilibrium, {H0_of_z}, "variable area alone"},
+    {axisym, {"energy.M0=-20"}, "energy.alpha"},
 };
 const std::vector<std::string> by_paper{"model.kind=overdamped", "discretisation.step=0.1"};
 const std::vector<Refused> refused_by_paper{
@@ -110,6 +113,7 @@ const std::vector<Refused> refused_by_paper{
     {moving, {"model.area=reservoir", "discretisation.scheme=paper"}, "fixed area and period"},
     {moving, {H0_of_z, "discretisation.scheme=paper"}, "a number energy.H0"},
     {moving, {"energy.term=[{modulus=1, H=6}]", "discretisation.scheme=paper"}, "the terms k20, k40 and k42 alone"},
+    {moving, {"energy.alpha=1", "discretisation.scheme=paper"}, "an energy without energy.alpha"},
 };
 
 std::string refusal(const std::string& text, const std::vector<std::string>& sets) {
