@@ -223,7 +223,9 @@ private:
         std::sort(found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
         for (auto& [distance, p] : found) {
             if (met_itself(*p.shape.space, p.shape.x, p.parameter)) break;
-            p.index = p.kind == PointKind::regular ? p.shape.negative_directions : before;
+            p.index = p.kind == PointKind::regular
+                          ? p.shape.negative_directions
+                          : before + directions_without_mirror(problem_at(p.parameter), p.shape);
             branch_.points.push_back(std::move(p));
             settings_.found(branch_.points.back());
         }

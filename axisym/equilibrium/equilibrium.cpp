@@ -517,6 +517,7 @@ double neck_radius(const CurveSpace& space, const Eigen::VectorXd& x) {
 // Counts the axisymmetric directions that lower the energy twice: by the second variation of the curve's coefficients,
 // and by that of the energy in normal displacements. A mesh that does not resolve the shape may have a minimum where
 // the energy has none; the counts differ then. Directions whose eigenvalue is zero up to the error count as either.
+// Half a curve knows the directions that mirror themselves; the others are counted by displacements alone.
 struct DirectionCount {
     int by_coefficients = 0, by_displacements = 0;
     bool agrees = true;
@@ -525,22 +526,20 @@ struct DirectionCount {
 DirectionCount count_directions(const StationaryProblem& problem, const StationarySystem& system,
                                 const Eigen::VectorXd& u, const Equilibrium& shape, double accuracy) {
     const double per_area = std::max(accuracy, 1e-9) * shape.reference_energy / shape.observed.area;
-    const auto count = [](const auto& values, double below) {
-        return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v < below; }));
+    const auto count = [](const auto& values, double from) {
+        return static_cast<int>(std::count_if(values.begin(), values.end(), [&](double v) { return v > from; }));
     };
-    const Eigen::VectorXd values = system.variation(u).eigenvalues;
+    const Eigen::VectorXd falls = -system.variation(u).eigenvalues;
     DirectionCount out;
-    out.by_coefficients = count(values, 0.0);
+    out.by_coefficients = count(falls, 0.0);
     if (problem.free_period || problem.bending.H0_varies())
         return out;  // displacements keep the period; H0 is constant
-    const double of_coefficient = per_area / static_cast<double>(values.size()),
-                 of_rate = per_area / shape.observed.area;
-    const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false};
-    std::vector<double> rates = ModeStability(problem, shape).rates(0, gradient_flow, out.by_coefficients + 2).rates;
-    for (double& rate : rates) rate = -rate;
+    const double neutral = per_area / static_cast<double>(falls.size()), neutral_rate = per_area / shape.observed.area;
+    const ModeStability stability(problem, shape);
+    const std::vector<double> rates = stability.axisymmetric_rates(true, out.by_coefficients + 2);
     out.by_displacements = count(rates, 0.0);
-    out.agrees = count(values, -of_coefficient) <= count(rates, of_rate) &&
-                 count(rates, -of_rate) <= count(values, of_coefficient);
+    out.agrees =
+        count(falls, neutral) <= count(rates, -neutral_rate) && count(rates, neutral_rate) <= count(falls, -neutral);
     return out;
 }
 
@@ -563,7 +562,7 @@ std::optional<std::pair<Stop, std::string>> verdict(const StationaryProblem& pro
                                  p.r, p.z)}};
         }
         const DirectionCount directions = count_directions(problem, system, u, out, settings.accuracy);
-        out.negative_directions = directions.by_coefficients;
+        out.negative_directions = directions.by_coefficients + directions_without_mirror(problem, out);
         if (directions.agrees) return {{Stop::finished, ""}};
         unknown = fmt::format(
             "the stability is undetermined: the energy falls in {} directions by the coefficients of the profile, in "
@@ -638,6 +637,14 @@ double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
     const CurveForms forms(*shape.space, problem.bending);
     return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda, .M = shape.mu}, shape.x) /
            shape.length;
+}
+
+int directions_without_mirror(const StationaryProblem& problem, const Equilibrium& shape) {
+    if (shape.space->images() == 1 || problem.free_period || problem.bending.H0_varies()) return 0;
+    constexpr int most = 10;
+    const double neutral = 1e-9 * shape.reference_energy / (shape.observed.area * shape.observed.area);
+    const std::vector<double> rates = ModeStability(problem, shape).axisymmetric_rates(false, most);
+    return static_cast<int>(std::count_if(rates.begin(), rates.end(), [&](double rate) { return rate > neutral; }));
 }
 
 Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& start,

@@ -122,6 +122,9 @@ Eigen::VectorXd unknowns(const Equilibrium& shape);
 // The axial force of a tube at rest, theory.md (3.19): given, or what holds its period.
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 
+// Of half a curve: directions that lower the energy and do not mirror themselves, of at most 10; else 0.
+int directions_without_mirror(const StationaryProblem& problem, const Equilibrium& shape);
+
 // The same grading with another number of elements.
 std::vector<double> regraded(const std::vector<double>& breaks, int elements);
 

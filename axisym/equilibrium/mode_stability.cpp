@@ -169,6 +169,14 @@ ModeRates ModeStability::rates(int m, const MotionLaw& law, int count) const {
     return out;
 }
 
+std::vector<double> ModeStability::axisymmetric_rates(bool even, int count) const {
+    const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false};
+    ModeRates out;
+    for (const Parity& parity : parities(0))
+        if ((mirror(parity) >= 0) == even) add_rates(0, gradient_flow, parity, count, out);
+    return out.rates;
+}
+
 namespace {
 
 // Columns that span the vectors orthogonal to all of `fixed`: area and volume are one constraint for a sphere or a

@@ -52,8 +52,10 @@ std::optional<LimitShape> vesiculated_limit(const Bending& bending, double area,
         LimitShape shape{n, inside, size * std::sqrt(std::fmax(0, 1 - n * square)), size * std::sqrt(square)};
         if (!(shape.radius > 0 && shape.other_radius > 0)) return;
         if (inside && shape.other_radius > fits_inside[n - 1] * shape.radius) return;
-        shape.energy =
-            sphere_energy(bending, shape.radius, 1) + n * (sphere_energy(bending, shape.other_radius, sign) + *neck);
+        const double M = -8 * pi * (shape.radius + sign * n * shape.other_radius);
+        shape.energy = sphere_energy(bending, shape.radius, 1) +
+                       n * (sphere_energy(bending, shape.other_radius, sign) + *neck) +
+                       area_difference_energy(bending, M);
         if (std::isfinite(shape.energy) && (!best || shape.energy < best->energy)) best = shape;
     };
     for (int n = 1; n <= most_others; ++n) {

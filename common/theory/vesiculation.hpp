@@ -9,7 +9,7 @@
 namespace tubule::theory {
 
 // A sphere of `radius` and `others` equal ones of `other_radius`, beside it or inside, and the energy of all with their
-// necks. Inside it the others are turned over: H = 2/r.
+// necks, area difference included. Inside it the others are turned over: H = 2/r.
 struct LimitShape {
     int others = 1;
     bool inside = false;

@@ -112,7 +112,7 @@ class Found(EquilibriaTest):
         self.assertEqual(row["pear", 0.8, -3.4]["outcome"], "failed")
         self.assertGreater(float(row["pear", 0.8, -3.4]["free_energy"]), float(row["pear", 0.8, -3.4]["limit_energy"]))
         lines = self.tubule("show", "scan.hdf")[0].splitlines()
-        self.assertEqual([line.strip() for line in lines[-2:]], ["vvl", "pll"])  # the upper line is that of H0 = -3.4
+        self.assertEqual([line.strip() for line in lines[-2:]], ["vvl", "ppl"])  # the upper line is that of H0 = -3.4
         self.tubule("plot", "scan.hdf", "-o", "map.svg")
         self.assertIn("vesiculated limit is lower (2)", (self.folder / "map.svg").read_text())
 

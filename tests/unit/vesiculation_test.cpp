@@ -70,6 +70,17 @@ TEST(Vesiculation, TheGaussCurvatureOfSpheresAndNecksIsThatOfASphere) {
     EXPECT_NEAR(vesiculated_limit(with, area, volume(0.6))->energy - less, 2.8 * pi, 1e-6);
 }
 
+TEST(Vesiculation, AreaDifferences) {
+    // theory.md (2.19): on spheres M = INT H dS = -8 pi (R + r).
+    Bending with = helfrich(-3);
+    with.alpha = 0.4, with.M0 = -30;
+    const auto limit = vesiculated_limit(with, area, volume(0.8)),
+               plain = vesiculated_limit(helfrich(-3), area, volume(0.8));
+    const double M = -8 * pi * (plain->radius + plain->other_radius);
+    ASSERT_EQ(limit->others, 1);
+    EXPECT_NEAR(limit->energy, plain->energy + 0.2 * (M + 30) * (M + 30), 1e-9);
+}
+
 TEST(Vesiculation, NoneWhereNecksCostMore) {
     Bending stiff = helfrich(-3);
     stiff.k[term_number("k42")] = 1e-3;

@@ -34,7 +34,7 @@ class Shape:
             return
         with h5py.File(result) as file:
             about = file["about"].attrs
-            self.stop, self.message = about["stop"], about["message"]
+            self.stop = about["stop"]
             self.error, self.scale = about["estimated_error"], about["E_ref"]
             last = {name: data[-1] for name, data in file["series"].items()}
         self.energy, self.negative = last["free_energy"], last["negative_directions"]
@@ -101,7 +101,7 @@ class Counts(unittest.TestCase):
         ratios.sort()
         print(f"\n{COUNT} problems: {dict(stops)}; undetermined {undetermined}; silent or another branch {silent}; "
               f"true over stated error: median {ratios[len(ratios) // 2]:.2g}, 90 % {ratios[9 * len(ratios) // 10]:.2g}")  # fmt: skip
-        self.assertLessEqual(len(undetermined), 0.03 * COUNT)
+        self.assertLessEqual(len(undetermined), max(0.03 * COUNT, 1))
 
 
 class GroundStates(unittest.TestCase):
