@@ -84,7 +84,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     S force_z = law.friction * v + drift;
     const S tension = ((2 * law.viscosity) * stretch_s - p) * ig2;
     if (law.inertia != 0) {
-        const S half = 0.5 * divergence, advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
+        const S half = 0.5 * (divergence - n.supply), advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
         force_r += law.inertia * (f.ur_t + advect * f.v[ur1] + half * u - w * w * inverse_r);
         force_z += law.inertia * (f.uz_t + advect * f.v[uz1] + half * v);
         if (law.swirls) {
@@ -411,7 +411,12 @@ void CurveMotion::add_law(double t, const double* y, const double* rate, double 
             const auto& f = at.fields;
             const Pack dS = (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
             if (at_.drift >= 0) add_column(at_.drift, velocity_z, e, g, weight * dS, values);
-            if (at_.supply >= 0) add_column(at_.supply, pressure, e, g, weight * dS, values);
+            if (at_.supply >= 0) {
+                add_column(at_.supply, pressure, e, g, weight * dS, values);
+                for (const int part : {velocity_r, velocity_z, swirl})
+                    add_column(at_.supply, part, e, g,
+                               (-0.5 * law_.inertia) * weight * dS * f.v[Local::first_slot(part)], values);
+            }
             if (at_.shift >= 0) {
                 add_column(at_.shift, curve_r, e, g, weight * (2 * pi) * f.v[r0] * f.v[r1], values);
                 add_column(at_.shift, curve_z, e, g, weight * (2 * pi) * f.v[r0] * f.v[z1], values);
@@ -601,7 +606,8 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             pull += dS * (2 * law_.viscosity * ss - f.v[p0]) * z_s * z_s * ig * ig;
             speed = stdx::max(speed, square);
         }
-    out.kinetic = stdx::reduce(kinetic), out.dissipation = stdx::reduce(dissipation);
+    out.kinetic = stdx::reduce(kinetic), out.supplied = numbers.supply * out.kinetic;
+    out.dissipation = stdx::reduce(dissipation);
     out.momentum_z = space().images() == 2 ? 0 : stdx::reduce(momentum);  // the other half has the opposite
     out.angular_z = stdx::reduce(angular);
     out.acceleration = stdx::reduce(acceleration);

@@ -54,7 +54,7 @@ struct InitialState {
 //   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve moves with u, its parameter stays even (gauge J)
 //   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
 //   (q, div u - supply) = 0,  dV[u] = 0
-// with c = (u - X_t).t. Half the divergence times u is added to the acceleration, by which the discrete kinetic energy
+// with c = (u - X_t).t. Half of (div u - supply) u is added to the acceleration, by which the discrete kinetic energy
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
 // pressure that is given stands for -lambda. A free period adds (L_t/L) z e_z to u, and the test
@@ -88,6 +88,7 @@ public:
     // Kinetic energy and related integrals over the whole cell or period.
     struct Balance {
         double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
+        double supplied = 0;                  // kinetic energy that a reservoir brings, per time: theory.md (3.18)
         double momentum_z = 0, angular_z = 0;
         double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
         double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter

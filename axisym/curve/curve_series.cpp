@@ -39,7 +39,8 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
                    {"M", [](const CurveRow& r) { return r.now.o.M; }}});
     const MotionLaw law = c.law;
     table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
-    if (law.loads_change()) table.add({{"work", [](const CurveRow& r) { return r.work; }}});
+    if (law.loads_change() || law.supplies_kinetic_energy())
+        table.add({{"work", [](const CurveRow& r) { return r.work; }}});
     table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},
                {"identity_defect", [](const CurveRow& r) { return r.identity_defect; }},
                {"area", [](const CurveRow& r) { return r.now.o.area; }},

@@ -115,12 +115,12 @@ void CurveSimulation::begin() {
     initial_ = std::make_unique<View>(*this, 0, 0, 0, at.shown, at.rate, s);
     if (!initial_stop_) initial_stop_ = find_guard(s, 0);
     if (initial_stop_) now_ = s;
-    // In the time of the steps that lead from the curve to the first unknowns, changing loads do work at this shape;
-    // the rest of the difference dissipates.
+    // In the time of the steps that lead from the curve to the first unknowns, changing loads and a reservoir do work
+    // at this shape; the rest of the difference dissipates.
     const auto at_loads = [&](double t) {
         return loads_at(setup_.motion->law(), t).energy(now_.o.area, now_.o.volume, now_.period);
     };
-    past_.work = at_loads(at.time) - at_loads(0);
+    past_.work = at_loads(at.time) - at_loads(0) + at.time * now_.balance.supplied;
     past_.dissipated = past_.total_start + past_.work - now_.total();
     look_at_mesh();
 }
@@ -182,7 +182,7 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     past_.rates = load_rates(setup_.motion->law(), time);
     system.work = [this](double t, const double* at, const double* v) {
         const Snapshot& s = observe(t, at, v);
-        return past_.rates.energy(s.o.area, s.o.volume, s.period);
+        return past_.rates.energy(s.o.area, s.o.volume, s.period) + s.balance.supplied;
     };
     system.guards = [this](double t, const double* at, const double* v) {
         const Snapshot& s = observe(t, at, v);
@@ -301,7 +301,7 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
     error = std::max(error, error_now_);
 }
 
-// No law of motion lets the total energy, less the work of loads that change, rise: a rise is an error. Where it
+// No law of motion lets the total energy, less the work done, rise: a rise is an error. Where it
 // exceeds the tolerance and the known error, or the shape is not that of a membrane, the run returns to the last good
 // step.
 std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {

@@ -96,6 +96,7 @@ struct MotionLaw {
     bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
     // Whether F is E alone at all times; whether F - E depends on time.
     bool without_loads() const { return tension.is_zero() && pressure.is_zero() && force.is_zero(); }
+    bool supplies_kinetic_energy() const { return reservoir && inertia != 0; }
     bool loads_change() const { return !tension.is_constant() || !pressure.is_constant() || !force.is_constant(); }
 };
 

@@ -36,7 +36,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"energy_formula", "energy", "part of the term given by a formula in E", SeriesUse::energy},
     {"energy_alpha", "energy", "part of area-difference elasticity, alpha/2 (M - M0)^2, in E", SeriesUse::energy},
     {"free_energy", "energy", "F = E + tension A - pressure V - force L", SeriesUse::energy},
-    {"work", "energy", "work of tension, pressure and force that change in time", SeriesUse::energy},
+    {"work", "energy", "work of loads that change in time, and kinetic energy from a reservoir", SeriesUse::energy},
     {"dissipation", "energy/time", "dissipation, at which F and the kinetic energy fall"},
     {"identity_defect", "energy", "defect of the energy identity", SeriesUse::diagnostic},
     {"area", "length^2", "area"},

@@ -201,12 +201,12 @@ void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& 
     }
 }
 
-// theory.md (10.5): inertia (u - ubar, v)/te + inertia ((u* - w*).grad u + supply/2 u, v) + friction (u, v) +
-// 2 viscosity (D(u), D(v))
+// theory.md (10.5): inertia (u - ubar, v)/te + inertia ((u* - w*).grad u, v) + friction (u, v) + 2 viscosity (D(u),
+// D(v))
 void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();
-    const double rate = law_.inertia / base_.te, drag = rate + law_.inertia * base_.supply / 2 + law_.friction;
+    const double rate = law_.inertia / base_.te, drag = rate + law_.friction;
     CellMatrix scalar = CellMatrix::Zero(n_, n_);
     for (int q = 0; q < Q; ++q) work.weighted1.row(q) = at[q].dS * t.phi.row(q);
     if (drag != 0) scalar.noalias() += drag * (t.phi.transpose() * work.weighted1);

@@ -35,7 +35,6 @@ struct StepBase {
     double tension = 0;  // expected: its part in the force changes with H at once, -tension (H - H*, v.nu)
     double stretch = 0;  // in X* - Xbar, of a free period
     double M = 0;        // INT H of X*
-    double supply = 0;   // expected div_P u of a membrane with inertia that a reservoir feeds: theory.md (3.18)
 };
 
 // What belongs to the stretch e of a free period, u = .. + e z e_z: theory.md (3.19), (10.18).

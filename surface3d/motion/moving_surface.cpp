@@ -182,14 +182,13 @@ Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
     return momenta(mesh(state)).transpose() * state.u;
 }
 
-// d_t u + div_P u/2 u: membrane is fed without work, so that momentum grows with the root of the area, theory.md
-// (3.18).
+// Membrane from a reservoir enters with the local velocity, so that both grow with the area: theory.md (3.18).
 Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, const MotionState& to) const {
     const Eigen::VectorXd now = momenta(from);
     if (now.size() == 0) return now;
     const double left = std::exp(-law_.friction / law_.inertia * to.step);
     if (!law_.reservoir) return left * now;
-    return left * std::sqrt(extent(space_, mesh(to)).area / extent(space_, mesh(from)).area) * now;
+    return left * extent(space_, mesh(to)).area / extent(space_, mesh(from)).area * now;
 }
 
 // Only friction changes momentum and angular momentum, but the discrete bending force has a small resultant, which

@@ -38,8 +38,7 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
                   .te = stage.te,
                   .curvature_stabilisation = curvature_stabilisation,
                   .tension = law.keeps_area ? stage.tension : law.tension.at(stage.time),
-                  .stretch = stretch,
-                  .supply = expected_supply(at, stage)};
+                  .stretch = stretch};
     if (surface_.bending().alpha) base.M = integral(surface_.space(), at, base.fields.H);
     StageSolution out;
     out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
@@ -57,15 +56,6 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
     out.period = stage.period_bar + stage.te * out.stretch * stage.period;
     out.fields = std::move(base.fields);
     return out;
-}
-
-// div_P u of a membrane with inertia that a reservoir feeds: what it brings has mass.
-double StepSolver::expected_supply(const CurvedMesh& at, const Stage& stage) const {
-    if (!surface_.law().reservoir || surface_.law().inertia == 0) return 0;
-    const SurfaceSpace& space = surface_.space();
-    const VectorField u = stage.u.reshaped(surface_.nodes(), 3).transpose();
-    const double along = stage.stretch != 0 ? stage.stretch * stretch_rate(space, at).area : 0;
-    return (extent_rate(space, at, u).area + along) / extent(space, at).area;
 }
 
 KeptExtent StepSolver::keep_extent(const StageSolution& solved, MotionState& to) const {

@@ -51,7 +51,6 @@ public:
 
 private:
     Eigen::VectorXd solve(const StepBase& base, double time, const Extent& rate, StageSolution& out);
-    double expected_supply(const CurvedMesh& at, const Stage& stage) const;
     Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     void make_symmetric(const StepBase& base);
     double turned(const StepBase& base) const;

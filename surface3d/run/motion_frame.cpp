@@ -27,7 +27,8 @@ void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_least_variation", m.scale.least_variation),
         f.number("restart_lowest_total", m.balance.lowest_total);
     f.number("restart_total_start", m.balance.total_start), f.number("restart_dissipated", m.balance.dissipated);
-    f.number("restart_work", m.balance.work), f.number("restart_area_past", m.balance.past.area);
+    f.number("restart_work", m.balance.work), f.number("restart_supplied", m.balance.supplied),
+        f.number("restart_area_past", m.balance.past.area);
     f.number("restart_volume_past", m.balance.past.volume), f.number("restart_length_past", m.balance.past.length);
     f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
     f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);

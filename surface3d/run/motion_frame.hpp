@@ -21,15 +21,17 @@ struct MotionScale {
     double length() const { return std::sqrt(area); }
 };
 
-// Balance of the total energy, which can only fall: free and kinetic energy, less the work of loads that change.
+// Balance of the total energy, which can only fall: free and kinetic energy, less the work done.
 struct MotionBalance {
     double total_start = 0, lowest_total = 0;  // initially, and least so far
     double work = 0;                           // of the loads: dF at constant area and volume
+    double supplied = 0;                       // kinetic energy, by a reservoir
     Extent past;                               // area, volume and period at the step before
     double dissipated = 0, corrected = 0;
     double dissipation_past = 0;  // its rate at the step before
     double defect = 0;            // largest defect of the dissipation identity
 
+    double done() const { return work + supplied; }
     double defect_at(double total) const { return total - total_start + dissipated; }
 };
 

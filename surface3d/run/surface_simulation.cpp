@@ -156,7 +156,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::check_trial(const M
                                                                          const MotionMeasures& m) const {
     const double t = state_.time, E_ref = memory_.scale.reference_energy;
     const double asked = case_.accuracy.energy * (is_reported() ? 1 : larger_errors);
-    const double then = m.free_energy + m.kinetic - memory_.balance.work - work_of(next, m);
+    const double then = m.free_energy + m.kinetic - memory_.balance.done() - work_of(next, m) - supplied_by(m);
     if (const auto spurious = impossible(m.bending, next.state))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
     if (const auto rises = find_rise_in_step((then - total()) / E_ref, asked, t, next.state.step))
@@ -217,8 +217,17 @@ double SurfaceSimulation::work_of(const MotionStep& next, const MotionMeasures& 
                               power(memory_.balance.past));
 }
 
+// Kinetic energy that a reservoir brings in a step: the mean of it per area, times the new area. Exact where a surface
+// moves without a change of its velocity.
+double SurfaceSimulation::supplied_by(const MotionMeasures& m) const {
+    if (!surface().law().supplies_kinetic_energy()) return 0;
+    const double A = now_.bending.area, A_next = m.bending.area;
+    return (now_.kinetic / A + m.kinetic / A_next) / 2 * (A_next - A);
+}
+
 void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.work += work_of(next, m);
+    memory_.balance.supplied += supplied_by(m);
     memory_.balance.past = extent_now();
     memory_.balance.dissipated += integral_over_step(next.state.step, since_kink(), m.dissipation, now_.dissipation,
                                                      memory_.balance.dissipation_past);
@@ -449,7 +458,7 @@ public:
     std::vector<double> row(double wall_seconds) const override {
         const MotionBalance& balance = run_.memory_.balance;
         return motion_series(run_.case_.energy)
-            .values({run_.state_, run_.now_, balance.work, run_.volume_drift(), balance.defect_at(run_.total()),
+            .values({run_.state_, run_.now_, balance.done(), run_.volume_drift(), balance.defect_at(run_.total()),
                      balance.corrected, run_.error_now_, run_.summary.elements, wall_seconds});
     }
 
@@ -489,7 +498,7 @@ void SurfaceSimulation::summarise() {
                                                      {"meshes", std::int64_t{memory_.count.meshes}},
                                                      {"relaxation", memory_.scale.relaxation},
                                                      {"dissipated", memory_.balance.dissipated},
-                                                     {"work", memory_.balance.work},
+                                                     {"work", memory_.balance.done()},
                                                      {"identity_defect", memory_.balance.defect_at(total())},
                                                      {"correction_energy", memory_.balance.corrected}});
 }

@@ -82,6 +82,7 @@ private:
     std::optional<StopReport> impossible(const Observables& o, const MotionState& s) const;
     std::optional<Refusal> check_trial(const MotionStep& next, const MotionMeasures& m) const;
     double work_of(const MotionStep& next, const MotionMeasures& m) const;
+    double supplied_by(const MotionMeasures& m) const;
     double since_kink() const;
     void take(const MotionStep& next, const MotionMeasures& m);
     void choose_next_step(double tau, double asked, double error, int order);
@@ -103,7 +104,7 @@ private:
     const SchemeEntry& traits() const { return entry(case_.scheme); }
     MovingSurface& surface() const { return scheme_->surface(); }
     // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
-    double total() const { return comparable() + now_.kinetic; }
+    double total() const { return comparable() + now_.kinetic - memory_.balance.supplied; }
     Extent extent_now() const { return {now_.bending.area, now_.bending.volume, state_.period}; }
     double comparable() const { return now_.free_energy - memory_.balance.work; }
     double moment_of_time() const { return 1e-12 * case_.time.end; }

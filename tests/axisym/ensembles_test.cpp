@@ -2,6 +2,7 @@
 // loads that other runs measured.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <complex>
 
@@ -316,6 +317,59 @@ TEST(Ensembles, rampsDoWorkThatTheIdentityKnows) {
             EXPECT_NEAR(o.at("work", 0.01), 0, 1e-12);
         }
     }
+}
+
+// theory.md (3.18): what swells takes along membrane that moves as it does. Of a sphere
+//   inertia R'' = P - P(R) - (gamma + 4 mu/R^2) R',
+// P(R) that of theory.md (3.23), and the reservoir brings 4 pi R R'^3 of kinetic energy per time.
+TEST(Ensembles, aReservoirBringsMembraneThatMovesAlong) {
+    const double tension = -0.3, pressure = 6, mu = 0.1, gamma = 0.3, end = 0.8;
+    const Model fed{.kind = ModelKind::fluid,
+                    .Re = 1 / mu,
+                    .gamma = gamma,
+                    .keeps_volume = false,
+                    .area = AreaRule::reservoir,
+                    .tension = tension,
+                    .pressure = pressure};
+    using State = std::array<double, 3>;  // R, R', work
+    const auto rate = [&](const State& s) {
+        const auto& [R, V, work] = s;
+        return State{V, pressure - sphere_pressure(all_terms, R, tension) - (gamma + 4 * mu / (R * R)) * V,
+                     4 * pi * R * V * V * V};
+    };
+    const auto ahead = [](State s, double h, const State& by) {
+        for (std::size_t i = 0; i < s.size(); ++i) s[i] += h * by[i];
+        return s;
+    };
+    State s{1, 0, 0};
+    const int steps = 4000;
+    const double h = end / steps;
+    for (int i = 0; i < steps; ++i) {
+        const State a = rate(s), b = rate(ahead(s, h / 2, a)), c = rate(ahead(s, h / 2, b)), d = rate(ahead(s, h, c));
+        s = ahead(ahead(ahead(ahead(s, h / 6, a), h / 3, b), h / 3, c), h / 6, d);
+    }
+    const double kinetic = 2 * pi * s[0] * s[0] * s[1] * s[1];
+    EXPECT_GT(s[2], 0.2 * kinetic);
+    for (const double accuracy : {1e-4, 1e-7}) {
+        const Case c = case_of(all_terms, Sphere{1, {}}, fed, end, accuracy);
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        EXPECT_NEAR(o.last("r_max"), s[0], 10 * accuracy);
+        EXPECT_NEAR(o.last("kinetic_energy"), kinetic, 50 * accuracy * kinetic);
+        EXPECT_NEAR(o.last("work"), s[2], 50 * accuracy * s[2]);
+    }
+}
+
+TEST(Ensembles, aReservoirBringsAngularMomentum) {
+    Case c = parse_case(
+        "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[model]\nkind = \"fluid\"\ngamma = 0.5\narea = \"reservoir\"\n"
+        "tension = -3\n[velocity]\ninitial = \"rotation\"\nomega = 0.7\n[shape]\nkind = \"tube\"\nradius = 1\n"
+        "length = 3\nmode = [{amplitude = 0.2, n = 1}]\n[accuracy]\nenergy = 1e-6\n[time]\nend = 0.5\n");
+    const Outcome o = run_case(c);
+    expect_balanced(o, c);
+    EXPECT_GT(o.last("area"), 1.02 * o["area"].front());
+    EXPECT_NEAR(o.last("angular_momentum_z") / o["angular_momentum_z"].front(),
+                std::exp(-0.25) * o.last("area") / o["area"].front(), 1e-6);
 }
 
 // From a frame between two kinks, with a free period: the same end, work and balance.
