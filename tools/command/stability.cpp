@@ -54,6 +54,23 @@ std::string words_of_model(const Problem& c) {
     return text;
 }
 
+double mean_square(double kT, double eigenvalue, double scale, double area, const std::string& mode) {
+    constexpr double rounding = 1e-12;
+    if (eigenvalue > rounding * scale) return kT / (eigenvalue * area);
+    throw std::invalid_argument(
+        eigenvalue < -rounding * scale
+            ? fmt::format(
+                  "--kT needs a minimum: {} lowers the energy, with the eigenvalue {:.6g} of the second variation",
+                  mode, eigenvalue)
+            : fmt::format("--kT needs a minimum: {} is neutral, its mean square has no bound; hold what it changes, or "
+                          "choose another --tension",
+                          mode));
+}
+
+void refuse_motion(const std::string& why) {
+    throw std::invalid_argument("--kT needs a shape at rest: " + why);
+}
+
 namespace {
 
 // The exit status of the script, which has said why.
@@ -235,6 +252,7 @@ void refuse_values(const StabilityOptions& o) {
     if (o.tension) require_within("--tension", *o.tension, -largest_number, largest_number);
     if (o.Re) require_within("--Re", *o.Re, 1 / largest_number, largest_number);
     if (o.gamma) require_within("--gamma", *o.gamma, 0, largest_number);
+    if (o.kT) require_within("--kT", *o.kT, 0, largest_number);
     const std::vector<std::string> names = model_names();
     if (o.model.empty() || std::find(names.begin(), names.end(), o.model) != names.end()) return;
     const auto meant = near_miss(o.model, names);
@@ -249,7 +267,7 @@ void refuse_contradictions(const StabilityOptions& o, bool of_result) {
     if (!o.q.empty() && o.waves)
         throw std::invalid_argument("--q and --waves exclude each other: both choose the waves");
     if (!o.fit.empty() && (!o.q.empty() || o.waves || o.tension || o.frame || o.numerical || !o.plot.empty() ||
-                           !o.model.empty() || o.Re || o.gamma))
+                           !o.model.empty() || o.Re || o.gamma || o.kT))
         throw std::invalid_argument("--fit can only be combined with --csv and --json");
 }
 
@@ -307,6 +325,8 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--Re", o->Re, "of viscous models, where the case has none");
     command->add_option("--gamma", o->gamma, "friction of all models but gradient flow, where the case has none");
     command->add_option("--tension", o->tension, "another tension (default: from model, case and shape)");
+    command->add_option("--kT", o->kT,
+                        "also mean squares of amplitudes at this temperature, kT in the case's unit of energy");
     command->add_option("--modes", o->modes, "modes m = 0 ... this, up to 100")->capture_default_str();
     command->add_option("--waves", o->waves,
                         "tube: n = 0 ... this, up to 10000; sphere: l (default: all that grow, and some)");

@@ -23,7 +23,7 @@ enum class Output { words, csv, json };
 struct StabilityOptions {
     std::string file, model, q, fit, plot;
     std::vector<std::string> sets;
-    std::optional<double> Re, gamma, tension;
+    std::optional<double> Re, gamma, tension, kT;
     std::optional<int> waves;
     std::optional<long> frame;
     int modes = 2, rates = 3;
@@ -66,6 +66,11 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
 // What the picture of --plot is drawn from, as JSON.
 std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,
                         const std::vector<Problem>& models);
+
+// <a^2> of the displacement a phi with INT phi^2 dS = A, theory.md (8.11). Throws std::invalid_argument, with the name
+// of the mode, where an eigenvalue of this scale is not positive: the shape is no minimum.
+double mean_square(double kT, double eigenvalue, double scale, double area, const std::string& mode);
+void refuse_motion(const std::string& why);  // of a shape that is asked about at a kT
 
 // Name and numbers of its model.
 std::string words_of_model(const Problem& c);

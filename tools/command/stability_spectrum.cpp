@@ -1,6 +1,7 @@
 // Numerical spectra of profiles of tier axisym.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -19,6 +20,7 @@ namespace {
 struct Found {
     Problem problem;
     axisym::Spectrum spectrum;
+    std::optional<axisym::Spectrum> warm = {};  // of the second variation alone, its eigenvalues with a minus sign
 };
 
 // What the case says is held, where it looked for an equilibrium.
@@ -26,9 +28,51 @@ Held held_in(const Problem& c, const MotionLaw& law) {
     return c.equilibrium && !law.inextensible ? c.held : axisym::held_by(law);
 }
 
-std::string words_of(const std::vector<Found>& found) {
+// The mean square over the surface of all displacements of one m, with cosine and sine.
+double of_all(double kT, const axisym::ModeRates& mode, double area) {
+    return kT / area * (mode.m == 0 ? 1 : 2) * mode.softness;
+}
+
+std::vector<double> mean_squares(double kT, const axisym::ModeRates& mode, double area) {
+    std::vector<double> out;
+    for (const double rate : mode.rates) out.push_back(mean_square(kT, -rate, 0, area, fmt::format("m = {}", mode.m)));
+    return out;
+}
+
+// The second variation under what is held, of a minimum for m = 0 ... 2 at least.
+axisym::Spectrum second_variation(const Problem& c, const MotionLaw& law, Held held, const Curve& shape,
+                                  axisym::SpectrumSettings settings) {
+    constexpr double well_known = 1e-2;
+    MotionLaw plain{.friction = 1, .inextensible = false, .keeps_volume = law.keeps_volume};
+    plain.free_period = law.free_period;
+    const int asked = settings.last;
+    settings.first = 0, settings.last = std::max(asked, 2);
+    axisym::Spectrum out = axisym::spectrum(c.energy, plain, held, shape, settings);
+    if (!out.at_rest()) refuse_motion("this one moves");
+    for (const axisym::ModeRates& mode : out.modes) mean_squares(0, mode, out.area);
+    if (!(out.estimated_error < well_known))
+        throw std::invalid_argument(fmt::format(
+            "--kT needs a minimum: eigenvalues of the second variation are known to {:.1g} only, so that one "
+            "of them may be neutral: hold more, or choose another --tension",
+            out.estimated_error));
+    out.modes.resize(asked + 1);
+    return out;
+}
+
+void add_warm(std::string& out, double kT, const axisym::Spectrum& warm) {
+    out += "  mean squares of a, for displacements a phi with INT phi^2 dS = A\n";
+    out += fmt::format("    m {:>14} {:>14} ...\n", "of all phi", "of each phi");
+    for (const axisym::ModeRates& mode : warm.modes) {
+        add(out, "{:>5} {:>14.7g}", mode.m, of_all(kT, mode, warm.area));
+        for (const double one : mean_squares(kT, mode, warm.area)) add(out, " {:>14.7g}", one);
+        out += "\n";
+    }
+    out += fmt::format("  estimated error {:.1e} (relative), {} elements\n", warm.estimated_error, warm.elements);
+}
+
+std::string words_of(const std::vector<Found>& found, double kT) {
     std::string out;
-    for (const auto& [problem, spectrum] : found) {
+    for (const auto& [problem, spectrum, warm] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words_of_model(problem));
         if (spectrum.at_rest())
             add(out, "  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
@@ -52,22 +96,47 @@ std::string words_of(const std::vector<Found>& found) {
                    ? fmt::format("  estimated error of the rates {:.1e} (relative)", spectrum.estimated_error)
                    : std::string("  error of the rates unknown: only the finest mesh was fine enough");
         out += fmt::format(", {} elements\n", spectrum.elements);
+        if (warm) add_warm(out, kT, *warm);
     }
+    return out;
+}
+
+std::string csv_of_warm(const std::vector<Found>& found, double kT) {
+    std::string out = "model,m,number,eigenvalue,mean_square\n";
+    for (const Found& one : found)
+        for (const axisym::ModeRates& mode : one.warm->modes) {
+            const std::vector<double> means = mean_squares(kT, mode, one.warm->area);
+            for (std::size_t i = 0; i < means.size(); ++i)
+                add(out, "{},{},{},{:.17g},{:.17g}\n", name(one.problem.model), mode.m, i, -mode.rates[i], means[i]);
+        }
     return out;
 }
 
 std::string csv_of(const std::vector<Found>& found) {
     std::string out = "model,m,number,rate\n";
-    for (const auto& [problem, spectrum] : found)
+    for (const auto& [problem, spectrum, warm] : found)
         for (const axisym::ModeRates& mode : spectrum.modes)
             for (std::size_t i = 0; i < mode.rates.size(); ++i)
                 add(out, "{},{},{},{:.17g}\n", name(problem.model), mode.m, i, mode.rates[i]);
     return out;
 }
 
-std::string json_text(const std::vector<Found>& found) {
+Json json_of_warm(const axisym::Spectrum& warm, double kT) {
+    Json out = Json::array();
+    for (const axisym::ModeRates& mode : warm.modes) {
+        Json each = Json::array();
+        for (std::size_t i = 0; i < mode.rates.size(); ++i)
+            each.push_back({{"eigenvalue", -mode.rates[i]},
+                            {"mean_square", mean_squares(kT, mode, warm.area)[i]},
+                            {"displacement", mode.displacements[i]}});
+        out.push_back({{"m", mode.m}, {"mean_square_of_all", of_all(kT, mode, warm.area)}, {"eigenmodes", each}});
+    }
+    return out;
+}
+
+std::string json_text(const std::vector<Found>& found, double kT) {
     Json models = Json::array();
-    for (const auto& [problem, spectrum] : found) {
+    for (const auto& [problem, spectrum, warm] : found) {
         Json modes = Json::array();
         for (const axisym::ModeRates& mode : spectrum.modes)
             modes.push_back({{"m", mode.m}, {"rates", mode.rates}, {"shape", mode.shape}});
@@ -77,7 +146,8 @@ std::string json_text(const std::vector<Found>& found) {
                           {"pressure", -spectrum.lambda},
                           {"estimated_error", spectrum.estimated_error},
                           {"elements", spectrum.elements},
-                          {"modes", modes}});
+                          {"modes", modes},
+                          {"fluctuations", warm ? json_of_warm(*warm, kT) : Json()}});
     }
     return line_of({{"shape", "profile"}, {"models", models}});
 }
@@ -98,18 +168,20 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
             settings.sigma = options.tension;
             settings.first = law.free_period ? 1 : 0;
             axisym::set_loads(settings, law, held, time);
-            found.push_back({problem, axisym::spectrum(subject.c.energy, law, held, shape, settings)});
+            Found one{problem, axisym::spectrum(subject.c.energy, law, held, shape, settings)};
+            if (options.kT) one.warm = second_variation(subject.c, law, held, shape, settings);
+            found.push_back(std::move(one));
         } catch (const std::invalid_argument& error) {
             if (models.size() == 1) throw;
             refused += fmt::format("\n{}: none: {}\n", name(problem.model), error.what());
         }
     switch (options.output()) {
         case Output::csv:
-            return csv_of(found);
+            return options.kT ? csv_of_warm(found, *options.kT) : csv_of(found);
         case Output::json:
-            return json_text(found);
+            return json_text(found, options.kT.value_or(0));
         default:
-            return words_of(found) + refused;
+            return words_of(found, options.kT.value_or(0)) + refused;
     }
 }
 

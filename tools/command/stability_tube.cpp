@@ -35,6 +35,7 @@ struct WaveRow {
     double q = 0;
     theory::Growth growth;
     std::optional<double> factor;  // by which it grows until the case ends
+    std::optional<double> mean_square = {};
 };
 
 // One model's answer.
@@ -194,6 +195,26 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
     report.radius_at_end = end.radius;
 }
 
+// Of a tube that is a minimum for all waves that fit its length and m = 0 ... last.
+void add_mean_squares(double kT, const TubeSubject& subject, int last, ModelReport& report) {
+    const UniformTube& tube = report.tube;
+    const MotionLaw& law = report.problem.law;
+    if (theory::ill_posed_along(tube) || theory::ill_posed_around(tube))
+        throw std::invalid_argument("--kT needs a minimum: short waves lower the energy without bound");
+    if (const double rate = radius_rate_of(report); rate != 0)
+        refuse_motion(fmt::format("the radius changes at the rate {:.6g}", rate));
+    const auto of_wave = [&](double q, int m, const std::string& name) {
+        const theory::Stiffness G = stiffness(tube, m);
+        const double scale = (std::abs(G.q4) * q * q + std::abs(G.q2)) * q * q + std::abs(G.q0);
+        return mean_square(kT, G(q), scale, 2 * pi * tube.radius * subject.length, name);
+    };
+    if (law.area_is_free() && !law.keeps_volume) of_wave(0, 0, "a change of the radius");
+    if (const auto wave = theory::fastest_fitting_wave(tube, law, subject.length, last))
+        of_wave(wave->q, wave->m, fmt::format("n = {}, m = {}", wave->n, wave->m));
+    for (WaveRow& row : report.rows)
+        row.mean_square = of_wave(row.q, row.m, fmt::format("q = {:.6g}, m = {}", row.q, row.m));
+}
+
 ModelReport report_of(const StabilityOptions& options, const TubeSubject& subject, const Problem& model) {
     const MotionLaw& law = model.law;
     ModelReport report{model, subject.tube, "", {}, {}, {}, {}};
@@ -213,6 +234,7 @@ ModelReport report_of(const StabilityOptions& options, const TubeSubject& subjec
     }
     report.fastest_fitting = theory::fastest_fitting_wave(report.tube, law, subject.length, options.modes);
     if (!theory::ill_posed_along(subject.tube)) add_factors(subject, report);
+    if (options.kT) add_mean_squares(*options.kT, subject, std::max(options.modes, 2), report);
     return report;
 }
 
@@ -253,9 +275,11 @@ std::string e_fold(double rate) {
 
 void add_rows(Text& out, const ModelReport& report, double end) {
     const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.problem.law.inertia != 0,
-               factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; });
-    add(out, "    m {}{:>12} {:>14}{} {:>12}{}\n", numbered ? "   n " : "", "q", "rate",
-        swings ? "      frequency" : "", "e-fold in", factors ? fmt::format("  factor until t = {:g}", end) : "");
+               factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; }),
+               warm = !report.rows.empty() && report.rows.front().mean_square;
+    add(out, "    m {}{:>12} {:>14}{} {:>12}{}{}\n", numbered ? "   n " : "", "q", "rate",
+        swings ? "      frequency" : "", "e-fold in", warm ? "    mean square" : "",
+        factors ? fmt::format("  factor until t = {:g}", end) : "");
     for (const WaveRow& row : report.rows) {
         const double s = row.growth.rate();
         add(out, "{:>5} ", row.m);
@@ -263,6 +287,7 @@ void add_rows(Text& out, const ModelReport& report, double end) {
         add(out, "{:>12.6g} {:>14.7g}", row.q, s);
         if (swings) add(out, " {:>14.7g}", row.growth.frequency());
         add(out, " {:>12}", e_fold(s));
+        if (row.mean_square) add(out, " {:>14.7g}", *row.mean_square);
         if (row.factor) add(out, " {:>14.6g}", *row.factor);
         add(out, "{}\n", row.q == 0 && row.m == 0 ? "  the radius" : s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
     }
@@ -342,12 +367,13 @@ std::string words_of(const TubeSubject& subject, const std::vector<ModelReport>&
 
 std::string csv_of(const std::vector<ModelReport>& reports) {
     Text out;
-    add(out, "model,tension,m,n,q,rate,frequency,factor\n");
+    add(out, "model,tension,m,n,q,rate,frequency,factor,mean_square\n");
     for (const ModelReport& report : reports)
         for (const WaveRow& row : report.rows)
-            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{}\n", name(report.problem.model), report.tube.tension,
-                row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(), row.growth.frequency(),
-                row.factor ? fmt::format("{:.17g}", *row.factor) : "");
+            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{},{}\n", name(report.problem.model),
+                report.tube.tension, row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(),
+                row.growth.frequency(), row.factor ? fmt::format("{:.17g}", *row.factor) : "",
+                row.mean_square ? fmt::format("{:.17g}", *row.mean_square) : "");
     return to_string(out);
 }
 
@@ -362,7 +388,8 @@ Json json_of(const WaveRow& row) {
             {"rate", row.growth.rate()},
             {"frequency", row.growth.frequency()},
             {"roots", json_of(row.growth.roots)},
-            {"factor", or_null(row.factor)}};
+            {"factor", or_null(row.factor)},
+            {"mean_square", or_null(row.mean_square)}};
 }
 
 Json json_of(const Threshold& limit) {
@@ -469,7 +496,7 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
     const int last = options.waves.value_or(6);
     Text out;
     Json list = Json::array();
-    if (options.csv) add(out, "model,l,rate,frequency\n");
+    if (options.csv) add(out, "model,l,rate,frequency,mean_square\n");
     if (!options.csv) add(out, "sphere of radius {:.8g}; {}; for any m <= l\n", sphere.radius, moduli(sphere.energy));
     for (const Problem& c : models) {
         const MotionLaw& law = c.law;
@@ -480,18 +507,40 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
         if (!options.csv) add(out, "\n{}\n  tension {:.8g}\n", words_of_model(c), loaded.tension);
         if (!options.csv && moves)
             add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n", radius_rate);
-        if (!options.csv) add(out, "    l {:>14}{} {:>12}\n", "rate", swings ? "      frequency" : "", "e-fold in");
+        const auto warm = [&](int l) -> std::optional<double> {
+            if (!options.kT) return {};
+            const double R = loaded.radius, scale = std::abs(density(loaded.energy, -2 / R, 1 / (R * R)).HH) *
+                                                    std::pow(1 + l, 4) / std::pow(R, 4);
+            return mean_square(*options.kT, stiffness(loaded, l), scale, 4 * pi * R * R, fmt::format("l = {}", l));
+        };
+        if (options.kT && law.area_is_free() && !law.keeps_volume) {
+            if (std::abs(radius_rate) > 1e-9 * std::abs(law.pressure.at(0)))
+                refuse_motion(fmt::format("the pressure of equilibrium is {:.9g}", theory::pressure_at_rest(loaded)));
+            warm(0);
+        }
+        if (!options.csv)
+            add(out, "    l {:>14}{} {:>12}{}\n", "rate", swings ? "      frequency" : "", "e-fold in",
+                options.kT ? "    mean square" : "");
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
             const theory::Growth found = growth(loaded, law, l);
             const double s = found.rate();
+            const std::optional<double> mean = warm(l);
             if (options.csv) {
-                add(out, "{},{},{:.17g},{:.17g}\n", name(c.model), l, s, found.frequency());
+                add(out, "{},{},{:.17g},{:.17g},{}\n", name(c.model), l, s, found.frequency(),
+                    mean ? fmt::format("{:.17g}", *mean) : "");
             } else {
                 add(out, "{:>5} {:>14.7g}", l, s);
                 if (swings) add(out, " {:>14.7g}", found.frequency());
-                add(out, " {:>12}{}\n", e_fold(s), s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
+                add(out, " {:>12}{}{}\n", e_fold(s), mean ? fmt::format(" {:>14.7g}", *mean) : "",
+                    s > 0    ? "  grows"
+                    : s == 0 ? "  neutral"
+                             : "");
             }
-            list.push_back({{"model", name(c.model)}, {"l", l}, {"rate", s}, {"roots", json_of(found.roots)}});
+            list.push_back({{"model", name(c.model)},
+                            {"l", l},
+                            {"rate", s},
+                            {"roots", json_of(found.roots)},
+                            {"mean_square", or_null(mean)}});
         }
     }
     if (options.json)

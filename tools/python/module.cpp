@@ -397,6 +397,7 @@ void add_answers(py::module_& m) {
         .def_readwrite("Re", &StabilityOptions::Re, "a number")
         .def_readwrite("gamma", &StabilityOptions::gamma, "a number")
         .def_readwrite("tension", &StabilityOptions::tension, "a number")
+        .def_readwrite("kT", &StabilityOptions::kT, "a number")
         .def_readwrite("waves", &StabilityOptions::waves, "an integer")
         .def_readwrite("frame", &StabilityOptions::frame, "an integer")
         .def_readwrite("modes", &StabilityOptions::modes, "an integer")

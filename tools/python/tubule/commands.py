@@ -104,19 +104,21 @@ def equilibrium(case, **options) -> Result:
 
 def stability(subject, *, model: str = "", Re: float | None = None, gamma: float | None = None,
               tension: float | None = None, modes: int = 2, waves: int | None = None, q: Iterable[float] | None = None,
-              rates: int = 3, frame: int | None = None, numerical: bool = False, fit: tuple[int, ...] | None = None) -> dict:
+              rates: int = 3, frame: int | None = None, numerical: bool = False, fit: tuple[int, ...] | None = None,
+              kT: float | None = None) -> dict:
     """Growth rates of a case or a result: `tubule stability --json`, docs/schemas/stability.json.
 
     model, Re, gamma, tension   instead of the case's; model "all" for every one
     modes, waves, q             m = 0 ... modes; n (spheres: l) up to waves, or these wave numbers
     rates, numerical            numerical spectra: how many rates for each m; also where a closed form is known
+    kT                          also mean squares of amplitudes at this temperature
     frame, fit                  of a result: which frame; or the rate of wave n or (n, m), fitted to its series
 
     Raises ValueError for what cannot be asked.
     """
     o = _core.StabilityOptions()
     integers = {"modes": modes, "waves": waves, "rates": rates, "frame": frame}
-    given = {"model": _text("model", model), "Re": Re, "gamma": gamma, "tension": tension, "numerical": bool(numerical)}
+    given = {"model": _text("model", model), "Re": Re, "gamma": gamma, "tension": tension, "kT": kT, "numerical": bool(numerical)}
     for name, value in (given | {name: _integer(name, value) for name, value in integers.items()}).items():
         try:
             setattr(o, name, value)
