@@ -252,7 +252,7 @@ class Stability(ProgramTest):
         self.refuses("inertia", self.write("fluid.toml", FLUID), "--numerical")
 
     def test_mean_squares_of_a_sphere(self):
-        """Milner and Safran, doi:10.1103/PhysRevA.36.4371, for kappa/2 (H - H0)^2: theory.md (8.12)."""
+        """Milner and Safran, doi:10.1103/PhysRevA.36.4371, for kappa/2 (H - H0)^2: theory.md (8.13)."""
         kT, kappa, R, H0, tension = 0.05, 2.4, 1.5, -0.4, 0.7
         case = self.write("sphere.toml", f"""tier = "axisym"
 energy = {{k20 = {kappa / 2}, H0 = {H0}}}
