@@ -167,8 +167,8 @@ energy = 1e-2
                 self.scan(path, *arguments, "--set", "accuracy.energy=1e-2")
                 sizes = [2 if axis.count(":") else axis.count(",") + 1 for axis in few]
                 self.assertEqual(list(outcomes(self.result).shape), sizes)
-                # At a corner of the vesicles a neck is too small.
-                self.assertLessEqual(np.count_nonzero(outcomes(self.result) == "failed"), path.name == "vesicles.toml")
+                # At corners of the vesicles necks close.
+                self.assertLessEqual(np.count_nonzero(outcomes(self.result) == "failed"), 4 * (path.name == "vesicles.toml"))
 
 
 class Boundary(ScanTest):
