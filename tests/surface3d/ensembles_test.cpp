@@ -128,7 +128,8 @@ TEST(Ensembles, AReservoirFeedsUniformlyAndBringsMomentum) {
 }
 
 TEST(Ensembles, ASupplyKeepsAUniformTranslation) {
-    // A vesicle that is fed while it moves differs from one at rest by this velocity alone.
+    // A vesicle that is fed while it moves keeps its mean velocity, but for what the mesh does to it. If the supply
+    // were at rest, it would lose half of the 1 % by which its area grows.
     Model model = open_model(ModelKind::fluid, -3, 1);
     model.gamma = 0;
     const CurvedMesh mesh = mesh_of(Sphere{.radius = 1, .modes = {{0.15, 2, 1}}}, icosphere(2), 3);
@@ -141,10 +142,10 @@ TEST(Ensembles, ASupplyKeepsAUniformTranslation) {
     const double end = 0.1, area = resting.measures().bending.area;
     moving.until(end, 8), resting.until(end, 8);
     EXPECT_GT(resting.measures().bending.area, 1.01 * area);
-    EXPECT_LT((moving.state.u - resting.state.u - Eigen::VectorXd(translation.transpose().reshaped()))
-                  .lpNorm<Eigen::Infinity>(),
-              1e-5);
-    EXPECT_LT((moving.state.X - resting.state.X - end * translation).cwiseAbs().maxCoeff(), 1e-6);
+    const Eigen::VectorXd left = moving.state.u - resting.state.u;
+    const Eigen::Vector3d mean = Eigen::Map<const Eigen::MatrixXd>(left.data(), n, 3).colwise().mean();
+    EXPECT_LT((mean - U).norm(), 5e-4 * U.norm());
+    EXPECT_LT((moving.state.X - resting.state.X - end * translation).rowwise().mean().norm(), 1e-4);
 }
 
 TEST(Ensembles, AReservoirBringsMembraneThatMovesAlong) {
