@@ -125,6 +125,36 @@ TEST(CurveForms, haveTheDerivativesOfAFreePeriod) {
     EXPECT_TRUE(check.pass());
 }
 
+// theory.md (3.18): membrane from a reservoir enters with the velocity of the membrane, so that a cell which swells
+// while it moves differs from one at rest by this velocity alone.
+TEST(CurveMotion, aSupplyKeepsAUniformTranslation) {
+    MotionLaw swelling{.inertia = 1, .viscosity = 0.5, .friction = 0, .keeps_volume = false, .reservoir = true};
+    swelling.tension = -3, swelling.pressure = 2;
+    const double U = 1.5, h = 0.01;
+    const CurveSpace space(Topology::cell, equal_breaks(8), 5, 4);
+    CurveLaw law = swelling;
+    law.holds_area = law.holds_volume = false;
+    const CurveMotion motion(space, stiff, law, 0.3, 0, 0);
+    const Vector curve = some_curve(space);
+    Vector resting = Vector::Zero(motion.layout().size);
+    resting.head(space.size()) = curve;
+    Curve shifted = meridian(Ellipsoid{1, 1, 1.5});
+    shifted.at = [at = shifted.at](double t) {
+        std::array<double, 4> p = at(t);
+        p[2] += 1;
+        return p;
+    };
+    const Vector along = fit(space, shifted) - curve;  // e_z, as a displacement
+    Vector moving = resting;
+    moving.segment(motion.layout().u_r, space.size()) = U * along;
+    const double start = motion.forms().observe(curve).area;
+    for (int i = 0; i < 5; ++i) resting = motion.consistent(resting, h).y, moving = motion.consistent(moving, h).y;
+    EXPECT_GT(motion.forms().observe(resting.head(space.size())).area, 1.01 * start);
+    const Vector difference = (moving - resting).segment(motion.layout().u_r, space.size());
+    // Up to div u - j_A of the mesh. A supply at rest would take half of the area's growth from U.
+    EXPECT_LT((difference - U * along).lpNorm<Eigen::Infinity>(), 2e-3);
+}
+
 // The least beta with sup_u (q, div u)/||u|| >= beta ||q||, where ||u||^2 = INT |u|^2 + |D(u)|^2 dS.
 double inf_sup(const CurveSpace& space, const Vector& x) {
     const MotionLaw viscous{.viscosity = 0.5, .friction = 1, .keeps_volume = false};

@@ -284,7 +284,7 @@ time = {{end = 1.0}}
                 for i, mode in enumerate(one["eigenmodes"]):
                     self.assertAlmostEqual(mode["mean_square"] / exact(first + i), 1, delta=1e-6)
                 all_l = (2 if one["m"] else 1) * sum(exact(l) for l in range(first, 2000))
-                self.assertAlmostEqual(one["mean_square_of_all"] / all_l, 1, delta=1e-3)  # shorter waves than the mesh has
+                self.assertAlmostEqual(one["mean_square_of_all"] / all_l, 1, delta=1e-4)  # of those that the mesh has
         rows = self.table(case, *given, "--numerical")
         self.assertEqual(set(rows[0]), {"model", "m", "number", "eigenvalue", "mean_square"})
         self.assertAlmostEqual(float(rows[0]["mean_square"]) / exact(2), 1, delta=1e-6)
@@ -363,8 +363,9 @@ equilibrium = {family = "prolate", reduced_volume = 0.8, held = "area-and-volume
     def test_mean_squares_are_of_minima_at_rest(self):
         kT = ("--kT", "0.01")
         self.refuses("--kT needs a minimum: n = 1, m = 0 lowers the energy, with the eigenvalue", self.tube, *kT)
-        frozen = (self.tube, "--model", "overdamped", *kT)
-        self.refuses("--kT needs a minimum: n = 0, m = 2 lowers", *frozen, "--set", "shape.length=3.0", "--set", "energy.k42=0.0")
+        # theory.md (5.21) at c = 0, x = 1/4: Sigma = 1.4 is neutral, though no wave that fits the length grows.
+        neutral = ("--set", "energy.H0=0.0", "--model", "overdamped", "--tension", "0.76", "--q", "0.5", *kT)
+        self.refuses("--kT needs a minimum: q = 0.5, m = 0 is neutral", self.tube, *neutral)
         self.refuses("--kT needs a shape at rest: the radius changes at the rate", self.tube, *kT, "--set", "shape.radius=1.1")
         self.refuses("short waves lower the energy", self.tube, *kT, "--set", "energy.k42=-0.3", "--model", "overdamped")
         self.refuses("--kT must be from 0 to 1e+100, not -1", self.tube, "--kT", "-1")
