@@ -19,7 +19,8 @@ double sphere_energy(const Bending& bending, double radius, double sign) {
     return 4 * pi * radius * radius * density(bending, -sign * 2 / radius, 1 / (radius * radius)).f;
 }
 
-// Of a neck that has shrunk to a point: a catenoid, H = 0 and INT |K| dS = 4 pi. Nothing if it grows without bound.
+// The energy of a neck that has shrunk to a point: a catenoid, H = 0 and INT |K| dS = 4 pi. Nothing if it grows without
+// bound.
 std::optional<double> neck_energy(const Bending& bending, double area) {
     const auto per_curvature = [&](double K) { return density(bending, 0.0, -K).f / K; };
     const double wide = per_curvature(1e12 / area), narrow = per_curvature(1e14 / area);
