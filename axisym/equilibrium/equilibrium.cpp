@@ -19,8 +19,8 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr double closed_neck =
-    0.003;                         // radius, over that of the sphere of the same area, below which no search goes on
+// Radius of a neck, over that of the sphere of the same area, below which no search goes on.
+constexpr double closed_neck = 0.003;
 constexpr double rounding = 1e-9;  // of the reduced volume of a sphere to begin with
 
 const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)

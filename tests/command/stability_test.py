@@ -366,7 +366,7 @@ equilibrium = {family = "prolate", reduced_volume = 0.8, held = "area-and-volume
         # theory.md (5.21) at c = 0, x = 1/4: Sigma = 1.4 is neutral, though no wave that fits the length grows.
         neutral = ("--set", "energy.H0=0.0", "--model", "overdamped", "--tension", "0.76", "--q", "0.5", *kT)
         self.refuses("--kT needs a minimum: q = 0.5, m = 0 is neutral", self.tube, *neutral)
-        self.refuses("--kT needs a shape at rest: the radius changes at the rate", self.tube, *kT, "--set", "shape.radius=1.1")
+        self.refuses("--kT needs an equilibrium: the radius changes at the rate", self.tube, *kT, "--set", "shape.radius=1.1")
         self.refuses("short waves lower the energy", self.tube, *kT, "--set", "energy.k42=-0.3", "--model", "overdamped")
         self.refuses("--kT must be from 0 to 1e+100, not -1", self.tube, "--kT", "-1")
         sphere = self.write("sphere.toml", """tier = "axisym"
@@ -377,11 +377,11 @@ time = {end = 1.0}
         held = ("--set", 'model.volume="fixed"')
         self.refuses("--kT needs a minimum: l = 0 is neutral", sphere, *kT)
         self.refuses("--kT needs a minimum: l = 2 lowers the energy", sphere, *kT, *held, "--tension", "-13")
-        self.refuses("--kT needs a shape at rest: the pressure of equilibrium is 1", sphere, *kT, "--tension", "0.5")
+        self.refuses("--kT needs an equilibrium: the pressure of equilibrium is 1", sphere, *kT, "--tension", "0.5")
         self.refuses("--kT needs a minimum: m = 0 lowers the energy", sphere, *kT, *held, "--tension", "-13", "--numerical")
         self.refuses("--kT needs a minimum: ", sphere, *kT, "--numerical")
         wavy = ("--set", "shape.mode.0.amplitude=0.2", "--numerical")
-        self.refuses("--kT needs a shape at rest: this one moves", self.tube, *kT, *wavy)
+        self.refuses("--kT needs an equilibrium: this one moves", self.tube, *kT, *wavy)
         self.refuses("a free period has no spectrum of m = 0", self.tube, *kT, "--numerical", "--set", "model.period=free",
                      "--set", "model.area=fixed", "--set", "energy.k42=0.0")  # fmt: skip
 

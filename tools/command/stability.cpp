@@ -68,7 +68,7 @@ double mean_square(double kT, double eigenvalue, double scale, double area, cons
 }
 
 void refuse_motion(const std::string& why) {
-    throw std::invalid_argument("--kT needs a shape at rest: " + why);
+    throw std::invalid_argument("--kT needs an equilibrium: " + why);
 }
 
 namespace {
