@@ -7,11 +7,9 @@
 #include <vector>
 
 #include "axisym/equilibrium/equilibrium.hpp"
+#include "common/equilibrium/equilibrium_task.hpp"
 
 namespace tubule::axisym {
-
-// Gives the parameter a value: a modulus, H0, an area, a volume, or several of them at once.
-using SetParameter = std::function<void(StationaryProblem&, double)>;
 
 enum class PointKind { regular, fold, bifurcation };
 

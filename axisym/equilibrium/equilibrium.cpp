@@ -12,6 +12,7 @@
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "common/equilibrium/newton.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"
@@ -21,21 +22,8 @@ namespace {
 
 // Radius of a neck, over that of the sphere of the same area, below which no search goes on.
 constexpr double closed_neck = 0.003;
-constexpr double rounding = 1e-9;  // of the reduced volume of a sphere to begin with
-
-const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
-
-// In space that is periodic along an axis, balls and cylinders enclose most (Pedrosa and Ritore, Indiana Univ. Math. J.
-// 48, 1999).
-double largest_volume(double area, double period) {
-    return std::max(std::pow(area, 1.5) / sphere_factor, area * area / (4 * pi * period));
-}
 
 }  // namespace
-
-double reduced_volume(double area, double volume) {
-    return sphere_factor * volume / std::pow(area, 1.5);
-}
 
 StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem,
                                    double gauge)
@@ -46,39 +34,14 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
 }
 
 void StationarySystem::set_problem(const StationaryProblem& problem) {
-    const Constraints& c = problem.constraints;
-    if (problem.free_period != space_->free_period() || (!problem.free_period && problem.loads.force != 0))
+    if (problem.free_period != space_->free_period())
         throw std::invalid_argument("a force needs a free period, and a space with one");
-    if (problem.free_period && !c.area && !c.volume)
-        throw std::invalid_argument("a free period needs a given area or a given volume");
-    if ((c.area && problem.loads.tension != 0) || (c.volume && problem.loads.pressure != 0) ||
-        (c.reduced_volume && (problem.loads.tension != 0 || problem.loads.pressure != 0)))
-        throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
-    if (c.reduced_volume && (c.area || c.volume))
-        throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
-    const auto positive = [](const std::optional<double>& value, const char* what) {
-        if (value && !(*value > 0))
-            throw std::invalid_argument(fmt::format("{} of {} is impossible: it must be positive", what, *value));
-    };
-    positive(c.area, "an area"), positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
-    if (space_->closed()) {
-        std::optional<double> v = c.reduced_volume;
-        if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
-        if (v && *v > 1 + rounding)
-            throw std::invalid_argument(
-                fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
-    } else if (c.area && c.volume && !problem.free_period) {
-        const double most = largest_volume(*c.area, space_->length());
-        if (*c.volume > most)
-            throw std::invalid_argument(
-                fmt::format("a volume of {:.6g} a period is impossible: an area of {:.6g} encloses at most {:.6g}",
-                            *c.volume, *c.area, most));
-    }
+    check_problem(problem, space_->closed() ? 0 : space_->length());
     problem_ = problem;
     forms_.set_bending(problem.bending);
 }
 
-Weights StationarySystem::lagrangian(const Eigen::VectorXd& u) const {
+Weights StationarySystem::weights(const Eigen::VectorXd& u) const {
     return {.energy = 1,
             .area = u[sigma()],
             .volume = u[lambda()],
@@ -86,47 +49,57 @@ Weights StationarySystem::lagrangian(const Eigen::VectorXd& u) const {
             .M = problem_.bending.alpha ? u[mu()] : 0};
 }
 
+// The last equations, for the numbers beside the curve.
+void StationarySystem::set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const {
+    const int n = space_->size();
+    F.segment<2>(n) = equations(o, u).F;
+    F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
+    F[n + 3] = space_->topology() == Topology::cell ? place_.dot(u.head(n)) : u[n + 3];
+}
+
+Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) const {
+    Eigen::VectorXd F = Eigen::VectorXd::Zero(unknowns());
+    set_constraints(forms_.observe(curve(u)), u, F);
+    return F;
+}
+
+double StationarySystem::constraint_error(const Eigen::VectorXd& u) const {
+    const CurveObservation o = forms_.observe(curve(u));
+    return tubule::constraint_error(problem_.constraints, equations(o, u), std::sqrt(o.area));
+}
+
+std::array<double, 2> StationarySystem::area_and_volume(const Eigen::VectorXd& u) const {
+    const CurveObservation o = forms_.observe(curve(u));
+    return {o.area, o.volume};
+}
+
+double StationarySystem::size(const Eigen::VectorXd& u) const {
+    return std::sqrt(forms_.observe(curve(u)).area);
+}
+
 Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
     const int n = space_->size();
-    const Constraints& c = problem_.constraints;
-    const Eigen::VectorXd x = u.head(n);
-    const CurveObservation o = forms_.observe(x);
-    Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
+    const Eigen::VectorXd x = curve(u);
+    Eigen::VectorXd F = Eigen::VectorXd::Zero(unknowns());
     F.head(n) = u[n + 3] * place_;
-    forms_.add_gradient(lagrangian(u), x.data(), F.data());
+    forms_.add_gradient(weights(u), x.data(), F.data());
     if (problem_.free_period) F[n - 1] -= problem_.loads.force * space_->images();
-    if (c.reduced_volume) {
-        F[n] = 2 * u[n] * o.area + 3 * u[n + 1] * o.volume;  // no change with size
-        F[n + 1] = o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5);
-    } else {
-        F[n] = c.area ? o.area - *c.area : u[n] - problem_.loads.tension;
-        F[n + 1] = c.volume ? o.volume - *c.volume : u[n + 1] + problem_.loads.pressure;
-    }
-    F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
-    F[n + 3] = space_->topology() == Topology::cell ? place_.dot(x) : u[n + 3];
+    set_constraints(forms_.observe(x), u, F);
     return F;
 }
 
 Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u, double damping) const {
     const int n = space_->size();
-    const Constraints& c = problem_.constraints;
-    const Eigen::VectorXd x = u.head(n);
-    Eigen::SparseMatrix<double> hessian = forms_.hessian(lagrangian(u), x);
+    const Eigen::VectorXd x = curve(u);
+    Eigen::SparseMatrix<double> hessian = forms_.hessian(weights(u), x);
     if (damping != 0) hessian += damping * forms_.mass(x);
     const Eigen::VectorXd columns[]{forms_.gradient({.area = 1}, x), forms_.gradient({.volume = 1}, x), slope_of_M(x),
                                     place_};
     const auto& [area, volume, M, place] = columns;
     Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(numbers, n), corner = Eigen::MatrixXd::Zero(numbers, numbers);
-    if (c.reduced_volume) {
-        const CurveObservation o = forms_.observe(x);
-        rows.row(0) = 2 * u[n] * area + 3 * u[n + 1] * volume;
-        rows.row(1) = volume - *c.reduced_volume / sphere_factor * 1.5 * std::sqrt(o.area) * area;
-        corner(0, 0) = 2 * o.area, corner(0, 1) = 3 * o.volume;
-    } else {
-        if (c.area) rows.row(0) = area;
-        if (c.volume) rows.row(1) = volume;
-        corner(0, 0) = c.area ? 0 : 1, corner(1, 1) = c.volume ? 0 : 1;
-    }
+    const MultiplierEquations e = equations(forms_.observe(x), u);
+    for (int i = 0; i < 2; ++i) rows.row(i) = e.by_extent(i, 0) * area + e.by_extent(i, 1) * volume;
+    corner.topLeftCorner<2, 2>() = e.by_multipliers;
     rows.row(2) = -problem_.bending.alpha.value_or(0) * M, corner(2, 2) = 1;
     if (space_->topology() == Topology::cell)
         rows.row(3) = place;
@@ -134,7 +107,7 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
         corner(3, 3) = 1;
 
     // Columns in order, each with the rows of the Hessian and then all others, zeros included.
-    Eigen::SparseMatrix<double> J(size(), size());
+    Eigen::SparseMatrix<double> J(unknowns(), unknowns());
     J.reserve(hessian.nonZeros() + 2 * numbers * n + numbers * numbers);
     for (int j = 0; j < n; ++j) {
         J.startVec(j);
@@ -157,13 +130,14 @@ Eigen::VectorXd StationarySystem::slope_of_M(const Eigen::VectorXd& x) const {
 }
 
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
-    const Constraints& c = problem_.constraints;
-    const CurveObservation o = forms_.observe(u.head(space_->size()));
-    double value = o.energy + problem_.loads.energy(o.area, o.volume, length(u)) + gauge_ * o.gauge;
-    if (c.area) value += u[sigma()] * (o.area - *c.area);
-    if (c.volume) value += u[lambda()] * (o.volume - *c.volume);
-    if (c.reduced_volume) value += u[lambda()] * (o.volume - *c.reduced_volume / sphere_factor * std::pow(o.area, 1.5));
-    return value;
+    const CurveObservation o = forms_.observe(curve(u));
+    return lagrangian(problem_, o.energy, o.area, o.volume, length(u), u[sigma()], u[lambda()]) + gauge_ * o.gauge;
+}
+
+Eigen::VectorXd StationarySystem::way_down(const Eigen::VectorXd& u) const {
+    Variation v = variation(u, true);
+    if (v.eigenvalues[0] >= -1e-9 * reference_energy(u)) return {};
+    return std::move(v.lowest);
 }
 
 Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) const {
@@ -171,7 +145,7 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
-    Eigen::MatrixXd hessian = forms_.hessian(lagrangian(u), x);
+    Eigen::MatrixXd hessian = forms_.hessian(weights(u), x);
     const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x),
                           M = slope_of_M(x);
     hessian += problem_.bending.alpha.value_or(0) * M * M.transpose();
@@ -183,9 +157,9 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
     if (c.area) fix(area);
     if (c.volume) fix(volume);
     if (c.reduced_volume) {
-        const double A = forms_.observe(x).area, factor = *c.reduced_volume / sphere_factor;
-        fix(volume - factor * 1.5 * std::sqrt(A) * area);
-        hessian -= u[lambda()] * factor * 0.75 / std::sqrt(A) * area * area.transpose();
+        const ReducedVolumeSlopes slopes = reduced_volume_slopes(*c.reduced_volume, forms_.observe(x).area);
+        fix(volume + slopes.by_area * area);
+        hessian += u[lambda()] * slopes.by_area_twice * area * area.transpose();
     }
     if (space_->topology() == Topology::cell) fix(place_);
     const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
@@ -204,140 +178,6 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
 }
 
 namespace {
-
-// Newton's method on one mesh; `size` is the length that steps are compared with.
-class Newton {
-public:
-    Newton(const StationarySystem& system, Eigen::VectorXd& u, int& iterations)
-        : system_(system),
-          u_(u),
-          iterations_(iterations),
-          size_(std::sqrt(system.forms().observe(curve()).area)),
-          scale_(system.forms().reference_energy(curve())),
-          damping_start_(10 * scale_ / std::pow(size_, 4)),
-          damping_(damping_start_) {}
-
-    // Plain steps, to rounding. False, and u as it was, if they do not converge or one is longer than `longest`.
-    bool converge(double longest) {
-        const Eigen::VectorXd start = u_;
-        try {
-            if (plain_steps(longest)) return true;
-        } catch (const SolveError&) {
-        }
-        u_ = start;
-        return false;
-    }
-
-    // Damped steps towards a minimum, until they are shorter than `tolerance`. A step solves the equations of the
-    // implicit Euler method for the descent, of a duration that grows while the model predicts the energy well. Far
-    // from the required area and volume, a step brings them nearer, and the energy may increase. False if no
-    // step makes further progress.
-    bool descend(double tolerance, int most = 200) {
-        for (int k = 0; k < most; ++k) {
-            ++iterations_;
-            const Attempt step = attempt();
-            const double gain = step.sound ? merit_at(curve(), step.to) - system_.merit(step.to) : 0;
-            const double noise = 1e-13 * scale_;
-            if (!step.sound || (step.feasible && gain < 0.1 * step.predicted - noise)) {
-                damping_ *= 5;
-                if (damping_ > 1e12 * damping_start_) return false;
-                continue;
-            }
-            const double length = relative(step.to - u_);
-            u_ = step.to;
-            if (!step.feasible) continue;
-            if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
-            if (length < tolerance || gain > 0.6 * step.predicted) damping_ /= 6;
-        }
-        return false;
-    }
-
-private:
-    bool plain_steps(double longest) {
-        double before = std::numeric_limits<double>::infinity();
-        for (int k = 0; k < 25; ++k) {
-            lu_.factor(system_.jacobian(u_));
-            ++iterations_;
-            const Eigen::VectorXd step = -lu_.solve(system_.residual(u_));
-            const double length = relative(step);
-            if (!(length < longest) || !system_.forms().admissible(head(u_ + step))) return false;
-            u_ += step;
-            if (length < 1e-7 || (length < 1e-5 && length > before / 4)) return true;  // quadratic; or rounding reached
-            before = length;
-        }
-        return false;
-    }
-
-    Eigen::VectorXd head(const Eigen::VectorXd& u) const { return u.head(system_.space().size()); }
-    Eigen::VectorXd curve() const { return head(u_); }
-    double relative(const Eigen::VectorXd& step) const {
-        return step.head(system_.space().size()).lpNorm<Eigen::Infinity>() / size_;
-    }
-    // Deviation of area and volume from the required values, in units of the size; 0 for what is not held.
-    double constraint_error(const Eigen::VectorXd& F) const {
-        const Constraints& c = system_.problem().constraints;
-        const double area = c.area ? std::abs(F[system_.sigma()]) / (size_ * size_) : 0;
-        const double volume =
-            c.volume || c.reduced_volume ? std::abs(F[system_.lambda()]) / (size_ * size_ * size_) : 0;
-        return std::max(area, volume);
-    }
-    // The merit of a curve with the multipliers of u.
-    double merit_at(const Eigen::VectorXd& x, Eigen::VectorXd u) const {
-        u.head(x.size()) = x;
-        return system_.merit(u);
-    }
-
-    struct Attempt {
-        bool sound = false;     // downhill, not too far, and to a curve
-        bool feasible = false;  // area and volume are as asked, or nearly
-        double predicted = 0;   // gain of the merit
-        Eigen::VectorXd to;
-    };
-
-    // One damped step, then corrections that bring area and volume to what they were meant to be.
-    Attempt attempt() {
-        constexpr double farthest = 0.05;  // for the sake of area and volume
-        const int n = system_.space().size();
-        Attempt out;
-        system_.set_mu(u_);
-        try {
-            const Eigen::SparseMatrix<double> J = system_.jacobian(u_, damping_);
-            lu_.factor(J);
-            const Eigen::VectorXd F = system_.residual(u_);
-            Eigen::VectorXd force = F, off = F;
-            force.tail(system_.numbers).setZero(), off.head(n).setZero();
-            const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
-            const double off_before = constraint_error(F), part = std::min(1.0, farthest / relative(back));
-            const Eigen::VectorXd step = down + part * back, dx = step.head(n);
-            Eigen::VectorXd within = Eigen::VectorXd::Zero(u_.size());
-            within.head(n) = dx, within[system_.mu()] = step[system_.mu()];
-            const double curvature = dx.dot((J * within).head(n));
-            if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
-            out.predicted = curvature / 2;
-            out.to = u_ + step;
-            for (int k = 0; k < 2; ++k) {
-                if (!system_.forms().admissible(head(out.to))) return out;
-                system_.set_mu(out.to);
-                Eigen::VectorXd still = system_.residual(out.to) - (1 - part) * off;
-                still.head(n).setZero();
-                out.to.head(n) -= lu_.solve(still).head(n);
-            }
-            const double off_after = constraint_error(system_.residual(out.to));
-            out.feasible = off_before < 1e-3 && part == 1;
-            out.sound = system_.forms().admissible(head(out.to)) &&
-                        off_after <= (out.feasible ? 1e-3 : (1 - part / 2) * off_before);
-        } catch (const SolveError&) {
-        }
-        return out;
-    }
-
-    const StationarySystem& system_;
-    Eigen::VectorXd& u_;
-    int& iterations_;
-    double size_;
-    double scale_, damping_start_, damping_;
-    SparseLu lu_;
-};
 
 constexpr int coarsest = 8;  // elements of a whole cell or period
 
@@ -369,53 +209,6 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
 }
 
 namespace {
-
-// Descends on one mesh; area and volume change from the initial to the required ones in steps.
-bool descend(StationarySystem& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
-    const StationaryProblem goal = system.problem();
-    const CurveObservation o = system.forms().observe(u.head(system.space().size()));
-    if (!(o.area > 0 && o.volume > 0)) return false;  // turned inside out by an earlier attempt
-    const double v = reduced_volume(o.area, o.volume);
-    const auto off = [](const std::optional<double>& wanted, double is) {
-        return wanted ? std::abs(std::log(*wanted / is)) : 0;
-    };
-    const double distance = std::max({off(goal.constraints.area, o.area), off(goal.constraints.volume, o.volume),
-                                      off(goal.constraints.reduced_volume, v)});
-    const int stages = 1 + static_cast<int>(distance / 0.03);
-    for (int k = 1; k < stages; ++k) {
-        const auto between = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
-            if (!wanted) return wanted;
-            return is * std::pow(*wanted / is, static_cast<double>(k) / stages);
-        };
-        StationaryProblem stage = goal;
-        stage.constraints = {between(goal.constraints.area, o.area), between(goal.constraints.volume, o.volume),
-                             between(goal.constraints.reduced_volume, v)};
-        system.set_problem(stage);
-        Newton(system, u, iterations).descend(std::max(0.03, tolerance), 30);
-    }
-    system.set_problem(goal);
-    return Newton(system, u, iterations).descend(tolerance);
-}
-
-// The stationary shape on one mesh; with `from_afar`, and wherever plain Newton steps fail, after a descent. False, and
-// u an intermediate state, if none is found.
-bool settle(StationarySystem& system, Eigen::VectorXd& u, bool from_afar, const EquilibriumSettings& settings,
-            Equilibrium& out) {
-    const int n = system.space().size();
-    if (!settings.descend) return Newton(system, u, out.iterations).converge(0.5);
-    bool found = !from_afar && Newton(system, u, out.iterations).converge(0.1);
-    for (double tolerance = 1e-3; !found && tolerance > 1e-6; tolerance *= 0.03)
-        found = descend(system, u, tolerance, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
-    // Newton's last steps, or a symmetry of the initial shape, may lead to a saddle: leave it downhill.
-    for (int k = 0; k < 3 && found; ++k) {
-        const Variation variation = system.variation(u, true);
-        if (variation.eigenvalues[0] >= -1e-9 * out.reference_energy) break;
-        const double size = std::sqrt(system.forms().observe(u.head(n)).area);
-        u.head(n) += 0.01 * size / variation.lowest.lpNorm<Eigen::Infinity>() * variation.lowest;
-        found = descend(system, u, 1e-3, out.iterations) && Newton(system, u, out.iterations).converge(0.1);
-    }
-    return found;
-}
 
 // Estimates the error on the last mesh but one from the energies on a sequence of meshes.
 class MeshComparison {
@@ -461,18 +254,7 @@ std::string why_none(const Constraints& goal, const CurveObservation& first, con
             "the energy has no minimum there: ever shorter waves lower it (its principal symbol falls "
             "to {:.3g}; see the moduli in [energy])",
             symbol);
-    std::string missed;
-    const auto compare = [&](const char* what, const std::optional<double>& wanted, double from, double to) {
-        if (wanted && !(std::abs(std::log(to / *wanted)) < 0.01) && missed.empty())
-            missed = fmt::format(
-                "no shape with {} {:.6g} was found: the start has {:.6g}, and the descent from there "
-                "came to {:.6g}",
-                what, *wanted, from, to);
-    };
-    compare("area", goal.area, first.area, last.area);
-    compare("volume", goal.volume, first.volume, last.volume);
-    compare("reduced volume", goal.reduced_volume, reduced_volume(first.area, first.volume),
-            reduced_volume(last.area, last.volume));
+    const std::string missed = missed_constraint(goal, first.area, first.volume, last.area, last.volume);
     return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
@@ -598,7 +380,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
                 "a sphere leads to no other area and volume, since all directions are alike: start at a spheroid "
                 "or a sphere with waves, or by equilibrium.family");
         }
-        found = settle(system, u, !found, settings, out);
+        found = settle(system, u, !found, settings.descend, out.iterations);
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);
         if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 7)) break;

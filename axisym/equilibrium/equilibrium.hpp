@@ -4,32 +4,18 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
-#include "common/model/model.hpp"
+#include "common/equilibrium/stationary_problem.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule::axisym {
-
-// V / (4 pi/3 (A/4 pi)^(3/2)), 1 for a sphere.
-double reduced_volume(double area, double volume);
-
-// What is held fixed: area, volume, both or neither; or the reduced volume alone, with the size free.
-struct Constraints {
-    std::optional<double> area, volume, reduced_volume;
-};
-
-struct StationaryProblem {
-    Bending bending;
-    Constraints constraints;
-    Loads loads{};  // tension of a free area, pressure of a free volume, force of a free period; see set_problem
-    bool free_period = false;  // of half a tube
-};
 
 // Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.
 struct Variation {
@@ -50,18 +36,18 @@ public:
     const std::shared_ptr<const CurveSpace>& space_handle() const { return space_; }
     const CurveForms& forms() const { return forms_; }
     const StationaryProblem& problem() const { return problem_; }
-    // Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
-    // values that no shape has, and where the period of the space is not free as the problem says.
+    // Throws as check_problem(), and where the period of the space is not free as the problem says.
     void set_problem(const StationaryProblem& problem);
     double gauge() const { return gauge_; }
-    int size() const { return space_->size() + numbers; }
+    int unknowns() const { return space_->size() + numbers; }
+    int shape_size() const { return space_->size(); }
     int sigma() const { return space_->size(); }  // places in u
     int lambda() const { return space_->size() + 1; }
     int mu() const { return space_->size() + 2; }
     // Makes mu that of the curve.
     void set_mu(Eigen::VectorXd& u) const { u[mu()] = area_difference_force(problem_.bending, forms_.M(u.data())); }
 
-    // F(u), of size() numbers.
+    // F(u), of unknowns() numbers.
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     // dF/du, with `damping` times the mass matrix added to the Hessian; compressed, of one pattern.
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
@@ -71,8 +57,24 @@ public:
     // `lowest` with `vectors` only.
     Variation variation(const Eigen::VectorXd& u, bool vectors = false) const;
 
+    // What Newton's method asks for (common/equilibrium/newton.hpp).
+    Eigen::VectorXd constraint_residual(const Eigen::VectorXd& u) const;
+    double constraint_error(const Eigen::VectorXd& u) const;
+    std::array<double, 2> area_and_volume(const Eigen::VectorXd& u) const;
+    double size(const Eigen::VectorXd& u) const;
+    double reference_energy(const Eigen::VectorXd& u) const { return forms_.reference_energy(curve(u)); }
+    bool admissible(const Eigen::VectorXd& u) const { return forms_.admissible(curve(u)); }
+    bool rebase(const Eigen::VectorXd&) const { return false; }
+    Eigen::VectorXd way_down(const Eigen::VectorXd& u) const;
+    SparseLu factors() const { return {}; }
+
 private:
-    Weights lagrangian(const Eigen::VectorXd& u) const;
+    Eigen::VectorXd curve(const Eigen::VectorXd& u) const { return u.head(space_->size()); }
+    MultiplierEquations equations(const CurveObservation& o, const Eigen::VectorXd& u) const {
+        return multiplier_equations(problem_, o.area, o.volume, u[sigma()], u[lambda()]);
+    }
+    void set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
+    Weights weights(const Eigen::VectorXd& u) const;
     Eigen::VectorXd slope_of_M(const Eigen::VectorXd& x) const;
     double length(const Eigen::VectorXd& x) const { return space_->length(x.data()); }
 

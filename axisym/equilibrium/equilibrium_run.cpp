@@ -16,6 +16,7 @@
 #include "axisym/equilibrium/equilibrium.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/read.hpp"
+#include "common/equilibrium/equilibrium_task.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/series/table.hpp"
@@ -33,65 +34,6 @@ struct Task {
 };
 
 constexpr double largest_of_family = 0.99;  // reduced volume where the search begins
-
-double sphere_volume(double area, double reduced) {
-    return reduced * area * std::sqrt(area) / (6 * std::sqrt(pi));
-}
-
-SetParameter setter(int parameter) {
-    if (parameter >= 0)
-        return [parameter](StationaryProblem& p, double value) { modulus(p.bending, parameter) = value; };
-    switch (parameter) {
-        case vary_H0:
-            return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
-        case vary_alpha:
-            return [](StationaryProblem& p, double value) { p.bending.alpha = value; };
-        case vary_M0:
-            return [](StationaryProblem& p, double value) { p.bending.M0 = value; };
-        case vary_area:
-            return [](StationaryProblem& p, double value) { p.constraints.area = value; };
-        case vary_volume:
-            return [](StationaryProblem& p, double value) { p.constraints.volume = value; };
-        case vary_tension:
-            return [](StationaryProblem& p, double value) { p.loads.tension = value; };
-        case vary_pressure:
-            return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
-        case vary_force:
-            return [](StationaryProblem& p, double value) { p.loads.force = value; };
-        default:
-            return [](StationaryProblem& p, double value) {
-                if (p.constraints.area)
-                    p.constraints.volume = sphere_volume(*p.constraints.area, value);
-                else
-                    p.constraints.reduced_volume = value;
-            };
-    }
-}
-
-double start_of(int parameter, const StationaryProblem& p) {
-    if (parameter >= 0) return modulus(p.bending, parameter);
-    const Constraints& c = p.constraints;
-    switch (parameter) {
-        case vary_H0:
-            return p.bending.H0;
-        case vary_alpha:
-            return *p.bending.alpha;
-        case vary_M0:
-            return p.bending.M0;
-        case vary_area:
-            return *c.area;
-        case vary_volume:
-            return *c.volume;
-        case vary_tension:
-            return p.loads.tension;
-        case vary_pressure:
-            return p.loads.pressure;
-        case vary_force:
-            return p.loads.force;
-        default:
-            return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
-    }
-}
 
 // The first shape of a family, of this reduced volume and about this area.
 Curve start_of(Family family, double reduced, double area) {
@@ -140,14 +82,8 @@ Task task_of(const Problem& c) {
     }
     check_varying_H0(c, task.start);
     const auto [area, volume] = area_and_volume(task.start);
-    task.problem.bending = c.energy;
-    task.problem.loads = loads_at(c.law, 0);
-    task.problem.free_period = c.model.free_period;
-    Constraints& held = task.problem.constraints;
-    if (c.held == Held::area_and_volume || c.held == Held::area) held.area = e.area.value_or(area);
-    if (c.held == Held::area_and_volume || c.held == Held::volume) held.volume = e.volume.value_or(volume);
-    if (c.held == Held::area_and_volume && e.reduced_volume) held.volume = sphere_volume(*held.area, *e.reduced_volume);
-    if (c.held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    task.problem = stationary_problem(c, area, volume);
+    const Constraints& held = task.problem.constraints;
     if (e.family) {
         if (task.start.topology != Topology::cell)
             throw complaint(c, "equilibrium.family",
@@ -160,23 +96,12 @@ Task task_of(const Problem& c) {
     if (const BranchChoices& b = e.branch; b.parameter) {
         task.set = setter(*b.parameter);
         BranchSettings& branch = task.branch;
-        branch.from = start_of(*b.parameter, task.problem), branch.to = *b.to;
         branch.shapes = task.settings;
-        if (const std::string wrong = wrong_branch(branch.from, branch.to, *b.step); !wrong.empty())
-            throw complaint(c, "equilibrium.branch", wrong);
-        const double way = branch.to - branch.from;
-        const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
-        for (int i = 0; i <= steps; ++i)
-            branch.output.push_back(i < steps ? branch.from + i * std::copysign(*b.step, way) : branch.to);
+        branch.output = branch_outputs(c, task.problem);
+        branch.from = branch.output.front(), branch.to = branch.output.back();
     }
-    try {  // what contradicts itself is said before anything is computed
-        StationarySystem(std::make_shared<CurveSpace>(task.start.topology, equal_breaks(4), 3, 2, task.start.length,
-                                                      task.problem.free_period),
-                         task.problem, 1);
-    } catch (const std::invalid_argument& error) {
-        const char* key = e.reduced_volume ? ".reduced_volume" : e.volume ? ".volume" : e.area ? ".area" : "";
-        throw CaseError(fmt::format("{}: equilibrium{}: {}", c.path, key, error.what()));
-    }
+    const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
+    check_problem(c, task.problem, closed ? 0 : task.start.length);
     return task;
 }
 

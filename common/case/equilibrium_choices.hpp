@@ -44,6 +44,7 @@ struct EquilibriumChoices {
     std::optional<double> area, volume, reduced_volume;  // where absent: those of the initial shape
     std::optional<Family> family;                        // where the search begins; absent: at [shape]
     bool descend = true;                                 // to a minimum; if not, to the closest stationary shape
+    std::optional<int> rates;  // of tier surface3d: growth rates of the slowest modes, this many
     std::optional<int> modes;  // stability against e^{i m theta}, m = 0 ... modes, by the dissipation of [model]
     BranchChoices branch;
 };
@@ -98,6 +99,7 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
               {"pear", Family::pear}});
     k.flag("descend", e.descend);
     k.integer("modes", e.modes, {.from = model.free_period ? 1.0 : 0.0, .to = 100});
+    k.integer("rates", e.rates, {.from = 1, .to = 200});
     const Held held = e.held.value_or(default_held(model));
     k.check("held", [&]() -> std::string {
         if (const std::string clash = held_against(model, held); !clash.empty() || !model.free_period) return clash;

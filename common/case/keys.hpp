@@ -381,7 +381,7 @@ void keys(Keys& k, Case& c) {
         else
             keys(k, c.discretisation);
     });
-    if (c.tier == Tier::surface3d) {
+    if (c.tier == Tier::surface3d && !c.equilibrium) {
         std::optional<TimeSpan> time = c.moves() ? std::optional(c.time) : std::nullopt;
         k.optional_table("time", time, [&](auto& k, TimeSpan& t) { keys(k, t, true); });
         if (time) c.time = *time;

@@ -8,7 +8,7 @@ namespace {
 constexpr double high_accuracy = 1e-4;  // from here on, without inertia, steps of higher order pay
 
 Unknowns unknowns_of(const Case& c) {
-    if (c.equilibrium) return Unknowns::equilibrium;
+    if (c.equilibrium) return c.tier == Tier::surface3d ? Unknowns::surface_equilibrium : Unknowns::equilibrium;
     if (c.tier == Tier::automatic) return Unknowns::automatic;
     if (c.tier == Tier::surface3d) return c.moves() ? Unknowns::moving_surface : Unknowns::surface;
     return begins_as_graph(c) ? Unknowns::graph : Unknowns::curve;
@@ -28,7 +28,7 @@ Problem::Problem(Case c)
       law(motion_law(model)),
       held((equilibrium ? equilibrium->held : std::nullopt).value_or(default_held(model))),
       scheme(scheme_of(*this, law.inertia != 0)),
-      element_order(surface.order.value_or(moves() ? 4 : 3)),
+      element_order(surface.order.value_or(moves() || equilibrium ? 4 : 3)),
       begin_time(handover ? handover->time : 0) {}
 
 Problem Problem::of_profile(double end, std::vector<double> output) const {

@@ -13,6 +13,7 @@ enum class Unknowns {
     curve,           // a profile curve in motion
     equilibrium,     // a stationary profile curve, or a branch of them
     moving_surface,  // a surface in motion
+    surface_equilibrium,  // a stationary surface
     surface,         // nothing: energy and curvature of a surface as it is
     automatic        // a profile in motion, then a surface where modes m > 0 grow: tier "auto"
 };
@@ -31,6 +32,7 @@ struct Problem : Case {
     int element_order = 0;
     double begin_time = 0;  // of a surface that continues a motion of tier axisym
 
+    bool is_equilibrium() const { return equilibrium.has_value(); }
     bool is_axisymmetric() const { return unknowns <= Unknowns::equilibrium; }  // by its tier
     // The case gives elements, tolerance or step: the program must not choose them.
     bool profile_resolution_given() const { return discretisation.elements || discretisation.time_tolerance; }

@@ -22,8 +22,9 @@ Property kind_with(bool ModelEntry::*has) {
 // Tiers and what they compute.
 const Property axisym{"tier = \"axisym\"", [](P p) { return p.tier == Tier::axisym; }},
     automatic_tier{"tier = \"auto\"", [](P p) { return p.tier == Tier::automatic; }},
+    surface{"tier = \"surface3d\"", [](P p) { return p.tier == Tier::surface3d; }},
     named_tier{"tier = \"axisym\" or \"surface3d\"", [](P p) { return p.tier != Tier::automatic; }},
-    time{"a table [time]", [](P p) { return p.tier != Tier::surface3d || p.moves(); }},
+    time{"a table [time]", [](P p) { return p.tier != Tier::surface3d || p.moves() || p.equilibrium; }},
     single_surface{"a single surface, without [time]", [](P p) { return !p.moves(); }},
     motion{"a motion, without [equilibrium]", [](P p) { return !p.equilibrium; }},
     moving_surface{"a surface in motion", [](P p) { return p.tier != Tier::axisym && p.moves(); }};
@@ -105,11 +106,14 @@ Requirement number(std::string name, Test counts, std::vector<Property> all, std
 
 const std::vector<Requirement> rows{
     key("auto", {automatic_tier}),
-    key("equilibrium", {axisym}),
-    key("equilibrium.modes", {no_inertia}, "growth rates neglect inertia"),
+    key("equilibrium", {named_tier}),
+    key("equilibrium.family", {axisym}, "begin with a shape of the case, or with a result of tier axisym"),
+    key("equilibrium.rates", {surface}, "the rates of each m are those of equilibrium.modes"),
+    key("equilibrium.branch", {axisym}),
+    key("equilibrium.modes", {axisym, no_inertia}, "growth rates neglect inertia"),
     value(
-        "shape.kind", [](P p) { return std::holds_alternative<Torus>(p.shape); }, {motion},
-        "equilibria are closed cells, or tubes with mirror symmetry"),
+        "shape.kind", [](P p) { return std::holds_alternative<Torus>(p.shape) && p.tier == Tier::axisym; }, {motion},
+        "equilibria of this tier are closed cells, or tubes with mirror symmetry"),
 
     key("model", {time}, "nothing moves without it"),
     key("model.Re", {viscous}),

@@ -69,6 +69,8 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"parameter", "that of the key", "value of the key that varies along a branch"},
     {"special", "1", "1 at a fold, 2 at a bifurcation, else 0"},
     {"negative_directions", "1", "number of directions in which the energy falls"},
+    {"rate_<i>", "1/time", "growth rate of the <i>-th slowest mode"},
+    {"wave_number_<i>", "1", "waves of mode <i> around the axis of the shape; -1 if there is none"},
     {"growth_<m>", "1/time", "growth rate of waves with m = <m> around the axis"},
     {"meridian_length", "length", "length of the profile"},
     {"height", "length", "height from pole to pole, or period"},

@@ -199,7 +199,7 @@ std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult
         p.c = result.scan.case_of(pick.point);
         p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
-        if (p.c.unknowns == Unknowns::equilibrium)
+        if (p.c.is_equilibrium())
             throw CaseError(options.scan + ": is a scan of equilibria: nothing moves there");
         if (!p.c.is_axisymmetric())
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");

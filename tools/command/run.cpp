@@ -213,7 +213,7 @@ std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, con
     const Problem& c = chosen.c;
     Result old = read_result(file);
     if (!goes_on(c, old, file)) return std::nullopt;
-    if (c.unknowns == Unknowns::equilibrium)
+    if (c.is_equilibrium())
         throw CaseError(fmt::format("{}: equilibria are not resumed; run the case again without --resume", c.path));
     if (old.frames.empty() && !old.checkpoint) return create(chosen, engine, file);
     ResultWriter writer = ResultWriter::resume(
@@ -275,7 +275,7 @@ int run_case(ChosenCase chosen, const std::filesystem::path& file, const RunOpti
             say(stderr, "{}: expected: {}\n", c.path, words(*forecast));
     Ended ended;
     {
-        Recorder recorder(c, result->writer, options.quiet || c.unknowns == Unknowns::equilibrium,
+        Recorder recorder(c, result->writer, options.quiet || c.is_equilibrium(),
                           result->restart ? &result->restart->record : nullptr);
         ended = run_to_end(engine, recorder, result->restart ? &*result->restart : nullptr,
                            result->unfinished ? &*result->unfinished : nullptr);
@@ -308,7 +308,7 @@ void refuse_to_replace_the_start(const Problem& c, const std::filesystem::path& 
 
 bool can_be_resumed(const Problem& c, const Result& result) {
     const auto stop = stop_of(result);
-    return c.unknowns != Unknowns::equilibrium && (!stop || can_go_on(*stop)) &&
+    return !c.is_equilibrium() && (!stop || can_go_on(*stop)) &&
            (!result.frames.empty() || result.checkpoint);
 }
 

@@ -323,7 +323,7 @@ void add_cases(py::module_& m) {
         .def_readonly("sets", &Problem::sets)
         .def_readonly("title", &Problem::title)
         .def_property_readonly("toml", [](const Problem& c) { return effective_toml(c); })
-        .def_property_readonly("is_equilibrium", [](const Problem& c) { return c.unknowns == Unknowns::equilibrium; });
+        .def_property_readonly("is_equilibrium", [](const Problem& c) { return c.is_equilibrium(); });
     m.def(
         "parse_case",
         [](const std::string& text, const std::vector<std::string>& sets, const std::string& path) {

@@ -4,6 +4,7 @@
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
+#include "surface3d/run/equilibrium_run.hpp"
 #include "surface3d/run/run.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/auto/joined_file.hpp"
@@ -20,6 +21,7 @@ Engine::Engine(Problem c) : case_(std::move(c)) {
         choice_ = choice_for(case_);
     else if (!case_.is_axisymmetric())
         choice_.start.emplace(case_);
+    if (case_.unknowns == Unknowns::surface_equilibrium) surface3d::check_equilibrium(case_, *choice_.start);
 }
 
 std::vector<std::string> Engine::series_names() const {
@@ -29,6 +31,8 @@ std::vector<std::string> Engine::series_names() const {
             return axisym::series_names(case_);
         case Unknowns::equilibrium:
             return axisym::equilibrium_series_names(case_);
+        case Unknowns::surface_equilibrium:
+            return surface3d::equilibrium_series_names(case_);
         case Unknowns::automatic:
             return joined_series_names(case_, choice_.axisymmetric);
         default:
@@ -39,7 +43,7 @@ std::vector<std::string> Engine::series_names() const {
 void Engine::check_restart(const Record& record) const {
     if (case_.is_axisymmetric() || (case_.unknowns == Unknowns::automatic && !record.mesh))
         axisym::check_restart(record);
-    else if (case_.unknowns != Unknowns::surface)
+    else if (case_.unknowns != Unknowns::surface && !case_.is_equilibrium())
         surface3d::check_restart(case_, record);
 }
 
@@ -50,6 +54,8 @@ RunSummary Engine::run(RunObserver& observer, const Restart* restart, const Resu
             return axisym::run(case_, observer, restart);
         case Unknowns::equilibrium:
             return axisym::run_equilibrium(case_, observer);
+        case Unknowns::surface_equilibrium:
+            return surface3d::run_equilibrium(case_, *choice_.start, observer);
         case Unknowns::automatic:
             return run_auto(case_, choice_, observer, restart, unfinished);
         case Unknowns::surface:

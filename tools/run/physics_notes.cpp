@@ -39,7 +39,7 @@ std::string frozen_wave(const Problem& c) {
 std::string sign_of_H0(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const auto* sphere = std::get_if<Sphere>(&c.shape);
-    if ((!tube && !sphere) || c.unknowns == Unknowns::equilibrium || c.energy.H0_varies() || !(c.energy.H0 > 0))
+    if ((!tube && !sphere) || c.is_equilibrium() || c.energy.H0_varies() || !(c.energy.H0 > 0))
         return {};
     const double H = tube ? -1 / tube->radius : -2 / sphere->radius;
     return note(c, "energy.H0",

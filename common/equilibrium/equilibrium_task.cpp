@@ -1,0 +1,106 @@
+#include "common/equilibrium/equilibrium_task.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule {
+
+double volume_at(double area, double reduced_volume) {
+    return reduced_volume * area * std::sqrt(area) / (6 * std::sqrt(pi));
+}
+
+SetParameter setter(int parameter) {
+    if (parameter >= 0)
+        return [parameter](StationaryProblem& p, double value) { modulus(p.bending, parameter) = value; };
+    switch (parameter) {
+        case vary_H0:
+            return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
+        case vary_alpha:
+            return [](StationaryProblem& p, double value) { p.bending.alpha = value; };
+        case vary_M0:
+            return [](StationaryProblem& p, double value) { p.bending.M0 = value; };
+        case vary_area:
+            return [](StationaryProblem& p, double value) { p.constraints.area = value; };
+        case vary_volume:
+            return [](StationaryProblem& p, double value) { p.constraints.volume = value; };
+        case vary_tension:
+            return [](StationaryProblem& p, double value) { p.loads.tension = value; };
+        case vary_pressure:
+            return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
+        case vary_force:
+            return [](StationaryProblem& p, double value) { p.loads.force = value; };
+        default:
+            return [](StationaryProblem& p, double value) {
+                if (p.constraints.area)
+                    p.constraints.volume = volume_at(*p.constraints.area, value);
+                else
+                    p.constraints.reduced_volume = value;
+            };
+    }
+}
+
+double parameter_value(int parameter, const StationaryProblem& p) {
+    if (parameter >= 0) return modulus(p.bending, parameter);
+    const Constraints& c = p.constraints;
+    switch (parameter) {
+        case vary_H0:
+            return p.bending.H0;
+        case vary_alpha:
+            return *p.bending.alpha;
+        case vary_M0:
+            return p.bending.M0;
+        case vary_area:
+            return *c.area;
+        case vary_volume:
+            return *c.volume;
+        case vary_tension:
+            return p.loads.tension;
+        case vary_pressure:
+            return p.loads.pressure;
+        case vary_force:
+            return p.loads.force;
+        default:
+            return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
+    }
+}
+
+StationaryProblem stationary_problem(const Problem& c, double area, double volume) {
+    const EquilibriumChoices& e = *c.equilibrium;
+    StationaryProblem out{.bending = c.energy, .constraints = {}, .loads = loads_at(c.law, 0)};
+    out.free_period = c.model.free_period;
+    Constraints& held = out.constraints;
+    if (holds_area(c.held)) held.area = e.area.value_or(area);
+    if (holds_volume(c.held)) held.volume = e.volume.value_or(volume);
+    if (c.held == Held::area_and_volume && e.reduced_volume) held.volume = volume_at(*held.area, *e.reduced_volume);
+    if (c.held == Held::reduced_volume) held.reduced_volume = e.reduced_volume.value_or(reduced_volume(area, volume));
+    return out;
+}
+
+std::vector<double> branch_outputs(const Problem& c, const StationaryProblem& problem) {
+    const BranchChoices& b = c.equilibrium->branch;
+    const double from = parameter_value(*b.parameter, problem), way = *b.to - from;
+    if (const std::string wrong = wrong_branch(from, *b.to, *b.step); !wrong.empty())
+        throw complaint(c, "equilibrium.branch", wrong);
+    const int steps = static_cast<int>(std::ceil(std::abs(way) / *b.step - 1e-9));
+    std::vector<double> out;
+    for (int i = 0; i < steps; ++i) out.push_back(from + i * std::copysign(*b.step, way));
+    out.push_back(*b.to);
+    return out;
+}
+
+void check_problem(const Problem& c, const StationaryProblem& problem, double period) {
+    try {
+        check_problem(problem, period);
+    } catch (const std::invalid_argument& error) {
+        const EquilibriumChoices& e = *c.equilibrium;
+        const char* key = e.reduced_volume ? ".reduced_volume" : e.volume ? ".volume" : e.area ? ".area" : "";
+        throw CaseError(fmt::format("{}: equilibrium{}: {}", c.path, key, error.what()));
+    }
+}
+
+}  // namespace tubule

@@ -1,0 +1,143 @@
+#include "common/equilibrium/stationary_problem.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "common/geometry/profile_point.hpp"
+
+namespace tubule {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double rounding = 1e-9;                // of the reduced volume of a sphere to begin with
+const double sphere_factor = 6 * std::sqrt(pi);  // reduced volume = sphere_factor V / A^(3/2)
+
+// In space that is periodic along an axis, balls and cylinders enclose most (Pedrosa and Ritore, Indiana Univ. Math. J.
+// 48, 1999).
+double largest_volume(double area, double period) {
+    return std::max(std::pow(area, 1.5) / sphere_factor, area * area / (4 * pi * period));
+}
+
+void check_values(const StationaryProblem& problem, double period) {
+    const Constraints& c = problem.constraints;
+    const auto positive = [](const std::optional<double>& value, const char* what) {
+        if (value && !(*value > 0))
+            throw std::invalid_argument(fmt::format("{} of {} is impossible: it must be positive", what, *value));
+    };
+    positive(c.area, "an area"), positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
+    if (period == 0) {
+        std::optional<double> v = c.reduced_volume;
+        if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
+        if (v && *v > 1 + rounding)
+            throw std::invalid_argument(
+                fmt::format("a reduced volume of {:.6g} is impossible: the largest is 1, that of a sphere", *v));
+    } else if (c.area && c.volume && !problem.free_period) {
+        const double most = largest_volume(*c.area, period);
+        if (*c.volume > most)
+            throw std::invalid_argument(
+                fmt::format("a volume of {:.6g} a period is impossible: an area of {:.6g} encloses at most {:.6g}",
+                            *c.volume, *c.area, most));
+    }
+}
+
+}  // namespace
+
+double reduced_volume(double area, double volume) {
+    return sphere_factor * volume / std::pow(area, 1.5);
+}
+
+void check_problem(const StationaryProblem& problem, double period) {
+    const Constraints& c = problem.constraints;
+    if (!problem.free_period && problem.loads.force != 0)
+        throw std::invalid_argument("a force needs a free period, and a space with one");
+    if (problem.free_period && !c.area && !c.volume)
+        throw std::invalid_argument("a free period needs a given area or a given volume");
+    if ((c.area && problem.loads.tension != 0) || (c.volume && problem.loads.pressure != 0) ||
+        (c.reduced_volume && (problem.loads.tension != 0 || problem.loads.pressure != 0)))
+        throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
+    if (c.reduced_volume && (c.area || c.volume))
+        throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
+    check_values(problem, period);
+}
+
+MultiplierEquations multiplier_equations(const StationaryProblem& problem, double area, double volume, double sigma,
+                                         double lambda) {
+    const Constraints& c = problem.constraints;
+    MultiplierEquations out{{}, Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero()};
+    if (c.reduced_volume) {
+        out.F[0] = 2 * sigma * area + 3 * lambda * volume;  // no change with size
+        out.F[1] = volume - *c.reduced_volume / sphere_factor * std::pow(area, 1.5);
+        out.by_extent << 2 * sigma, 3 * lambda, reduced_volume_slopes(*c.reduced_volume, area).by_area, 1;
+        out.by_multipliers(0, 0) = 2 * area, out.by_multipliers(0, 1) = 3 * volume;
+        return out;
+    }
+    out.F[0] = c.area ? area - *c.area : sigma - problem.loads.tension;
+    out.F[1] = c.volume ? volume - *c.volume : lambda + problem.loads.pressure;
+    (c.area ? out.by_extent : out.by_multipliers)(0, 0) = 1;
+    (c.volume ? out.by_extent : out.by_multipliers)(1, 1) = 1;
+    return out;
+}
+
+double lagrangian(const StationaryProblem& problem, double energy, double area, double volume, double length,
+                  double sigma, double lambda) {
+    const Constraints& c = problem.constraints;
+    double value = energy + problem.loads.energy(area, volume, length);
+    if (c.area) value += sigma * (area - *c.area);
+    if (c.volume) value += lambda * (volume - *c.volume);
+    if (c.reduced_volume) value += lambda * (volume - *c.reduced_volume / sphere_factor * std::pow(area, 1.5));
+    return value;
+}
+
+ReducedVolumeSlopes reduced_volume_slopes(double reduced_volume, double area) {
+    const double factor = reduced_volume / sphere_factor;
+    return {-factor * 1.5 * std::sqrt(area), -factor * 0.75 / std::sqrt(area)};
+}
+
+double constraint_error(const Constraints& c, const MultiplierEquations& equations, double length) {
+    const double area = c.area ? std::abs(equations.F[0]) / (length * length) : 0;
+    const double volume =
+        c.volume || c.reduced_volume ? std::abs(equations.F[1]) / (length * length * length) : 0;
+    return std::max(area, volume);
+}
+
+StationaryProblem between(const StationaryProblem& goal, double area, double volume, double part) {
+    const auto on_the_way = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
+        if (!wanted) return wanted;
+        return is * std::pow(*wanted / is, part);
+    };
+    const Constraints& c = goal.constraints;
+    StationaryProblem out = goal;
+    out.constraints = {on_the_way(c.area, area), on_the_way(c.volume, volume),
+                       on_the_way(c.reduced_volume, reduced_volume(area, volume))};
+    return out;
+}
+
+double distance(const Constraints& goal, double area, double volume) {
+    const auto off = [](const std::optional<double>& wanted, double is) {
+        return wanted ? std::abs(std::log(*wanted / is)) : 0;
+    };
+    return std::max({off(goal.area, area), off(goal.volume, volume),
+                     off(goal.reduced_volume, reduced_volume(area, volume))});
+}
+
+std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,
+                              double volume) {
+    std::string missed;
+    const auto compare = [&](const char* what, const std::optional<double>& wanted, double from, double to) {
+        if (wanted && !(std::abs(std::log(to / *wanted)) < 0.01) && missed.empty())
+            missed = fmt::format(
+                "no shape with {} {:.6g} was found: the start has {:.6g}, and the descent from there "
+                "came to {:.6g}",
+                what, *wanted, from, to);
+    };
+    compare("area", goal.area, first_area, area);
+    compare("volume", goal.volume, first_volume, volume);
+    compare("reduced volume", goal.reduced_volume, reduced_volume(first_area, first_volume),
+            reduced_volume(area, volume));
+    return missed;
+}
+
+}  // namespace tubule

@@ -1,0 +1,66 @@
+// Stationary shapes of E + sigma A + lambda V - force L: what is held, the loads on what is free, and the equations of
+// the multipliers. Both tiers solve them, each for its own unknowns.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "common/energy/bending.hpp"
+#include "common/model/model.hpp"
+
+namespace tubule {
+
+// V / (4 pi/3 (A/4 pi)^(3/2)), 1 for a sphere.
+double reduced_volume(double area, double volume);
+
+// What is held fixed: area, volume, both or neither; or the reduced volume alone, with the size free.
+struct Constraints {
+    std::optional<double> area, volume, reduced_volume;
+};
+
+struct StationaryProblem {
+    Bending bending;
+    Constraints constraints;
+    Loads loads{};             // tension of a free area, pressure of a free volume, force of a free period
+    bool free_period = false;  // of a tube; of half a tube in tier 1
+};
+
+// Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
+// constraints that contradict each other, and for values that no shape has. `period`: 0 of a closed surface.
+void check_problem(const StationaryProblem& problem, double period);
+
+// The two equations for sigma and lambda, F = 0: what is held has its value, what is free its load, and with a reduced
+// volume a change of size does no work; with their derivatives in (area, volume) and in (sigma, lambda).
+struct MultiplierEquations {
+    Eigen::Vector2d F;
+    Eigen::Matrix2d by_extent, by_multipliers;
+};
+MultiplierEquations multiplier_equations(const StationaryProblem& problem, double area, double volume, double sigma,
+                                         double lambda);
+
+// What the energy and the loads become with the multipliers: stationary, in the shape, where the constraints hold.
+double lagrangian(const StationaryProblem& problem, double energy, double area, double volume, double length,
+                  double sigma, double lambda);
+
+// The functional of (area, volume) that a reduced volume fixes, V - v A^(3/2)/(6 sqrt(pi)): derivatives, and the second
+// one in the area.
+struct ReducedVolumeSlopes {
+    double by_area, by_area_twice;
+};
+ReducedVolumeSlopes reduced_volume_slopes(double reduced_volume, double area);
+
+// Deviation of area and volume from what is held, 0 for what is free, in units of a length.
+double constraint_error(const Constraints& c, const MultiplierEquations& equations, double length);
+
+// The problem part of the way from a shape of this area and volume to its own constraints, 0 <= part <= 1.
+StationaryProblem between(const StationaryProblem& goal, double area, double volume, double part);
+// How far that is: the largest |log| of a ratio.
+double distance(const Constraints& goal, double area, double volume);
+
+// Why no shape was found, from the area and volume of the first one and of the last: "no shape with volume ..."; else
+// empty.
+std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,
+                              double volume);
+
+}  // namespace tubule

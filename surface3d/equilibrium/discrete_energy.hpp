@@ -1,0 +1,83 @@
+// A discrete bending energy of curved triangles with exact first and second derivatives, theory.md (10.22): INT f(H, K)
+// over each triangle and, where two triangles meet at an angle, the terms of an interior penalty method, which make it
+// consistent and stable although the surface has kinks of order h^k.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <vector>
+
+#include "common/energy/bending.hpp"
+#include "surface3d/fem/surface_space.hpp"
+
+namespace tubule::surface3d {
+
+// Displacements of the nodes: w_i n_i with one number w_i each, and of a tube the stretch e z e_z.
+struct Directions {
+    VectorField normal;    // n_i
+    bool stretch = false;  // whether there is the unknown e, after those of the nodes
+};
+
+struct EnergyValues {
+    double energy = 0;  // INT f, of densities alone
+    double area = 0, volume = 0, M = 0;
+    double kinks = 0;  // INT angle^2 over all edges, times the penalty: of the order of the energy's error
+};
+
+// Of the same sums, with respect to the unknowns.
+struct EnergyDerivatives {
+    EnergyValues values;
+    Eigen::VectorXd energy, area, volume, M;
+    // Second derivatives of energy + sigma area + lambda volume; among nodes, and with the stretch (else empty).
+    Eigen::SparseMatrix<double> hessian;
+    Eigen::VectorXd with_stretch;
+    double stretch_twice = 0;
+};
+
+class DiscreteEnergy {
+public:
+    // The triangles of the mesh. The penalty belongs to this energy and to these positions; it stays until
+    // set_penalty() is called again.
+    DiscreteEnergy(const CurvedMesh& mesh, const Bending& bending);
+    void set_penalty(const CurvedMesh& mesh, const Bending& bending);
+
+    const SurfaceSpace& space() const { return space_; }
+    // A zero matrix of the pattern of the Hessian.
+    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+
+    // Of a mesh with these triangles; where areas differ, of an energy with_M(). H0 at the nodes, where it varies.
+    EnergyValues values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0 = {}) const;
+    EnergyDerivatives derivatives(const CurvedMesh& mesh, const Directions& directions, const Bending& bending,
+                                  double sigma, double lambda, const Eigen::VectorXd& H0 = {}) const;
+    // INT w_i w_j (n.nu)^2 dS
+    Eigen::SparseMatrix<double> mass(const CurvedMesh& mesh, const Directions& directions) const;
+
+    // Beside the least that makes elements of this order stable in theory: docs/decisions/equilibria_3d.md
+    double penalty_factor = getenv("PF") ? atof(getenv("PF")) : 4;
+
+private:
+    struct Edge {
+        int cell[2], side[2];
+        double penalty = 0;
+    };
+    struct Gradients;
+    struct Block;
+
+    void find_edges();
+    void set_pattern();
+    void add(const Block& block, const std::vector<int>& nodes, const int* slots, EnergyDerivatives& out) const;
+    void cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, double sigma, double lambda,
+                    const Eigen::VectorXd& H0, int cell, Block& out) const;
+    void edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, const Eigen::VectorXd& H0,
+                    const Edge& edge, Block& out) const;
+
+    SurfaceSpace space_;
+    std::vector<Edge> edges_;
+    // Tables at the points of each edge, along and across it, as the cell on its left sees them, and the one on its
+    // right, whose side runs backwards.
+    std::vector<Tabulation> left_, right_;
+    Eigen::SparseMatrix<double> pattern_;
+    std::vector<int> cell_slots_, edge_slots_;
+};
+
+}  // namespace tubule::surface3d

@@ -1,0 +1,150 @@
+#include "surface3d/equilibrium/surface_equilibrium.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "common/equilibrium/newton.hpp"
+#include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/meshing/remesh.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr double refinement = 1.8;   // triangles of a mesh over those of the one before
+constexpr double least_quality = 0.3;
+constexpr int most_attempts = 5;  // meshes on which no shape is found
+
+CurvedMesh scaled_to(CurvedMesh mesh, const StationaryProblem& problem) {
+    const Constraints& c = problem.constraints;
+    if (mesh.period > 0 || !(c.area || c.volume)) return mesh;
+    const EnergyValues v = DiscreteEnergy(mesh, problem.bending).values(mesh, problem.bending);
+    const double factor = c.area ? std::sqrt(*c.area / v.area) : std::cbrt(*c.volume / v.volume);
+    for (Eigen::Vector3d& x : mesh.nodes) x *= factor;
+    return mesh;
+}
+
+// The search on one mesh after the other.
+class Search {
+public:
+    Search(const StationaryProblem& problem, const SurfaceEquilibriumSettings& settings)
+        : problem_(problem), settings_(settings) {}
+
+    SurfaceEquilibrium run(const MakeMesh& initial) {
+        const bool given = settings_.triangles > 0;
+        int triangles = given ? std::max(static_cast<int>(settings_.triangles / refinement), 40)
+                              : settings_.first_triangles;
+        for (;;) {
+            SurfaceSystem system(next_mesh(initial, triangles), problem_);
+            Eigen::VectorXd u = system.unknowns_at_base();
+            if (rounds_ == 0) first_ = system.area_and_volume(u);
+            if (out_.stop == Stop::finished) u.tail(multipliers_.size()) = multipliers_;
+            const bool far = out_.stop != Stop::finished && !settings_.near;
+            const bool sound = system.admissible(u),
+                       found = sound && settle(system, u, far, settings_.descend, out_.iterations);
+            out_.stop = found ? Stop::finished : sound ? Stop::solver_failed : Stop::mesh_lost;
+            keep(system, u);
+            ++rounds_;
+            const bool enough = given ? rounds_ > 1 : found && out_.estimated_error <= settings_.accuracy;
+            triangles = given ? settings_.triangles : static_cast<int>(refinement * std::max(triangles, out_.mesh.triangles()));
+            if (enough || triangles > settings_.max_triangles || (!found && !given && rounds_ == most_attempts))
+                return found ? finish(system, u) : end(out_.stop, why_none(system, u));
+        }
+    }
+
+private:
+    // Of the shape found last; of the initial one where there is none, and where that is nearer than a new mesh of the
+    // old one.
+    CurvedMesh next_mesh(const MakeMesh& initial, int triangles) const {
+        if (out_.stop == Stop::finished && !settings_.near) {
+            auto finer = remesh(out_.mesh, Eigen::MatrixXd(0, out_.mesh.size()),
+                                {.triangles = triangles, .quality = least_quality});
+            if (auto* found = std::get_if<Remeshed>(&finer)) return std::move(found->mesh);
+        }
+        return scaled_to(initial(triangles), problem_);
+    }
+
+    void keep(const SurfaceSystem& system, const Eigen::VectorXd& u) {
+        out_.mesh = system.mesh(u);
+        out_.sigma = u[system.sigma()], out_.lambda = u[system.lambda()], out_.mu = u[system.mu()];
+        out_.values = system.values(u);
+        out_.reference_energy = reference_energy(problem_, system, u);
+        out_.held_motions = system.held_motions();
+        const double energy = out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume,
+                                                                        out_.mesh.period);
+        multipliers_ = u.tail(u.size() - system.shape_size());
+        if (out_.stop != Stop::finished) {
+            before_.reset(), out_.estimated_error = 1;
+            return;
+        }
+        if (before_) {
+            // Energies converge as h^(2k-2) where meshes are alike; these are not: half of that.
+            const double fall =
+                std::pow(static_cast<double>(before_->second) / out_.mesh.triangles(), (out_.mesh.order - 1) / 2.0);
+            // What the edges carry is no larger than the error of the next coarser mesh.
+            out_.estimated_error =
+                std::max(std::abs(energy - before_->first) * fall / (1 - std::min(fall, 0.5)), out_.values.kinks) /
+                out_.reference_energy;
+        }
+        before_ = {energy, out_.mesh.triangles()};
+    }
+
+    SurfaceEquilibrium finish(const SurfaceSystem& system, const Eigen::VectorXd& u) {
+        try {
+            out_.spectrum = system.spectrum(u, std::max(settings_.modes, 1));
+            out_.wave_numbers = system.wave_numbers(u, out_.spectrum.vectors.topRows(out_.mesh.size()));
+        } catch (const SolveError& error) {
+            return end(Stop::solver_failed, fmt::format("the second variation: {}", error.what()));
+        }
+        if (settings_.triangles == 0 && out_.estimated_error > settings_.accuracy)
+            return end(Stop::resolution_lost,
+                       fmt::format("with {} triangles, the error of the energy is still {:.1e}", out_.mesh.triangles(),
+                                   out_.estimated_error));
+        if (!out_.spectrum.doubt.empty())
+            return end(Stop::resolution_lost, "the stability is undetermined: " + out_.spectrum.doubt);
+        return end(Stop::finished, "");
+    }
+
+    SurfaceEquilibrium end(Stop stop, std::string message) {
+        out_.stop = stop, out_.message = std::move(message);
+        return std::move(out_);
+    }
+
+    std::string why_none(const SurfaceSystem& system, const Eigen::VectorXd& u) const {
+        if (out_.stop == Stop::mesh_lost)
+            return fmt::format("the mesh of the initial shape has bad triangles (quality {:.2g}) or kinks",
+                               mesh_quality(out_.mesh).worst);
+        const auto [area, volume] = system.area_and_volume(u);
+        const std::string missed = missed_constraint(problem_.constraints, first_[0], first_[1], area, volume);
+        return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", out_.iterations)
+                              : missed;
+    }
+
+    const StationaryProblem& problem_;
+    const SurfaceEquilibriumSettings& settings_;
+    SurfaceEquilibrium out_;
+    std::array<double, 2> first_{};
+    int rounds_ = 0;
+    Eigen::VectorXd multipliers_;
+    std::optional<std::pair<double, int>> before_;  // energy and triangles of the mesh before
+};
+
+}  // namespace
+
+SurfaceEquilibrium find_equilibrium(const StationaryProblem& problem, const MakeMesh& initial,
+                                    const SurfaceEquilibriumSettings& settings) {
+    return Search(problem, settings).run(initial);
+}
+
+double reference_energy(const StationaryProblem& problem, const SurfaceSystem& system, const Eigen::VectorXd& u) {
+    const EnergyValues v = system.values(u);
+    const Loads& loads = problem.loads;
+    const double length = system.mesh(u).period;
+    return std::max(std::abs(v.energy + loads.energy(v.area, v.volume, length)),
+                    system.reference_energy(u) + std::abs(loads.tension) * v.area +
+                        std::abs(loads.pressure * v.volume) + std::abs(loads.force) * length);
+}
+
+}  // namespace tubule::surface3d

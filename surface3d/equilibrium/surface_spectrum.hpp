@@ -1,0 +1,35 @@
+// The lowest eigenvalues of a sparse symmetric form under constraints, by Lanczos' method with a shift that is inverted.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <string>
+
+#include "common/solve/sparse.hpp"
+
+namespace tubule::surface3d {
+
+// A w = value M w for w with C^T w = 0; A = `form` + SUM weight_j L_j L_j^T with few columns L.
+struct ConstrainedForm {
+    Eigen::SparseMatrix<double> form, mass;  // mass may vanish for a few unknowns
+    Eigen::MatrixXd constraints;             // C; may have no columns
+    Eigen::MatrixXd low_rank;                // L; may have no columns
+    Eigen::VectorXd weights;
+};
+
+struct SurfaceSpectrum {
+    Eigen::VectorXd values;   // ascending
+    Eigen::MatrixXd vectors;  // one column each, of norm 1 in M
+    int negative = 0;         // eigenvalues below 0, counted by the inertia of the form
+    // Empty, or why eigenvalues and inertia do not agree: a value may be missing.
+    std::string doubt;
+};
+
+// The `count` lowest. `scale`: a size of eigenvalues, from which the search for a lower bound begins. SolveError if no
+// shift can be factored, or Lanczos' method does not converge.
+SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale);
+
+// The number of eigenvalues below `shift`: Sylvester's law for the form with its constraints.
+int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift);
+
+}  // namespace tubule::surface3d

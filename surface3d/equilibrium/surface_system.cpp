@@ -1,0 +1,382 @@
+#include "surface3d/equilibrium/surface_system.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/meshing/remesh.hpp"
+
+namespace tubule::surface3d {
+namespace {
+
+constexpr double least_admissible = 0.1, good_quality = 0.45;
+// Energy of the penalty, relative to all, beyond which the edges carry what belongs to the triangles.
+constexpr double most_kinks = 0.05;
+// A motion whose normal part is smaller than this, relative to the largest, only turns or slides the surface in itself.
+constexpr double no_motion = 2e-3;
+
+// Where motions turn about, and the length that makes turns and dilations as large as translations.
+struct Middle {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    double size = 0;
+
+    explicit Middle(const CurvedMesh& mesh) {
+        if (mesh.period == 0)
+            for (const Eigen::Vector3d& x : mesh.nodes) centre += x / static_cast<double>(mesh.size());
+        for (const Eigen::Vector3d& x : mesh.nodes) size = std::max(size, (x - centre).norm());
+    }
+};
+
+// Normal parts at the nodes: three translations, three turns (of a tube the last alone); a dilation, and three
+// conformal maps of space to first order.
+Eigen::MatrixXd motions_of(const CurvedMesh& mesh, const VectorField& normal, const Middle& middle, bool dilation,
+                           bool conformal) {
+    const Eigen::Index n = normal.cols();
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, SurfaceSystem::most_motions);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const Eigen::Vector3d x = (mesh.nodes[i] - middle.centre) / middle.size, nu = normal.col(i), turn = x.cross(nu);
+        out.row(i).head<3>() = nu.transpose();
+        if (mesh.period > 0)
+            out(i, 5) = turn.z();
+        else
+            out.row(i).segment<3>(3) = turn.transpose();
+        if (dilation) out(i, 6) = x.dot(nu);
+        if (conformal) out.row(i).tail<3>() = (2 * x.dot(nu) * x - x.squaredNorm() * nu).transpose();
+    }
+    return out;
+}
+
+bool scale_free(const StationaryProblem& p) {
+    return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
+           p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
+           p.loads.pressure == 0 && p.loads.force == 0;
+}
+
+}  // namespace
+
+VectorField node_normals(const SurfaceSpace& space, const CurvedMesh& mesh) {
+    VectorField out = VectorField::Zero(3, mesh.size());
+    const Tabulation at = [&] {
+        std::vector<QuadraturePoint> points;
+        for (const auto& p : lattice(mesh.order))
+            points.push_back({static_cast<double>(p[1]) / mesh.order, static_cast<double>(p[2]) / mesh.order, 1});
+        return Tabulation(mesh.order, points);
+    }();
+    for (int cell = 0; cell < space.cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int a = 0; a < space.width(); ++a) {
+            const SurfacePoint<double> p = tangent_point(X, at, a);
+            out.col(space.node(cell, a)) += p.area * p.normal;
+        }
+    }
+    out.colwise().normalize();
+    return out;
+}
+
+SurfaceSystem::SurfaceSystem(const CurvedMesh& base, const StationaryProblem& problem, const Eigen::VectorXd& H0)
+    : problem_(problem), H0_(H0) {
+    check_problem(problem, base.period);
+    directions_.stretch = problem.free_period;
+    set_mesh(base);
+}
+
+void SurfaceSystem::set_mesh(const CurvedMesh& mesh) {
+    energy_ = std::make_shared<DiscreteEnergy>(mesh, problem_.bending);
+    ordering_ = nested_dissection(energy_->pattern());
+    if (problem_.free_period) ordering_.push_back(space().size());
+    set_base(mesh);
+}
+
+void SurfaceSystem::set_problem(const StationaryProblem& problem) {
+    check_problem(problem, base_.period);
+    problem_ = problem;
+    last_.reset();
+}
+
+void SurfaceSystem::set_base(const CurvedMesh& mesh) {
+    base_ = mesh;
+    directions_.normal = node_normals(space(), base_);
+    energy_->set_penalty(base_, problem_.bending);
+    mass_ = energy_->mass(base_, directions_);
+    set_motions();
+    last_.reset();
+    scale_ = reference_energy(unknowns_at_base());
+}
+
+void SurfaceSystem::set_motions() {
+    const Constraints& c = problem_.constraints;
+    const bool free_size = !c.area && !c.volume, any_shape = free_size && !c.reduced_volume && base_.period == 0;
+    const bool scales = scale_free(problem_) && free_size && base_.period == 0;
+    const Middle middle(base_);
+    const Eigen::MatrixXd fields = motions_of(base_, directions_.normal, middle, scales, scales && any_shape);
+    const Eigen::MatrixXd image = mass_ * fields;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * image);
+    const double least = no_motion * no_motion * gram.eigenvalues().maxCoeff();
+    motions_.resize(shape_size(), 0);
+    for (Eigen::Index j = 0; j < fields.cols(); ++j) {
+        const double norm2 = gram.eigenvalues()[j];
+        if (!(norm2 > least)) continue;
+        motions_.conservativeResize(shape_size(), motions_.cols() + 1);
+        motions_.col(motions_.cols() - 1).setZero();
+        motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.eigenvectors().col(j) / std::sqrt(norm2);
+    }
+    set_turn(fields.leftCols<6>(), middle.centre, middle.size, least);
+}
+
+// The combinations of rigid motions without a normal part: of a closed surface of revolution there is one.
+void SurfaceSystem::set_turn(const Eigen::MatrixXd& rigid, const Eigen::Vector3d& centre, double size, double least) {
+    turn_.reset();
+    const Eigen::Index first = base_.period > 0 ? 5 : 0, count = 6 - first;
+    const Eigen::MatrixXd fields = rigid.middleCols(first, count);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * (mass_ * fields));
+    if (!(gram.eigenvalues()[0] < least) || (count > 1 && gram.eigenvalues()[1] < least)) return;
+    Eigen::VectorXd c = Eigen::VectorXd::Zero(6);
+    c.tail(count) = gram.eigenvectors().col(0);
+    const Eigen::Vector3d omega = c.tail<3>() / size;
+    if (!(omega.norm() * size > 0.1)) return;
+    turn_ = {(c.head<3>() - omega.cross(centre)) / omega.norm(), omega.normalized()};
+}
+
+std::vector<int> SurfaceSystem::wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const {
+    std::vector<int> out(displacements.cols(), -1);
+    if (!turn_) return out;
+    const CurvedMesh at = mesh(u);
+    const Tabulation& table = space().tabulation();
+    Eigen::VectorXd turned = Eigen::VectorXd::Zero(displacements.cols()), all = turned;
+    for (int cell = 0; cell < space().cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(at, cell);
+        Eigen::MatrixXd w(space().width(), displacements.cols());
+        for (int a = 0; a < space().width(); ++a) w.row(a) = displacements.row(space().node(cell, a));
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const Eigen::RowVectorXd along = (turn_->velocity + turn_->omega.cross(p.x)).transpose() * gradients(p, table, q) * w;
+            turned += table.weight[q] * p.area * along.cwiseAbs2().transpose();
+            all += table.weight[q] * p.area * (table.value.col(q).transpose() * w).cwiseAbs2().transpose();
+        }
+    }
+    for (Eigen::Index j = 0; j < all.size(); ++j) {
+        const double m = std::sqrt(turned[j] / all[j]);  // of w cos(m theta)
+        if (std::abs(m - std::round(m)) < 0.1) out[j] = static_cast<int>(std::lround(m));
+    }
+    return out;
+}
+
+CurvedMesh SurfaceSystem::mesh(const Eigen::VectorXd& u) const {
+    CurvedMesh out = base_;
+    const double stretch = problem_.free_period ? u[shape_size() - 1] : 0;
+    for (int i = 0; i < out.size(); ++i) {
+        const double z = out.nodes[i].z();
+        out.nodes[i] += u[i] * directions_.normal.col(i);
+        out.nodes[i].z() += stretch * z;
+    }
+    out.period *= 1 + stretch;
+    return out;
+}
+
+Bending SurfaceSystem::bending(const Eigen::VectorXd& u) const {
+    Bending out = problem_.bending;
+    if (out.alpha) out.mu = u[mu()];
+    return out;
+}
+
+EnergyValues SurfaceSystem::values(const Eigen::VectorXd& u) const {
+    EnergyValues v = energy_->values(mesh(u), problem_.bending, H0_);
+    v.energy += area_difference_energy(problem_.bending, v.M);
+    return v;
+}
+
+void SurfaceSystem::set_mu(Eigen::VectorXd& u) const {
+    u[mu()] = problem_.bending.alpha ? area_difference_force(problem_.bending, values(u).M) : 0;
+}
+
+const EnergyDerivatives& SurfaceSystem::derivatives(const Eigen::VectorXd& u) const {
+    if (!last_ || at_ != u) {
+        at_ = u;
+        last_ = energy_->derivatives(mesh(u), directions_, bending(u), u[sigma()], u[lambda()], H0_);
+    }
+    return *last_;
+}
+
+MultiplierEquations SurfaceSystem::equations(const EnergyValues& v, const Eigen::VectorXd& u) const {
+    return multiplier_equations(problem_, v.area, v.volume, u[sigma()], u[lambda()]);
+}
+
+void SurfaceSystem::set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const {
+    F.segment<2>(sigma()) = equations(v, u).F;
+    F[mu()] = u[mu()] - area_difference_force(problem_.bending, v.M);
+    const Eigen::Index held = motions_.cols();
+    F.tail(most_motions) = u.tail(most_motions);
+    F.segment(mu() + 1, held) = motions_.transpose() * u.head(shape_size());
+}
+
+Eigen::VectorXd SurfaceSystem::constraint_residual(const Eigen::VectorXd& u) const {
+    Eigen::VectorXd F = Eigen::VectorXd::Zero(unknowns());
+    set_constraints(values(u), u, F);
+    return F;
+}
+
+double SurfaceSystem::constraint_error(const Eigen::VectorXd& u) const {
+    const EnergyValues v = values(u);
+    return tubule::constraint_error(problem_.constraints, equations(v, u), std::sqrt(v.area));
+}
+
+Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
+    const EnergyDerivatives& d = derivatives(u);
+    Eigen::VectorXd F(unknowns());
+    F.head(shape_size()) = d.energy + u[sigma()] * d.area + u[lambda()] * d.volume +
+                           motions_ * u.segment(mu() + 1, motions_.cols());
+    if (problem_.free_period) F[shape_size() - 1] -= problem_.loads.force * base_.period;
+    set_constraints(d.values, u, F);
+    return F;
+}
+
+Eigen::SparseMatrix<double> SurfaceSystem::jacobian(const Eigen::VectorXd& u, double damping) const {
+    const EnergyDerivatives& d = derivatives(u);
+    const int N = space().size(), n = shape_size();
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, unknowns() - n), rows = columns.transpose();
+    Eigen::MatrixXd corner = Eigen::MatrixXd::Identity(rows.rows(), rows.rows());
+    const MultiplierEquations e = equations(d.values, u);
+    columns.col(0) = d.area, columns.col(1) = d.volume;
+    for (int i = 0; i < 2; ++i) rows.row(i) = (e.by_extent(i, 0) * d.area + e.by_extent(i, 1) * d.volume).transpose();
+    corner.topLeftCorner<2, 2>() = e.by_multipliers;
+    if (problem_.bending.alpha) columns.col(2) = d.M, rows.row(2) = -*problem_.bending.alpha * d.M.transpose();
+    const Eigen::Index held = motions_.cols();
+    columns.middleCols(3, held) = motions_, rows.middleRows(3, held) = motions_.transpose();
+    corner.diagonal().segment(3, held).setZero();
+
+    Eigen::SparseMatrix<double> J(unknowns(), unknowns());
+    const Eigen::SparseMatrix<double> H = damping != 0 ? d.hessian + damping * mass_ : d.hessian;
+    J.reserve(H.nonZeros() + 2 * (unknowns() - N) * unknowns());
+    for (int j = 0; j < N; ++j) {
+        J.startVec(j);
+        for (Eigen::SparseMatrix<double>::InnerIterator it(H, j); it; ++it) J.insertBack(it.row(), j) = it.value();
+        if (problem_.free_period) J.insertBack(N, j) = d.with_stretch[j];
+        for (int i = 0; i < rows.rows(); ++i) J.insertBack(n + i, j) = rows(i, j);
+    }
+    if (problem_.free_period) {
+        J.startVec(N);
+        for (int i = 0; i < N; ++i) J.insertBack(i, N) = d.with_stretch[i];
+        J.insertBack(N, N) = d.stretch_twice + damping * d.values.area * base_.period * base_.period;
+        for (int i = 0; i < rows.rows(); ++i) J.insertBack(n + i, N) = rows(i, N);
+    }
+    for (int j = 0; j < columns.cols(); ++j) {
+        J.startVec(n + j);
+        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = columns(i, j);
+        for (int i = 0; i < rows.rows(); ++i) J.insertBack(n + i, n + j) = corner(i, j);
+    }
+    J.finalize();
+    return J;
+}
+
+double SurfaceSystem::merit(const Eigen::VectorXd& u) const {
+    const EnergyValues v = values(u);
+    return lagrangian(problem_, v.energy, v.area, v.volume, mesh(u).period, u[sigma()], u[lambda()]);
+}
+
+std::array<double, 2> SurfaceSystem::area_and_volume(const Eigen::VectorXd& u) const {
+    const EnergyValues v = values(u);
+    return {v.area, v.volume};
+}
+
+double SurfaceSystem::size(const Eigen::VectorXd& u) const {
+    return std::sqrt(area_and_volume(u)[0]);
+}
+
+double SurfaceSystem::reference_energy(const Eigen::VectorXd& u) const {
+    const CurvedMesh at = mesh(u);
+    const Tabulation& table = space().tabulation();
+    double sum = 0;
+    for (int cell = 0; cell < space().cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(at, cell);
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = curved_point(X, table, q);
+            const double H0 = H0_.size() > 0 ? space().gather(H0_, cell).dot(table.value.col(q)) : problem_.bending.H0;
+            sum += table.weight[q] * p.area * magnitude(problem_.bending, H0, p.H, p.K);
+        }
+    }
+    const EnergyValues v = values(u);
+    return std::max(std::abs(v.energy), sum + area_difference_energy(problem_.bending, v.M));
+}
+
+bool SurfaceSystem::admissible(const Eigen::VectorXd& u) const {
+    if (!u.allFinite()) return false;
+    const CurvedMesh at = mesh(u);
+    if ((base_.period > 0 && !(at.period > 0)) || !(mesh_quality(at).worst > least_admissible)) return false;
+    return energy_->values(at, problem_.bending, H0_).kinks < most_kinks * scale_;
+}
+
+bool SurfaceSystem::rebase(Eigen::VectorXd& u) {
+    CurvedMesh next = mesh(u);
+    const int before = shape_size();
+    if (H0_.size() == 0 && mesh_quality(next).worst < good_quality) {
+        RemeshOptions options;
+        options.quality = good_quality;
+        auto better = remesh(next, Eigen::MatrixXd(0, next.size()), options);
+        if (auto* found = std::get_if<Remeshed>(&better)) {
+            const Eigen::VectorXd multipliers = u.tail(u.size() - before);
+            set_mesh(found->mesh);
+            u.setZero(unknowns());
+            u.tail(multipliers.size()) = multipliers;
+            return true;
+        }
+    }
+    set_base(next);
+    u.head(before).setZero();
+    return false;
+}
+
+Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(unknowns());
+    u[sigma()] = problem_.loads.tension, u[lambda()] = -problem_.loads.pressure;
+    set_mu(u);
+    return u;
+}
+
+SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) const {
+    const EnergyDerivatives& d = derivatives(u);
+    const Constraints& c = problem_.constraints;
+    const int N = space().size(), n = shape_size();
+    ConstrainedForm A;
+    const auto extended = [&](const Eigen::SparseMatrix<double>& M, bool form) {
+        if (n == N) return M;
+        Eigen::SparseMatrix<double> out(n, n);
+        std::vector<Eigen::Triplet<double>> entries;
+        for (int j = 0; j < N; ++j) {
+            for (Eigen::SparseMatrix<double>::InnerIterator it(M, j); it; ++it)
+                entries.emplace_back(it.row(), j, it.value());
+            entries.emplace_back(N, j, form ? d.with_stretch[j] : 0), entries.emplace_back(j, N, form ? d.with_stretch[j] : 0);
+        }
+        entries.emplace_back(N, N, form ? d.stretch_twice : 0);
+        out.setFromTriplets(entries.begin(), entries.end());
+        return out;
+    };
+    A.form = extended(d.hessian, true), A.mass = extended(mass_, false);
+    A.constraints = motions_;
+    const auto append = [](Eigen::MatrixXd& to, const Eigen::VectorXd& column) {
+        to.conservativeResize(column.size(), to.cols() + 1);
+        to.col(to.cols() - 1) = column;
+    };
+    const auto weigh = [&](double weight) {
+        A.weights.conservativeResize(A.weights.size() + 1);
+        A.weights[A.weights.size() - 1] = weight;
+    };
+    if (c.area) append(A.constraints, d.area);
+    if (c.volume) append(A.constraints, d.volume);
+    A.low_rank.resize(n, 0);
+    if (c.reduced_volume) {
+        const ReducedVolumeSlopes slopes = reduced_volume_slopes(*c.reduced_volume, d.values.area);
+        append(A.constraints, d.volume + slopes.by_area * d.area);
+        if (const double weight = u[lambda()] * slopes.by_area_twice; weight != 0)
+            append(A.low_rank, d.area), weigh(weight);
+    }
+    if (problem_.bending.alpha.value_or(0) != 0) append(A.low_rank, d.M), weigh(*problem_.bending.alpha);
+    return lowest_eigenvalues(A, ordering_, count, reference_energy(u) / (d.values.area * d.values.area));
+}
+
+Eigen::VectorXd SurfaceSystem::way_down(const Eigen::VectorXd& u) const {
+    const SurfaceSpectrum s = spectrum(u, 1);
+    if (s.values[0] > -1e-6 * reference_energy(u) / std::pow(derivatives(u).values.area, 2)) return {};
+    return s.vectors.col(0);
+}
+
+}  // namespace tubule::surface3d

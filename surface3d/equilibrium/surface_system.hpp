@@ -1,0 +1,97 @@
+// The equations of a stationary surface on one mesh, for Newton's method (common/equilibrium/newton.hpp).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/equilibrium/stationary_problem.hpp"
+#include "common/solve/bordered_ldlt.hpp"
+#include "surface3d/equilibrium/discrete_energy.hpp"
+#include "surface3d/equilibrium/surface_spectrum.hpp"
+
+namespace tubule::surface3d {
+
+// u holds the displacements w_i along the normals of a base mesh, of a free period the stretch, then sigma, lambda, mu =
+// alpha (M - M0), and one multiplier for each motion that costs no energy and is held: rigid ones, and where the energy
+// has them dilations and conformal maps. These multipliers vanish up to the error of the mesh.
+class SurfaceSystem {
+public:
+    static constexpr int most_motions = 10;
+
+    // Throws as check_problem(). H0: at the nodes, where it varies.
+    SurfaceSystem(const CurvedMesh& base, const StationaryProblem& problem, const Eigen::VectorXd& H0 = {});
+
+    const StationaryProblem& problem() const { return problem_; }
+    void set_problem(const StationaryProblem& problem);
+    int unknowns() const { return mu() + 1 + most_motions; }
+    int shape_size() const { return space().size() + problem_.free_period; }
+    int sigma() const { return shape_size(); }
+    int lambda() const { return shape_size() + 1; }
+    int mu() const { return shape_size() + 2; }
+    void set_mu(Eigen::VectorXd& u) const;
+
+    Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
+    Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping) const;
+    Eigen::VectorXd constraint_residual(const Eigen::VectorXd& u) const;
+    double constraint_error(const Eigen::VectorXd& u) const;
+    double merit(const Eigen::VectorXd& u) const;
+    std::array<double, 2> area_and_volume(const Eigen::VectorXd& u) const;
+    double size(const Eigen::VectorXd& u) const;
+    double reference_energy(const Eigen::VectorXd& u) const;
+    bool admissible(const Eigen::VectorXd& u) const;
+    // Makes the shape the base; where its triangles have become bad, on a new mesh. Whether that was so, and u has
+    // another size.
+    bool rebase(Eigen::VectorXd& u);
+    Eigen::VectorXd way_down(const Eigen::VectorXd& u) const;
+    BorderedLdlt factors() const { return BorderedLdlt(ordering_, unknowns() - shape_size()); }
+
+    // The multipliers of the given shape, by least squares: u with w = 0.
+    Eigen::VectorXd unknowns_at_base() const;
+    CurvedMesh mesh(const Eigen::VectorXd& u) const;
+    const CurvedMesh& base() const { return base_; }
+    const DiscreteEnergy& energy() const { return *energy_; }
+    const SurfaceSpace& space() const { return energy_->space(); }
+    // E, without multipliers; area differences included.
+    EnergyValues values(const Eigen::VectorXd& u) const;
+    // The second variation under what is held, of displacements that are no held motion; `count` lowest.
+    SurfaceSpectrum spectrum(const Eigen::VectorXd& u, int count) const;
+    // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each, if
+    // that has one; -1 where there is none.
+    std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
+    int held_motions() const { return static_cast<int>(motions_.cols()); }
+
+private:
+    Bending bending(const Eigen::VectorXd& u) const;
+    MultiplierEquations equations(const EnergyValues& v, const Eigen::VectorXd& u) const;
+    void set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
+    const EnergyDerivatives& derivatives(const Eigen::VectorXd& u) const;
+    void set_mesh(const CurvedMesh& mesh);
+    void set_base(const CurvedMesh& mesh);
+    void set_motions();
+    void set_turn(const Eigen::MatrixXd& rigid, const Eigen::Vector3d& centre, double size, double least);
+
+    StationaryProblem problem_;
+    CurvedMesh base_;
+    Eigen::VectorXd H0_;
+    std::shared_ptr<DiscreteEnergy> energy_;
+    Ordering ordering_;  // of the shape's unknowns
+    Directions directions_;
+    Eigen::SparseMatrix<double> mass_;
+    // The turn x -> velocity + omega x x, |omega| = 1, that leaves the base as it is, if there is exactly one.
+    struct Turn {
+        Eigen::Vector3d velocity, omega;
+    };
+    std::optional<Turn> turn_;
+    Eigen::MatrixXd motions_;  // functionals of w, one column each, that hold the motions; orthonormal
+    double scale_ = 0;         // reference energy of the base
+    // The last derivatives, and where they were taken.
+    mutable Eigen::VectorXd at_;
+    mutable std::optional<EnergyDerivatives> last_;
+};
+
+// Unit normals at the nodes: means over the triangles around them.
+VectorField node_normals(const SurfaceSpace& space, const CurvedMesh& mesh);
+
+}  // namespace tubule::surface3d
