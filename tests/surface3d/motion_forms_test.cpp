@@ -16,6 +16,7 @@
 #include "surface3d/fem/projection.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "tests/surface3d/motion.hpp"
 #include "tests/surface3d/smooth_field.hpp"
 
 namespace tubule::surface3d {
@@ -24,11 +25,6 @@ namespace motion_forms_test {
 const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.1, 3, 2}}};
 const SurfaceLaw gradient_flow = motion_law({});
 const SurfaceLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5, .keeps_volume = {}});
-
-template <class Shape>
-CurvedMesh mesh_of(const Shape& shape, const TriangleMesh& base, int order) {
-    return mapped_mesh(base, order, [&](const auto& p) { return position(shape, p); });
-}
 
 // Component by component, as a velocity in MotionUnknowns.
 Eigen::VectorXd stacked(const VectorField& v) {
