@@ -56,6 +56,8 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
                    const auto& H0 = p.energy.H0_formula;
                    return !p.equilibrium || (!uses(*H0, 1) && !uses(*H0, 2));
                }},
+    axisym_rest{"tier = \"axisym\" where [equilibrium] is",
+                [](P p) { return !p.equilibrium || p.tier == Tier::axisym; }},
     alpha{"energy.alpha", [](P p) { return p.energy.alpha.has_value(); }},
     no_alpha{"an energy without energy.alpha", [](P p) { return !p.energy.alpha; }},
     no_modes{"a case without equilibrium.modes", [](P p) { return !p.equilibrium || !p.equilibrium->modes; }},
@@ -176,7 +178,7 @@ const std::vector<Requirement> rows{
           {inextensible, resisted, as_begun, number_H0, few_terms, no_alpha}),
     key("energy.M0", {alpha}),
     number("energy.H0", [](P p) { return p.energy.H0_varies(); },
-           {named_tier, time, fixed_period, no_modes, other_branch, H0_of_area}, {}),
+           {named_tier, time, axisym_rest, fixed_period, no_modes, other_branch, H0_of_area}, {}),
 };
 
 }  // namespace

@@ -127,19 +127,17 @@ struct Change {
     }
 };
 
-// f and its derivatives at a point, and f_H, f_K with theirs up to the second; formulas leave out third derivatives.
-struct DensityDerivatives {
-    CurvatureJet<double> f;
+// f_H and f_K with their derivatives up to the second; those of formulas leave out the second.
+struct MomentDerivatives {
     Jet<double, 2, 2> by_H, by_K;
 };
-DensityDerivatives density_derivatives(const Bending& bending, double H0, double H, double K) {
+MomentDerivatives moment_derivatives(const Bending& bending, const Bending& powers, double H0, double H, double K) {
     using J = Jet<double, 2, 2>;
-    DensityDerivatives out;
-    out.f = density_at(bending, H0, H, K);
-    const auto third = density_at<J, Added::powers>(bending, H0, J::variable(H, 0), J::variable(K, 1));
-    out.by_H = third.H, out.by_K = third.K;
-    out.by_H.v = out.f.H, out.by_H.d = {out.f.HH, out.f.HK};
-    out.by_K.v = out.f.K, out.by_K.d = {out.f.HK, out.f.KK};
+    const CurvatureJet<double> f = density_at(bending, H0, H, K);
+    const CurvatureJet<J> nested = density_at<J, Added::powers>(powers, H0, J::variable(H, 0), J::variable(K, 1));
+    MomentDerivatives out{nested.H, nested.K};
+    out.by_H.v = f.H, out.by_H.d = {f.HH, f.HK};
+    out.by_K.v = f.K, out.by_K.d = {f.HK, f.KK};
     return out;
 }
 // F(H, K) of two functions of the forms.
@@ -206,6 +204,13 @@ double at_point(const SurfaceSpace& space, const Eigen::VectorXd& H0, const Bend
 }
 
 }  // namespace
+
+// What is known of the triangles beside an edge, the left one first.
+struct DiscreteEnergy::EdgeSides {
+    CellColumns<3> X[2], D[2], stretch[2];  // nodes, their directions and stretch, empty where not asked for
+    Eigen::RowVectorXd H0[2];
+    const Tabulation* table[2];
+};
 
 struct DiscreteEnergy::Block {
     EnergyValues values;
@@ -348,85 +353,86 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
     }
 }
 
+// One point of an edge, as the triangles on its left and on its right see it.
+struct DiscreteEnergy::EdgePoint {
+    Frame frame[2];
+    Form moment[2];  // f_H + f_K t.Bt: by how much the energy changes with curvature across the edge
+    Corner angle, length;
+    double mean, kink;  // of the moments; energy of the penalty
+
+    EdgePoint(const EdgeSides& at, const Bending& bending, const Bending& powers, double penalty, int q)
+        : frame{{at.X[0], *at.table[0], q}, {at.X[1], *at.table[1], q}},
+          angle(surface3d::angle(frame[0].t, frame[0].c, frame[1].c)),
+          length(surface3d::length(frame[0].t)) {
+        for (int s = 0; s < 2; ++s) {
+            const Curvatures c = frame[s].curvatures();
+            const double H0 = at.H0[s].size() > 0 ? at.H0[s].dot(at.table[s]->value.col(q).transpose()) : bending.H0;
+            const MomentDerivatives F = moment_derivatives(bending, powers, H0, c.H.v, c.K.v);
+            moment[s] = composed(F.by_H, c.H, c.K) + composed(F.by_K, c.H, c.K) * (c.b11 / c.g11);
+        }
+        mean = 0.5 * (moment[0].v + moment[1].v);
+        kink = 0.5 * penalty * angle.v * angle.v;
+    }
+};
+
 void DiscreteEnergy::edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                                 const Eigen::VectorXd& H0, const Edge& e, Block& out) const {
-    const bool derive = d.normal.cols() > 0;
-    const int n = space_.width(), all = 2 * n + (derive && d.stretch);
     const Bending powers = powers_alone(bending);
-    CellColumns<3> X[2], D[2], stretch[2];
+    EdgeSides at;
     for (int s = 0; s < 2; ++s) {
-        X[s] = cell_nodes(mesh, e.cell[s]), stretch[s] = stretch_of(X[s]);
-        if (derive) D[s] = space_.gather<3>(d.normal, e.cell[s]);
+        at.X[s] = cell_nodes(mesh, e.cell[s]), at.table[s] = &(s == 0 ? left_ : right_)[e.side[s]];
+        if (H0.size() > 0) at.H0[s] = space_.gather(H0, e.cell[s]).transpose();
+        if (d.normal.cols() > 0) at.D[s] = space_.gather<3>(d.normal, e.cell[s]);
+        if (d.stretch) at.stretch[s] = stretch_of(at.X[s]);
     }
-    // The columns of a side among all.
-    const auto spread = [&](int s, const auto& columns, auto& into) {
-        into.middleCols(s * n, n) = columns.leftCols(n);
-        if (d.stretch) into.col(2 * n) = columns.col(n);
-    };
     for (int q = 0; q < left_[0].points(); ++q) {
-        const Tabulation* table[]{&left_[e.side[0]], &right_[e.side[1]]};
-        const Frame f[]{{X[0], *table[0], q}, {X[1], *table[1], q}};
-        Form moment[2];
-        for (int s = 0; s < 2; ++s) {
-            const Curvatures at = f[s].curvatures();
-            DensityDerivatives F = density_derivatives(powers, at_point(space_, H0, bending, e.cell[s], *table[s], q),
-                                                       at.H.v, at.K.v);
-            if (powers.terms.size() != bending.terms.size()) {
-                const CurvatureJet<double> whole =
-                    density_at(bending, at_point(space_, H0, bending, e.cell[s], *table[s], q), at.H.v, at.K.v);
-                F.by_H.v = whole.H, F.by_H.d = {whole.HH, whole.HK}, F.by_K.v = whole.K, F.by_K.d = {whole.HK, whole.KK};
-            }
-            moment[s] = composed(F.by_H, at.H, at.K) + composed(F.by_K, at.H, at.K) * (at.b11 / at.g11);
-        }
-        const Corner beta = angle(f[0].t, f[0].c, f[1].c), ds = length(f[0].t);
-        const double weight = left_[0].weight[q], mean = 0.5 * (moment[0].v + moment[1].v);
-        const double kink = 0.5 * e.penalty * beta.v * beta.v;
-        out.values.energy += weight * ds.v * (mean * beta.v + kink);
-        out.values.M += weight * ds.v * beta.v, out.values.kinks += weight * ds.v * kink;
-        if (!derive) continue;
-
-        const double by_moment = weight * ds.v * 0.5 * beta.v, by_beta = weight * ds.v * (mean + e.penalty * beta.v),
-                     by_ds = weight * (mean * beta.v + kink);
-        Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> first(4, all);  // moments, angle, length
-        Columns9 corner = Columns9::Zero(9, all);
-        first.setZero();
-        for (int s = 0; s < 2; ++s) {
-            const Change change(f[s], D[s], d.stretch ? &stretch[s] : nullptr, *table[s], q);
-            const Vector6 slope = gradient(moment[s]);
-            const Row along = slope.transpose() * change.forms;
-            auto row = first.row(s);
-            row.segment(s * n, n) = along.head(n);
-            if (d.stretch) row[2 * n] = along[n];
-            auto c = corner.middleRows<3>(3 + 3 * s);
-            spread(s, change.tangents.bottomRows<3>(), c);
-            if (s == 0) {
-                auto t = corner.topRows<3>();
-                spread(0, change.tangents.topRows<3>(), t);
-            }
-            Square own = Square::Zero(n + d.stretch, n + d.stretch);
-            change.add_second(f[s], by_moment * slope, by_moment * hessian(moment[s]), own);
-            // The side's t is that of the left.
-            out.second.block(s * n, s * n, n, n) += own.topLeftCorner(n, n);
-            if (d.stretch) {
-                out.second.col(2 * n).segment(s * n, n) += own.col(n).head(n);
-                out.second.row(2 * n).segment(s * n, n) += own.row(n).head(n);
-                out.second(2 * n, 2 * n) += own(n, n);
-            }
-        }
-        const Vector9 beta_slope = gradient(beta), ds_slope = gradient(ds);
-        first.row(2) = beta_slope.transpose() * corner, first.row(3) = ds_slope.transpose() * corner;
-        Eigen::Matrix4d P = Eigen::Matrix4d::Zero();
-        P(0, 2) = P(1, 2) = weight * ds.v * 0.5, P(0, 3) = P(1, 3) = weight * 0.5 * beta.v;
-        P(2, 3) = weight * (mean + e.penalty * beta.v);
-        P += P.transpose().eval();
-        P(2, 2) = weight * e.penalty * ds.v;
-        out.energy.noalias() += Eigen::RowVector4d(by_moment, by_moment, by_beta, by_ds) * first;
-        out.M.noalias() += weight * (ds.v * first.row(2) + beta.v * first.row(3));
-        const Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> P_first = P * first;
-        const Columns9 W_corner = (by_beta * hessian(beta) + by_ds * hessian(ds)) * corner;
-        out.second.noalias() += first.transpose() * P_first;
-        out.second.noalias() += corner.transpose() * W_corner;
+        const EdgePoint p(at, bending, powers, e.penalty, q);
+        const double ds = left_[0].weight[q] * p.length.v;
+        out.values.energy += ds * (p.mean * p.angle.v + p.kink);
+        out.values.M += ds * p.angle.v, out.values.kinks += ds * p.kink;
+        if (d.normal.cols() > 0) add_derivatives(at, p, e.penalty, q, out);
     }
+}
+
+// With weight (mean angle + penalty/2 angle^2) length as a function of the two moments, angle and length.
+void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, double penalty, int q, Block& out) const {
+    const int n = space_.width(), stretch = at.stretch[0].cols() > 0, all = 2 * n + stretch;
+    const double weight = left_[0].weight[q], ds = p.length.v, angle = p.angle.v;
+    const Eigen::RowVector4d slope(weight * ds * 0.5 * angle, weight * ds * 0.5 * angle,
+                                   weight * ds * (p.mean + penalty * angle), weight * (p.mean * angle + p.kink));
+    Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> first(4, all);
+    Columns9 corner = Columns9::Zero(9, all);  // changes of the tangent along the edge and of those across it
+    first.setZero();
+    for (int s = 0; s < 2; ++s) {
+        const Change change(p.frame[s], at.D[s], stretch ? &at.stretch[s] : nullptr, *at.table[s], q);
+        const auto spread = [&](const auto& columns, auto&& into) {
+            into.middleCols(s * n, n) = columns.leftCols(n);
+            if (stretch) into.col(2 * n) = columns.col(n);
+        };
+        const Vector6 by_forms = gradient(p.moment[s]);
+        spread(by_forms.transpose() * change.forms, first.row(s));
+        spread(change.tangents.bottomRows<3>(), corner.middleRows<3>(3 + 3 * s));
+        if (s == 0) spread(change.tangents.topRows<3>(), corner.topRows<3>());  // both sides share it
+        Square own = Square::Zero(n + stretch, n + stretch);
+        change.add_second(p.frame[s], slope[s] * by_forms, slope[s] * hessian(p.moment[s]), own);
+        out.second.block(s * n, s * n, n, n) += own.topLeftCorner(n, n);
+        if (!stretch) continue;
+        out.second.col(2 * n).segment(s * n, n) += own.col(n).head(n);
+        out.second.row(2 * n).segment(s * n, n) += own.row(n).head(n);
+        out.second(2 * n, 2 * n) += own(n, n);
+    }
+    first.row(2) = gradient(p.angle).transpose() * corner, first.row(3) = gradient(p.length).transpose() * corner;
+    Eigen::Matrix4d twice = Eigen::Matrix4d::Zero();
+    twice(0, 2) = twice(1, 2) = weight * ds * 0.5, twice(0, 3) = twice(1, 3) = weight * 0.5 * angle;
+    twice(2, 3) = weight * (p.mean + penalty * angle);
+    twice += twice.transpose().eval();
+    twice(2, 2) = weight * penalty * ds;
+    out.energy.noalias() += slope * first;
+    out.M.noalias() += weight * (ds * first.row(2) + angle * first.row(3));
+    const Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> twice_first = twice * first;
+    const Columns9 corner_part = (slope[2] * hessian(p.angle) + slope[3] * hessian(p.length)) * corner;
+    out.second.noalias() += first.transpose() * twice_first;
+    out.second.noalias() += corner.transpose() * corner_part;
 }
 
 EnergyValues DiscreteEnergy::values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0) const {

@@ -52,7 +52,7 @@ public:
     // INT w_i w_j (n.nu)^2 dS
     Eigen::SparseMatrix<double> mass(const CurvedMesh& mesh, const Directions& directions) const;
 
-    // Beside the least that makes elements of this order stable in theory: docs/decisions/equilibria_3d.md
+    // Beside the least that makes elements of this order stable in theory: docs/decisions/equilibria.md
     double penalty_factor = getenv("PF") ? atof(getenv("PF")) : 4;
 
 private:
@@ -60,8 +60,9 @@ private:
         int cell[2], side[2];
         double penalty = 0;
     };
-    struct Gradients;
     struct Block;
+    struct EdgeSides;
+    struct EdgePoint;
 
     void find_edges();
     void set_pattern();
@@ -70,6 +71,7 @@ private:
                     const Eigen::VectorXd& H0, int cell, Block& out) const;
     void edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, const Eigen::VectorXd& H0,
                     const Edge& edge, Block& out) const;
+    void add_derivatives(const EdgeSides& at, const EdgePoint& p, double penalty, int q, Block& out) const;
 
     SurfaceSpace space_;
     std::vector<Edge> edges_;

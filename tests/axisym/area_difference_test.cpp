@@ -158,7 +158,7 @@ TEST(AreaDifference, theSecondVariationIsTheDerivativeOfTheGradient) {
     const StationaryProblem problem{with_alpha(bending(0.5, -0.3), alpha, M0), {4 * pi, 0.9 * 4 * pi / 3, {}}};
     const StationarySystem system(space, problem, 0.3);
     const int n = space->size();
-    Vector u = Vector::Zero(system.size());
+    Vector u = Vector::Zero(system.unknowns());
     u.head(n) = fit(*space, spheroid(0.9, true)) + test::random_vector(n, 0.01);
     u[system.sigma()] = -0.7, u[system.lambda()] = 1.3;
     const auto gradient = [&](const Vector& x) {

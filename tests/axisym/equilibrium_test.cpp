@@ -49,7 +49,7 @@ TEST(StationarySystem, jacobianIsThatOfTheResidual) {
             Bending energy = bending(0.2, -2, 0.03, 0.06);
             if (topology == Topology::cell) energy.alpha = 0.4, energy.M0 = -20;
             const StationarySystem system(space, {energy, c}, 0.3);
-            Vector u(system.size()), w(u.size());
+            Vector u(system.unknowns()), w(u.size());
             u << fit(*space, topology == Topology::cell ? m : half(m)), -0.7, 1.3, 0.9, 0.2;
             for (int i = 0; i < u.size(); ++i) w[i] = std::sin(3 * i + 1), u[i] += 0.01 * std::cos(5 * i);
             const double h = 1e-5;
@@ -72,7 +72,7 @@ TEST(StationarySystem, freePeriods) {
         energy.alpha = 0.4, energy.M0 = -20;
         const StationarySystem system(space, {energy, c, {.force = force}, true}, 0.3);
         const int n = space->size();
-        Vector u(system.size()), w(u.size());
+        Vector u(system.unknowns()), w(u.size());
         u << fit(*space, half(meridian(Tube{1, length, {{0.2, 1}}}))), c.area ? -0.7 : 0, c.volume ? 1.3 : 0, 0, 0;
         for (int i = 0; i < u.size(); ++i) w[i] = std::sin(3 * i + 1);
         for (int i = 0; i < n; ++i) u[i] += 0.01 * std::cos(5 * i);

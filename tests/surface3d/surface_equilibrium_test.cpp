@@ -77,7 +77,7 @@ TEST(SurfaceSpectrum, straightTube) {
     const theory::UniformTube tube{bending, 1, 0.6};
     StationaryProblem problem{bending, {}};
     problem.loads.tension = tube.tension, problem.loads.pressure = theory::pressure_at_rest(tube);
-    const CurvedMesh mesh = mapped_mesh(tube_rings(1, length, 8, 8), 4, [](const Eigen::Vector3d& p) {
+    const CurvedMesh mesh = mapped_mesh(tube_rings(1, length, 12, 12), 4, [](const Eigen::Vector3d& p) {
         const double r = p.head<2>().norm();
         return Eigen::Vector3d(p.x() / r, p.y() / r, p.z());
     });

@@ -436,7 +436,7 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
     EXPECT_EQ(refused("auto.mods=3"),
               "--set auto.mods=3: unknown key auto.mods; did you mean 'modes'? Allowed here: noise, largest, modes");
     EXPECT_EQ(refused("equilibrium.modes=2"),
-              "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\"");
+              "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\" or \"surface3d\"");
     EXPECT_EQ(refused("discretisation.parametrisation=even").substr(0, 92),
               "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation: only ");
     EXPECT_EQ(refused("discretisation.scheme=paper"),

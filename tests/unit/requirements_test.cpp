@@ -16,6 +16,9 @@ const std::string tube = "[energy]\nk20 = 1\n[shape]\nkind = \"tube\"\nradius = 
                   motion = "[time]\nend = 1\n";
 const std::string axisym = "tier = \"axisym\"\n" + tube + motion, surface = "tier = \"surface3d\"\n" + tube,
                   moving = surface + motion, automatic = "tier = \"auto\"\n" + tube + motion,
+                  surface_equilibrium =
+                      "tier = \"surface3d\"\nequilibrium = {}\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\n"
+                      "radius = 1\n[accuracy]\nenergy = 0.1\n",
                   equilibrium =
                       "tier = \"axisym\"\nequilibrium = {}\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\n"
                       "radius = 1\n";
@@ -30,6 +33,11 @@ const std::string H0_of_z = "energy.H0=sin(pi*z)", H0_of_area = "energy.H0=-1-0.
 const std::vector<Refused> refused{
     {axisym, {"auto.modes=2"}, "tier = \"auto\""},
     {moving, {"equilibrium.modes=2"}, "tier = \"axisym\""},
+    {automatic, {"equilibrium.descend=true"}, "tier = \"axisym\" or"},
+    {surface_equilibrium, {"equilibrium.family=prolate"}, "tier = \"axisym\""},
+    {surface_equilibrium, {"equilibrium.branch={vary=\"energy.k20\", to=2, step=0.1}"}, "tier = \"axisym\""},
+    {surface_equilibrium, {H0_of_area}, "tier = \"axisym\" where [equilibrium] is"},
+    {equilibrium, {"equilibrium.rates=2"}, "tier = \"surface3d\""},
     {equilibrium, {"model.kind=fluid", "equilibrium.modes=2"}, "a model without inertia"},
     {equilibrium, {"shape={kind=\"torus\", radius=2, tube_radius=1}"}, "a motion, without [equilibrium]"},
     {surface, {"model.kind=fluid"}, "a table [time]"},

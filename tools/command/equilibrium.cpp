@@ -24,10 +24,10 @@ Text table_of(const Result& result) {
     Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
     const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
-    const bool branch = has("parameter"), modes = has("growth_0");
+    const bool branch = has("parameter"), modes = has("growth_0"), rates = has("rate_1");
     if (branch) add(out, "{:>14}  ", "parameter");
     add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "tension", "pressure", "height", "r_max", "neg");
-    if (modes) add(out, "  {:>10} of m", "growth");
+    if (modes || rates) add(out, "  {:>10} of m", "growth");
     add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
@@ -41,6 +41,10 @@ Text table_of(const Result& result) {
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)
                 if (value(fmt::format("growth_{}", m), i) > value(fmt::format("growth_{}", fastest), i)) fastest = m;
             add(out, "  {:>10.4g} {:>4}", value(fmt::format("growth_{}", fastest), i), fastest);
+        }
+        if (rates && known) {
+            const int m = static_cast<int>(value("wave_number_1", i));
+            add(out, "  {:>10.4g} {:>4}", value("rate_1", i), m >= 0 ? fmt::to_string(m) : "-");
         }
         const int special = branch ? static_cast<int>(value("special", i)) : 0;
         add(out, "{}\n", special == 1 ? "  fold" : special == 2 ? "  bifurcation" : "");
