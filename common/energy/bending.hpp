@@ -50,8 +50,8 @@ struct CurvatureJet {
 };
 
 // One term k * value(H, K, H0), all of which may be jets. `name` gives the series energy_<name>, `key` the case key of
-// its modulus, `label` the formula in pictures (mathtext). `magnitude` >= |value| never vanishes on a curved membrane
-// where value may; it scales the asked accuracy (E_ref).
+// its modulus, `label` the formula in pictures (mathtext). `magnitude` scales the asked accuracy, theory.md (11.1). It
+// does not bound |value|: that of k20 is half of it where H = -H0, but does not vanish where H = H0, as the value does.
 template <class Value, class Magnitude>
 struct BendingTerm {
     const char* name;

@@ -192,11 +192,11 @@ TEST(AreaDifference, theSecondVariationIsTheDerivativeOfTheGradient) {
     EXPECT_GT(alpha * M.squaredNorm(), 1e-2 * expected.cwiseAbs().minCoeff());
 }
 
-// E + sigma A - P V of a sphere.
-double free_energy_of_sphere(const Bending& b, double R, double sigma, double P) {
+// E + sigma A - pressure V of a sphere.
+double free_energy_of_sphere(const Bending& b, double R, double sigma, double pressure) {
     const double h = -2 / R - b.H0, A = 4 * pi * R * R, M = -8 * pi * R;
     return (b.k[0] * h * h + b.k[2] / std::pow(R, 4) + sigma) * A + *b.alpha / 2 * (M - b.M0) * (M - b.M0) -
-           P * 4 * pi / 3 * R * R * R;
+           pressure * 4 * pi / 3 * R * R * R;
 }
 
 TEST(AreaDifference, spheres) {
@@ -204,18 +204,18 @@ TEST(AreaDifference, spheres) {
     // H in theory.md (6.3), which is f of another H0 and tension. In closed form and numerically.
     const Bending energy = with_alpha(bending(0.5, -0.4, 0, 0.1), 0.3, -22);
     const double R = 1.2, sigma = 0.7, A = 4 * pi * R * R, h = 1e-4;
-    const auto F = [&](double radius, double P) { return free_energy_of_sphere(energy, radius, sigma, P); };
-    const double slope = (F(R + h, 0) - F(R - h, 0)) / (2 * h), P = slope / A;
+    const auto F = [&](double radius, double load) { return free_energy_of_sphere(energy, radius, sigma, load); };
+    const double slope = (F(R + h, 0) - F(R - h, 0)) / (2 * h), pressure = slope / A;
     const theory::UniformSphere sphere{energy, R, sigma};
-    EXPECT_NEAR(theory::pressure_at_rest(sphere), P, 1e-6);
-    const double expected = -(F(R + h, P) - 2 * F(R, P) + F(R - h, P)) / (h * h * A);
+    EXPECT_NEAR(theory::pressure_at_rest(sphere), pressure, 1e-6);
+    const double expected = -(F(R + h, pressure) - 2 * F(R, pressure) + F(R - h, pressure)) / (h * h * A);
     const double mu = 0.3 * (-8 * pi * R + 22), other_H0 = -0.4 - mu,
                  constant = 0.5 * (0.4 * 0.4 - other_H0 * other_H0);
     const theory::UniformSphere other{bending(0.5, other_H0, 0, 0.1), R, sigma + constant};
     Equilibrium e;
     e.space = std::make_shared<CurveSpace>(Topology::cell, equal_breaks(24), 5, 4);
     e.x = fit(*e.space, meridian(Sphere{R, {}}));
-    e.sigma = sigma, e.lambda = -P;
+    e.sigma = sigma, e.lambda = -pressure;
     e.observed = CurveForms(*e.space, energy).observe(e.x);
     const ModeStability stability({energy, {}}, e);
     // The flow is linearised at the fixed loads: theory::growth of l = 0 has the radius move as the sphere's flow does,
@@ -342,15 +342,16 @@ TEST(AreaDifference, motionsEndAtEquilibria) {
 }
 
 TEST(AreaDifference, aTubeFollowsItsForce) {
-    // Exact, of a straight tube whose area is kept: F' = 0 for E + sigma A - P V - force L with M = -2 pi L, where the
-    // force of theory.md (3.21) has the energy's -2 pi mu. It stays at rest; and the series says the same at a fixed
-    // period.
+    // Exact, of a straight tube whose area is kept: F' = 0 for E + sigma A - pressure V - force L with M = -2 pi L,
+    // where the force of theory.md (3.21) has the energy's -2 pi mu. It stays at rest; and the series says the same at
+    // a fixed period.
     const double R = 0.8, L = 2, sigma = 0.3, alpha = 0.2, M0 = -10, mu = alpha * (-2 * pi * L - M0);
     const Bending energy = with_alpha(bending(0.5, -0.7, 0, 0.1), alpha, M0);
-    const double h = -1 / R + 0.7, f = 0.5 * h * h, F1 = h, P = (f + F1 / R + sigma) / R,
-                 force = 2 * pi * R * (f + sigma) - 2 * pi * mu - pi * R * R * P;
+    const double h = -1 / R + 0.7, f = 0.5 * h * h, F1 = h, pressure = (f + F1 / R + sigma) / R,
+                 force = 2 * pi * R * (f + sigma) - 2 * pi * mu - pi * R * R * pressure;
     for (const ModelKind kind : {ModelKind::gradient_flow, ModelKind::stokes}) {
-        Model model{.kind = kind, .Re = 2, .gamma = 0.3, .keeps_volume = false, .area = AreaRule::fixed, .pressure = P};
+        Model model{
+            .kind = kind, .Re = 2, .gamma = 0.3, .keeps_volume = false, .area = AreaRule::fixed, .pressure = pressure};
         Case c = tube_case(energy, R, L, {}, 1);
         c.model = model;
         const Outcome fixed = run_case(c);

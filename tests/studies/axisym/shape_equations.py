@@ -1,11 +1,11 @@
 """Closed cells at rest by the shape equations, independently of the program: another formulation, another discretisation, NumPy alone.
 
 A mirror-symmetric cell has the half profile r(s), psi(s), s in [0, S], with r' = cos psi, z' = sin psi, H = -(psi' + q) and
-K = psi' q, where q = sin psi/r. Stationary points of E + sigma A - P V with the side condition r' = cos psi obey Hamilton's
+K = psi' q, where q = sin psi/r. Stationary points of E + sigma A - Pi V with the side condition r' = cos psi obey Hamilton's
 equations with the momenta m (of psi) and p (of r):
 
-    m = r (-f_H + q f_K)    m' = cos psi (-f_H + psi' f_K) - P r^2 cos psi/2 + p sin psi
-    p' = f + sigma + q (f_H - psi' f_K) - P r sin psi,    p = 0 at the pole (S is free) and at the equator (symmetry).
+    m = r (-f_H + q f_K)    m' = cos psi (-f_H + psi' f_K) - Pi r^2 cos psi/2 + p sin psi
+    p' = f + sigma + q (f_H - psi' f_K) - Pi r sin psi,    p = 0 at the pole (S is free) and at the equator (symmetry).
 
 With x = s/S, r, psi and p are x times even polynomials in Chebyshev form; the equations hold at their Gauss nodes. Newton's method
 with a Jacobian by complex steps.
@@ -43,7 +43,7 @@ class Basis:
 
 
 class Cell:
-    """The unknowns are the coefficients of r, psi and p, then S, sigma, P."""
+    """The unknowns are the coefficients of r, psi and p, then S, sigma, Pi."""
 
     def __init__(self, area, volume, n=60):
         self.n, self.area, self.volume = n, area, volume
@@ -63,16 +63,16 @@ class Cell:
         return radius, angle, basis.value @ p, basis.slope @ psi / S, np.sin(angle) / radius
 
     def residual(self, energy, x):
-        r_, psi_, p_, S, sigma, P = self.parts(x)
+        r_, psi_, p_, S, sigma, Pi = self.parts(x)
         r, psi, p, bend, q = self.geometry(self.at, x)
         f, f_H, f_K = energy.density(-(bend + q), bend * q)
         m = r * (-f_H + q * f_K)
         of_r = self.at.slope @ r_ / S - np.cos(psi)
-        of_p = self.at.slope @ p_ / S - (f + sigma + q * (f_H - bend * f_K) - P * r * np.sin(psi))
+        of_p = self.at.slope @ p_ / S - (f + sigma + q * (f_H - bend * f_K) - Pi * r * np.sin(psi))
         # One node less: at the pole this equation holds by itself.
         r, psi, p, bend, q = self.geometry(self.inner, x)
         _, f_H, f_K = energy.density(-(bend + q), bend * q)
-        of_m = self.slope_of_odd @ m / S - np.cos(psi) * (-f_H + bend * f_K - P * r**2 / 2) - p * np.sin(psi)
+        of_m = self.slope_of_odd @ m / S - np.cos(psi) * (-f_H + bend * f_K - Pi * r**2 / 2) - p * np.sin(psi)
         area, volume, _ = self.integrals(energy, x)
         ends = [self.equator @ psi_ - np.pi / 2, self.equator @ p_, area - self.area, volume - self.volume]
         return np.concatenate([of_r, of_p, of_m, ends])

@@ -70,7 +70,7 @@ NAMES = {
     "energy.H0": "spontaneous curvature " + formula("H_0"),
     "shape.length": "length L",
     "model.tension": "tension " + formula("\\sigma"),
-    "model.pressure": "pressure " + formula("P"),
+    "model.pressure": "pressure " + formula("\\Pi"),
     "model.force": "axial force " + formula("N"),
     "shape.radius": "radius",
     "shape.mode.0.amplitude": "amplitude A",
