@@ -367,6 +367,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
     CurveObservation first, last;
     MeshComparison compare;
     bool found = false;
+    // Where a neck is narrow, a descent takes thousands of short steps: what one mesh does not find, the next may.
     for (int round = 0; round < 16; ++round) {
         StationarySystem system(space, problem, gauge);
         const int n = space->size(), elements = space->splines().elements();
@@ -383,7 +384,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         found = settle(system, u, !found, settings.descend, out.iterations);
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);
-        if (!system.forms().admissible(x) || (!found && !settings.descend) || (!found && round > 7)) break;
+        if (!system.forms().admissible(x) || (!found && !settings.descend)) break;
         std::vector<double> defect;
         out.x = x, out.sigma = u[system.sigma()], out.lambda = u[system.lambda()], out.mu = u[system.mu()];
         out.observed = system.forms().observe(x, &defect);
