@@ -162,6 +162,19 @@ bool descend(System& system, Eigen::VectorXd& u, double tolerance, int& iteratio
     return Newton(system, u, iterations).descend(tolerance);
 }
 
+// Goes a hundredth of the size along this direction, or less where a narrow neck allows no more: downhill.
+template <class System>
+void leave_saddle(const System& system, Eigen::VectorXd& u, const Eigen::VectorXd& down) {
+    const int n = system.shape_size();
+    const double size = system.size(u), before = system.merit(u);
+    Eigen::VectorXd to = u;
+    for (double part = 0.01; part > 1e-6; part /= 4) {
+        to.head(n) = u.head(n) + part * size / down.head(n).template lpNorm<Eigen::Infinity>() * down.head(n);
+        if (system.admissible(to) && system.merit(to) < before) break;
+    }
+    u = to;
+}
+
 // The stationary shape on one mesh; with `from_afar`, and wherever plain Newton steps fail, after a descent. Without
 // `may_descend`, by plain steps alone. False, and u an intermediate state, if none is found.
 template <class System>
@@ -176,8 +189,7 @@ bool settle(System& system, Eigen::VectorXd& u, bool from_afar, bool may_descend
     for (int k = 0; k < 3 && found; ++k) {
         const Eigen::VectorXd down = system.way_down(u);
         if (down.size() == 0) break;
-        const int n = system.shape_size();
-        u.head(n) += 0.01 * system.size(u) / down.head(n).template lpNorm<Eigen::Infinity>() * down.head(n);
+        leave_saddle(system, u, down);
         system.rebase(u);
         found = search(1e-3);
     }
