@@ -272,14 +272,6 @@ double reference_energy_of(const StationaryProblem& problem, const CurveForms& f
                         std::abs(loads.force) * length);
 }
 
-// Whether the search is to lead from a sphere to a smaller reduced volume: there area and volume have one gradient.
-bool begins_at_sphere(const Constraints& goal, const CurveObservation& start) {
-    constexpr double near = 1e-6;  // of a spline
-    if (!goal.reduced_volume && !(goal.area && goal.volume)) return false;
-    const double wanted = goal.reduced_volume ? *goal.reduced_volume : reduced_volume(*goal.area, *goal.volume);
-    return reduced_volume(start.area, start.volume) > 1 - near && wanted < 1 - near;
-}
-
 // The radius of the narrowest neck of a closed curve; infinite where it has none.
 double neck_radius(const CurveSpace& space, const Eigen::VectorXd& x) {
     double narrowest = HUGE_VAL;
@@ -374,7 +366,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         if (round == 0) first = last = out.observed = system.forms().observe(out.x);
         out.reference_energy = reference_energy_of(problem, system.forms(), out.x);
-        if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first)) {
+        if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first.area, first.volume)) {
             out.estimated_error = 1;
             return end(
                 Stop::solver_failed,

@@ -58,6 +58,10 @@ StationaryProblem between(const StationaryProblem& goal, double area, double vol
 // How far that is: the largest |log| of a ratio.
 double distance(const Constraints& goal, double area, double volume);
 
+// Whether the search is to lead from a closed shape, a sphere, to a smaller reduced volume: there area and volume have
+// one gradient.
+bool begins_at_sphere(const Constraints& goal, double area, double volume);
+
 // Why no shape was found, from the area and volume of the first one and of the last: "no shape with volume ..."; else
 // empty.
 std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,

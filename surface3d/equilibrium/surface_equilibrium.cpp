@@ -39,7 +39,14 @@ public:
         for (;;) {
             SurfaceSystem system(next_mesh(initial, triangles), problem_);
             Eigen::VectorXd u = system.unknowns_at_base();
-            if (rounds_ == 0) first_ = system.area_and_volume(u);
+            if (rounds_ == 0) {
+                first_ = system.area_and_volume(u);
+                keep(system, u);
+                if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_[0], first_[1]))
+                    return end(Stop::solver_failed,
+                               "a sphere leads to no other area and volume, since all directions are alike: start at "
+                               "an ellipsoid or a sphere with waves");
+            }
             if (out_.stop == Stop::finished) u.tail(multipliers_.size()) = multipliers_;
             const bool far = out_.stop != Stop::finished && !settings_.near;
             const bool sound = system.admissible(u),

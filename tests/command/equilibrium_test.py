@@ -4,6 +4,8 @@ import subprocess
 import unittest
 from pathlib import Path
 
+import h5py
+
 from program import CAPSULE, ProgramTest, about, series
 
 CASE = CAPSULE + "modes = 2\n"
@@ -45,6 +47,34 @@ class Equilibrium(ProgramTest):
         self.assertIn("distance_to_start", shown)
         self.tubule("equilibrium", case, "--quiet", "-o", "other.hdf")
         self.assertIn("other.hdf", self.files())
+
+    def test_a_surface_from_a_profile(self):
+        """The energy and the slowest rates of tier axisym, which tests/axisym compares with a spectral reference."""
+        cell = self.write("cell.toml", CASE)
+        self.tubule("equilibrium", cell)
+        lines = [line for line in CASE.splitlines() if not line.startswith(("length", "radius", "modes", "tier"))]
+        text = "\n".join(['tier = "surface3d"', *lines, "rates = 3"]).replace('"capsule"', '"result"\npath = "cell.hdf"')
+        text = text.replace("energy = 1e-10", "energy = 1e-3")
+        case = self.write("surface.toml", text)
+        out, _ = self.tubule("equilibrium", case)
+        header, row = out.splitlines()[-2:]
+        self.assertEqual(header.split(), ["energy", "tension", "pressure", "height", "r_max", "neg", "growth", "of", "m"])
+        self.assertEqual(row.split()[-1], "1")
+        result, profile = series(self.folder / "surface.hdf"), series(self.folder / "cell.hdf")
+        self.assertAlmostEqual(result["energy"][0], profile["energy"][0], delta=result["energy_error"][0])
+        for name, m in (("rate_1", 1), ("rate_2", 1), ("rate_3", 0)):
+            self.assertAlmostEqual(result[name][0] / profile[f"growth_{m}"][0], 1, delta=1e-2)
+            self.assertEqual(result[name.replace("rate", "wave_number")][0], m)
+        self.assertEqual(result["negative_directions"][0], 0)
+        with h5py.File(self.folder / "surface.hdf") as file:
+            frame = file["frames/000000"]
+            self.assertEqual(frame.attrs["kind"], "surface")
+            for i in (1, 2, 3):
+                self.assertAlmostEqual(abs(frame[f"mode_{i}"][()]).max(), 1)
+        self.assertIn("complete", self.tubule("run", case, "--resume")[0])
+        sphere = self.write("sphere.toml", text.replace('"result"\npath = "cell.hdf"', '"sphere"\nradius = 1.0') + "\nreduced_volume = 0.9\n")
+        out, _ = self.tubule("equilibrium", sphere, status=4)
+        self.assertIn("start at an ellipsoid or a sphere with waves", out)
 
     def test_spheres_joined_by_points_are_named(self):
         """Closed form, theory.md (8.11): spheres of the radii cos a and sin a."""

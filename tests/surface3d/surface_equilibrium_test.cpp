@@ -1,6 +1,7 @@
 // Stationary surfaces in three dimensions and their second variation, against the axisymmetric tier and closed forms.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 
 #include "common/equilibrium/newton.hpp"
@@ -48,6 +49,31 @@ TEST(SurfaceEquilibrium, aVolumeThatNoShapeHasIsRefused) {
     const auto make = [](int triangles) { return spheroid(triangles, 1, 1.2); };
     EXPECT_EQ(test::message_of([&] { find_equilibrium(vesicle(1.2), make, {}); }),
               "a reduced volume of 1.2 is impossible: the largest is 1, that of a sphere");
+}
+
+// Dense eigenvalues within the constraints, with parts of low rank of either sign.
+TEST(SurfaceSpectrum, constraintsAndLowRank) {
+    const int n = 80;
+    ConstrainedForm A;
+    A.form.resize(n, n), A.mass.resize(n, n);
+    for (int i = 0; i < n; ++i) {
+        A.form.insert(i, i) = i - 5.5, A.mass.insert(i, i) = 1 + 0.01 * i;
+        if (i > 0) A.form.insert(i, i - 1) = 0.7, A.form.insert(i - 1, i) = 0.7;
+    }
+    const auto column = [&](double q) { return Eigen::VectorXd::LinSpaced(n, 0, q).array().cos().matrix().eval(); };
+    A.constraints.resize(n, 2), A.constraints << column(3), column(50);
+    A.low_rank.resize(n, 2), A.low_rank << column(7), column(20);
+    A.weights = Eigen::Vector2d(2, -0.5);
+    const Eigen::MatrixXd Z = Eigen::MatrixXd(A.constraints.householderQr().householderQ()).rightCols(n - 2);
+    const Eigen::MatrixXd full = Eigen::MatrixXd(A.form) + A.low_rank * A.weights.asDiagonal() * A.low_rank.transpose();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> dense(Z.transpose() * full * Z,
+                                                                         Z.transpose() * A.mass * Z);
+    const SurfaceSpectrum s = lowest_eigenvalues(A, nested_dissection(A.form), 12, 1);
+    EXPECT_EQ(s.doubt, "");
+    EXPECT_EQ(s.negative, (dense.eigenvalues().array() < 0).count());
+    for (int i = 0; i < 12; ++i) EXPECT_NEAR(s.values[i], dense.eigenvalues()[i], 1e-8) << i;
+    EXPECT_LT((A.constraints.transpose() * s.vectors).norm(), 1e-9);
+    EXPECT_EQ(count_below(A, nested_dissection(A.form), 10.2), (dense.eigenvalues().array() < 10.2).count());
 }
 
 // Eigenvalues of the second variation of a sphere under a pressure: the stiffness G_l, 2 l + 1 times each.

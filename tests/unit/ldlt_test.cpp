@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "common/solve/bordered_ldlt.hpp"
 #include "common/solve/gmres.hpp"
 #include "common/solve/sparse_ldlt.hpp"
 #include "tests/sphere_matrices.hpp"
@@ -329,6 +330,27 @@ TEST(Gmres, failsLoudly) {
     x.setConstant(std::nan(""));
     EXPECT_EQ(message_of([&] { gmres.solve(shift, copy, Vector::Ones(20), x, 1e-10, 10); }),
               "the right-hand side or the initial guess of GMRES is not finite");
+}
+
+// Dense LU of the whole.
+TEST(BorderedLdlt, solvesWithAndWithoutPivots) {
+    const int n = 60, border = 4;
+    for (const bool regular : {true, false}) {
+        Dense A = Dense::Zero(n + border, n + border);
+        A.topLeftCorner(n, n) = quasi_definite(40, 20, 3);
+        if (!regular) A.block(0, 0, 2, n).setZero(), A.block(0, 0, n, 2).setZero(), A(0, 1) = A(1, 0) = 1;
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < border; ++j) A(i, n + j) = std::sin(i * (j + 1)), A(n + j, i) = std::cos(i * (j + 2));
+        A.bottomRightCorner(border, border).diagonal().setConstant(0.3);
+        BorderedLdlt factors(nested_dissection(sparse(A.topLeftCorner(n, n))), border);
+        factors.factor(sparse(A));
+        EXPECT_EQ(factors.pivoted(), !regular);
+        const Vector b = waves(n + border), x = factors.solve(b);
+        EXPECT_LT((A * x - b).norm(), 1e-9 * b.norm());
+        if (regular) {
+            EXPECT_EQ(factors.negative(), negative_eigenvalues(A.topLeftCorner(n, n)));
+        }
+    }
 }
 
 }  // namespace ldlt_test
