@@ -10,6 +10,7 @@
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/theory/vesiculation.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
 
@@ -219,6 +220,16 @@ TEST(Equilibrium, saysThatANeckCloses) {
     const auto e = find_equilibrium(at_area_and_volume(bending(1, -3.4), 4 * pi, 0.75 * 4 * pi / 3), pear(0.75));
     EXPECT_EQ(e.stop, Stop::resolution_lost);
     EXPECT_EQ(e.message.find("a neck closes"), 0U) << e.message;
+}
+
+TEST(Equilibrium, aStomatocyteWithANarrowNeck) {
+    // Its neck stays open, since it has less energy than a sphere in a sphere, theory.md (8.11).
+    const double volume = 0.668 * 4 * pi / 3;
+    const auto problem = at_area_and_volume(bending(1, 1.05), 4 * pi, volume);
+    const auto e = find_equilibrium(problem, bowl(0.3, 2.3), accurate(1e-6));
+    ASSERT_EQ(e.stop, Stop::finished) << e.message;
+    EXPECT_LT(e.observed.energy, theory::vesiculated_limit(problem.bending, 4 * pi, volume)->energy);
+    EXPECT_EQ(e.negative_directions, 0);
 }
 
 TEST(Equilibrium, statedErrorHolds) {
