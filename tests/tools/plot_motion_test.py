@@ -224,7 +224,7 @@ class Pages(InFolder):
     def test_refusals(self):
         file = write(self.folder / "a.hdf", pressure=False)
         self.refused("not all of its frames have p", file, "--colour", "p")
-        self.refused("'T' is not one of u_n, H, K, p", file, "--colour", "H,T")
+        self.refused("'T' is not one of u_n, H, K, p, mode_1, ...", file, "--colour", "H,T")
         self.refused("--plane: z = 2 meets none of the surfaces", file, "--plane", "z=2")
         for plane in ("w=0", "z=", "z=e", "z=nan", "z"):
             self.refused(f"'{plane}' is not x, y or z = number", file, "--plane", plane)

@@ -75,6 +75,10 @@ def one_of(words):
     return parse
 
 
+def colour(text):
+    return text if re.fullmatch(r"mode_[1-9]\d*", text) else one_of((*COLOURS, "mode_1", "..."))(text)
+
+
 def file_name(text):
     if not text.strip():
         raise argparse.ArgumentTypeError("must not be blank: give the file a name")
@@ -187,8 +191,8 @@ def plot():
            help="picture to write, .png, .svg or .pdf; may be repeated (default: both RESULT.png and .svg)")  # fmt: skip
     option("--times", type=listed(time), metavar="T1,T2,...", help="times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
     option("--kind", type=one_of(KINDS), words=KINDS, default="all", help=f"what to draw: {', '.join(KINDS)}")
-    option("--colour", type=listed(one_of(COLOURS)), words=COLOURS, action="extend", default=[],
-           help="quantities to colour surfaces by: u_n (with arrows for the flow along them), H, K, p, or several as in u_n,H "
+    option("--colour", type=listed(colour), words=COLOURS, action="extend", default=[],
+           help="quantities to colour surfaces by: u_n (with arrows for the flow along them), H, K, p, of an equilibrium mode_1 ..., or several as in u_n,H "
                 "(default: u_n of surfaces that move, else H,K)")  # fmt: skip
     option("--scale", type=one_of(SCALES), words=SCALES, default="run",
            help="velocities are drawn relative to the largest one of the run, or of each shape")  # fmt: skip

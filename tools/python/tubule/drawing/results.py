@@ -77,12 +77,17 @@ class Surface:
     u: np.ndarray | None = None  # of a surface that moves: velocity, three components,
     u_n: np.ndarray | None = None  # outward,
     p: np.ndarray | None = None  # and pressure, where there is one
+    modes: dict = field(default_factory=dict)  # of an equilibrium: normal displacements mode_1, ...
     # As the file has them:
     period: float = 0.0
     mesh: int = 0  # its number
     cells: np.ndarray | None = None
     nodes: dict = field(default_factory=dict)  # arrays of nodes, by name
     parameter = None
+
+    def quantity(self, name):
+        """Values of H, K, u_n, p or a mode; None where there are none."""
+        return self.modes.get(name) if name.startswith("mode_") else getattr(self, name)
 
     @property
     def size(self):
@@ -317,6 +322,7 @@ def _surface(path, name, record, meshes):
     (points,) = _arrays(path, name, record, ("Points",))
     data = record["PointData"]
     keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p", "energy_density") if key in data)]
+    keys += sorted(key for key in data if key.startswith("mode_"))
     arrays = dict(zip(keys, _arrays(path, name, data, keys)))
     vectors = [array for key, array in arrays.items() if key in ("normal", "u")]
     numbers = [array for key, array in arrays.items() if key not in ("normal", "u")]
@@ -327,4 +333,5 @@ def _surface(path, name, record, meshes):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
     nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p")
     of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
-    return Surface(float(record.attrs["time"]), int(order), period == 0, **of_cells, period=float(period), mesh=number, cells=cells, nodes=nodes)
+    modes = {key: array[cells] for key, array in nodes.items() if key.startswith("mode_")}
+    return Surface(float(record.attrs["time"]), int(order), period == 0, **of_cells, modes=modes, period=float(period), mesh=number, cells=cells, nodes=nodes)

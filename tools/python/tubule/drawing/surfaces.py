@@ -1,4 +1,4 @@
-"""Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K or pressure.
+"""Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K, pressure or modes.
 With one time the quantities are side by side; else there is one column per time, with the quantities above each other."""
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ def choose_colours(results, wanted):
         return ["u_n"] if all(result.moves for result in results) else ["H", "K"]
     for name in wanted:
         for result in results:
-            if any(getattr(surface, name) is None for surface in result.surfaces):
+            if any(surface.quantity(name) is None for surface in result.surfaces):
                 raise BadInput(f"{result.path}: not all of its frames have {name}")
     return list(dict.fromkeys(wanted))
 
@@ -49,7 +49,7 @@ class Quantity:
     colours: Colours
 
     def at_nodes(self, surface, motion):
-        values = getattr(surface, self.name)
+        values = surface.quantity(self.name)
         if self.name != "u_n":
             return values
         return values / (motion.scale("u_n", surface) or np.inf)  # at rest: white
@@ -66,6 +66,10 @@ def quantities(names, results, surfaces):
         found[name] = Quantity(name, name, colours)
     if "p" in names:
         found["p"] = Quantity("p", "p", pressure_colours([surface.p.ravel() for surface in surfaces], areas))
+    for name in names:
+        if name.startswith("mode_"):
+            number = name.removeprefix("mode_")
+            found[name] = Quantity(name, f"mode {number}", Colours(flow.VELOCITY, Normalize(-1, 1), "neither", f"normal displacement of mode {number}"))
     return [found[name] for name in names]
 
 
