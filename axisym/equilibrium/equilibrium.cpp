@@ -366,7 +366,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         if (round == 0) first = last = out.observed = system.forms().observe(out.x);
         out.reference_energy = reference_energy_of(problem, system.forms(), out.x);
-        if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first.area, first.volume)) {
+        if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first.area, first.volume, 1e-6)) {
             out.estimated_error = 1;
             return end(
                 Stop::solver_failed,

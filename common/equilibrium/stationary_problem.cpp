@@ -123,11 +123,10 @@ double distance(const Constraints& goal, double area, double volume) {
                      off(goal.reduced_volume, reduced_volume(area, volume))});
 }
 
-bool begins_at_sphere(const Constraints& goal, double area, double volume) {
-    constexpr double near = 1e-6;  // of splines and elements
+bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding) {
     if (!goal.reduced_volume && !(goal.area && goal.volume)) return false;
     const double wanted = goal.reduced_volume ? *goal.reduced_volume : reduced_volume(*goal.area, *goal.volume);
-    return reduced_volume(area, volume) > 1 - near && wanted < 1 - near;
+    return reduced_volume(area, volume) > 1 - rounding && wanted < 1 - rounding;
 }
 
 std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,

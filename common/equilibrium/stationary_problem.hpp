@@ -59,8 +59,8 @@ StationaryProblem between(const StationaryProblem& goal, double area, double vol
 double distance(const Constraints& goal, double area, double volume);
 
 // Whether the search is to lead from a closed shape, a sphere, to a smaller reduced volume: there area and volume have
-// one gradient.
-bool begins_at_sphere(const Constraints& goal, double area, double volume);
+// one gradient. `rounding`: of the reduced volume of a sphere on the mesh.
+bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding);
 
 // Why no shape was found, from the area and volume of the first one and of the last: "no shape with volume ..."; else
 // empty.

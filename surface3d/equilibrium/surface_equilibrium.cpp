@@ -42,7 +42,7 @@ public:
             if (rounds_ == 0) {
                 first_ = system.area_and_volume(u);
                 keep(system, u);
-                if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_[0], first_[1]))
+                if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_[0], first_[1], 1e-4))
                     return end(Stop::solver_failed,
                                "a sphere leads to no other area and volume, since all directions are alike: start at "
                                "an ellipsoid or a sphere with waves");

@@ -36,7 +36,7 @@ const std::vector<Refused> refused{
     {automatic, {"equilibrium.descend=true"}, "tier = \"axisym\" or"},
     {surface_equilibrium, {"equilibrium.family=prolate"}, "tier = \"axisym\""},
     {surface_equilibrium, {"equilibrium.branch={vary=\"energy.k20\", to=2, step=0.1}"}, "tier = \"axisym\""},
-    {surface_equilibrium, {H0_of_area}, "tier = \"axisym\" where [equilibrium] is"},
+    {surface_equilibrium, {H0_of_z}, "tier = \"axisym\" where [equilibrium] is"},
     {equilibrium, {"equilibrium.rates=2"}, "tier = \"surface3d\""},
     {equilibrium, {"model.kind=fluid", "equilibrium.modes=2"}, "a model without inertia"},
     {equilibrium, {"shape={kind=\"torus\", radius=2, tube_radius=1}"}, "a motion, without [equilibrium]"},
