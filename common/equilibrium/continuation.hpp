@@ -1,0 +1,382 @@
+// Branches of stationary shapes in one parameter of the problem, by pseudo-arclength continuation: around folds, with
+// folds and bifurcations detected and located, for the unknowns of either tier.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/equilibrium/equilibrium_task.hpp"
+#include "common/solve/sparse.hpp"
+#include "common/solve/stop.hpp"
+
+namespace tubule {
+
+enum class PointKind { regular, fold, bifurcation };
+
+template <class Shape>
+struct BranchPoint {
+    PointKind kind = PointKind::regular;
+    double parameter = 0;
+    int index = 0;  // negative directions that the continuation counts; at a special point, before it
+    Shape shape;    // at special points to about 1e-6 of the parameter's range
+};
+
+template <class Shape, class ShapeSettings>
+struct BranchSettings {
+    double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
+    std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
+    int max_steps = 500;
+    ShapeSettings shapes;        // accuracy of each
+    bool switches = false;       // at the first bifurcation, to the branch along the critical displacement
+    // Is given each as soon as it is known.
+    std::function<void(const BranchPoint<Shape>&)> found = [](const BranchPoint<Shape>&) {};
+};
+
+template <class Shape>
+struct Branch {
+    std::vector<BranchPoint<Shape>> points;  // in the order of the branch
+    int steps = 0;
+    Stop stop = Stop::finished;  // or why it ends inside the interval
+    std::string message;
+};
+
+// A point of the branch on one mesh: unknowns, then the parameter; and the direction of the branch there, of unit
+// length in the norm of Follower.
+struct Place {
+    Eigen::VectorXd w, tangent;
+    double parameter() const { return w[w.size() - 1]; }
+    Eigen::VectorXd u() const { return w.head(w.size() - 1); }
+};
+
+// What became of the unknowns of a place.
+enum class Renewal { none, same_size, new_mesh, impossible };
+
+// A change of the number of negative directions that goes with a turn of the parameter is a fold, one without is a
+// bifurcation. `Tier` holds the equations on the present mesh and offers
+//   Shape, Settings           what is reported, and how accurate
+//   system()                  as for Newton's method
+//   factors()                 a solver for its Jacobian with one more row and column
+//   size()                    the length that displacements are compared with
+//   index(u)                  negative directions
+//   lowest(u, count)          at least that many lowest eigenvalues of the second variation, ascending
+//   renew(place)              other unknowns for the same shape and tangent, a better mesh where this one is too coarse
+//   why_not_renewed(parameter)             words for the latter
+//   meets_itself(u), meets_itself(shape)   where, to follow "the shape intersects itself"; empty: nowhere
+//   report(place, problem, kind)           the shape; regular ones are found again with the parameter held
+//   index_of(point, problem, before)       of a point to report, given the number that the continuation counts
+//   critical(u, which)                     the eigenvector of that number, where the branch switches; what it needs to be
+//                                          simple is held
+template <class Tier>
+class Follower {
+public:
+    using Shape = typename Tier::Shape;
+    using Settings = BranchSettings<Shape, typename Tier::Settings>;
+    using Point = BranchPoint<Shape>;
+
+    // `problem` and `start`, of unknowns u, belong to the parameter `from`.
+    Follower(Tier& tier, const StationaryProblem& problem, const Eigen::VectorXd& start, const SetParameter& set,
+             const Settings& settings)
+        : tier_(tier),
+          problem_(problem),
+          set_(set),
+          settings_(settings),
+          range_(std::abs(settings.to - settings.from)),
+          lu_(tier.factors()) {
+        if (settings.from == settings.to) throw std::invalid_argument("the start and the end of a branch must differ");
+        const double slack = 1e-9 * range_;
+        low_ = std::min(settings.from, settings.to) - slack, high_ = low_ + range_ + 2 * slack;
+        place_.w.resize(start.size() + 1);
+        place_.w << start, settings.from;
+    }
+
+    Branch<Shape> run() {
+        set_tangent(place_, unit_parameter());
+        if ((settings_.to - settings_.from) * place_.tangent[last()] < 0) place_.tangent *= -1;
+        renew();
+        index_ = index(place_);
+        output_at(settings_.from);
+        double step = 0.02;
+        while (branch_.steps < settings_.max_steps) {
+            int iterations = 0;
+            const std::optional<Place> next = advance(place_, step, iterations);
+            // A direction that turns too far may belong to another branch.
+            if (!next || inner(next->tangent, place_.tangent) < 0.8) {
+                step /= 2;
+                if (step < 1e-7)
+                    return end(Stop::solver_failed, "the branch cannot be followed further: the step became too small");
+                continue;
+            }
+            ++branch_.steps;
+            const double before = place_.parameter();
+            if (!record_between(place_, *next, step))
+                return end(Stop::solver_failed,
+                           fmt::format("no stationary shape found on the branch between the parameters {:.6g} and "
+                                       "{:.6g}",
+                                       before, next->parameter()));
+            if (switch_) {
+                take_switch(), step = 0.02;
+                continue;
+            }
+            place_ = *next;
+            if (auto stop = check()) return end(stop->first, std::move(stop->second));
+            if (iterations <= 4) step = std::min(step * 1.6, 0.2);
+        }
+        return end(Stop::solver_failed,
+                   fmt::format("after {} steps, the largest number allowed, the branch is at parameter {:.6g}",
+                               settings_.max_steps, place_.parameter()));
+    }
+
+private:
+    using At = std::pair<double, Place>;  // a place, and its distance along the tangent
+
+    Branch<Shape> end(Stop stop, std::string message) {
+        branch_.stop = stop, branch_.message = std::move(message);
+        return std::move(branch_);
+    }
+    int last() const { return static_cast<int>(place_.w.size()) - 1; }
+
+    // Whether the branch ends at the place reached; if not, with new unknowns where that is better.
+    std::optional<std::pair<Stop, std::string>> check() {
+        const double p = place_.parameter();
+        if (!branch_.message.empty()) return {{Stop::self_intersection, branch_.message}};
+        if (p < low_ || p > high_) return {{Stop::finished, ""}};
+        if (met_itself(tier_.meets_itself(place_.u()), p)) return {{Stop::self_intersection, branch_.message}};
+        if (!renew()) return {{Stop::resolution_lost, tier_.why_not_renewed(p)}};
+        return std::nullopt;
+    }
+
+    // Mean square of the shape's displacement relative to its size, and of the parameter's relative to its range.
+    Eigen::VectorXd covector(const Eigen::VectorXd& t) const {
+        const int n = tier_.system().shape_size();
+        const double size = tier_.size();
+        Eigen::VectorXd out = Eigen::VectorXd::Zero(t.size());
+        out.head(n) = t.head(n) / (n * size * size);
+        out[t.size() - 1] = t[t.size() - 1] / (range_ * range_);
+        return out;
+    }
+    double inner(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const { return covector(a).dot(b); }
+    Eigen::VectorXd unit_parameter() const { return Eigen::VectorXd::Unit(place_.w.size(), last()) * range_; }
+
+    StationaryProblem problem_at(double parameter) const {
+        StationaryProblem p = problem_;
+        set_(p, parameter);
+        return p;
+    }
+    Eigen::VectorXd residual(const Eigen::VectorXd& u, double parameter) {
+        tier_.system().set_problem(problem_at(parameter));
+        return tier_.system().residual(u);
+    }
+    // [F_u F_parameter; row]. Moduli, alpha, M0 and constraints enter F linearly, H0 as a polynomial of low degree.
+    Eigen::SparseMatrix<double> matrix(const Eigen::VectorXd& w, const Eigen::VectorXd& row) {
+        const int n = static_cast<int>(w.size()) - 1;
+        const double h = 1e-4 * range_;
+        const Eigen::VectorXd u = w.head(n);
+        const Eigen::VectorXd column = (residual(u, w[n] + h) - residual(u, w[n] - h)) / (2 * h);
+        tier_.system().set_problem(problem_at(w[n]));
+        const Eigen::SparseMatrix<double> J = tier_.system().jacobian(u, 0);
+        Eigen::SparseMatrix<double> out(n + 1, n + 1);
+        out.reserve(J.nonZeros() + 2 * n + 1);
+        for (int j = 0; j <= n; ++j) {
+            out.startVec(j);
+            if (j < n)
+                for (Eigen::SparseMatrix<double>::InnerIterator it(J, j); it; ++it)
+                    out.insertBack(it.row(), j) = it.value();
+            else
+                for (int i = 0; i < n; ++i) out.insertBack(i, j) = column[i];
+            out.insertBack(n, j) = row[j];
+        }
+        out.finalize();
+        return out;
+    }
+
+    // The direction of the branch on the side of `along`.
+    void set_tangent(Place& place, const Eigen::VectorXd& along) {
+        lu_.factor(matrix(place.w, covector(along)));
+        const Eigen::VectorXd t = lu_.solve(Eigen::VectorXd::Unit(place.w.size(), last()));
+        place.tangent = t / std::sqrt(inner(t, t));
+    }
+
+    // The point of the branch at this distance along the tangent, by Newton's method across it.
+    std::optional<Place> advance(const Place& from, double distance, int& iterations) {
+        Place to{from.w + distance * from.tangent, from.tangent};
+        const int n = static_cast<int>(to.w.size()) - 1;
+        const Eigen::VectorXd row = covector(from.tangent);
+        double before = 1;
+        try {
+            for (iterations = 1; iterations <= 12; ++iterations) {
+                if (!tier_.system().admissible(to.u())) return std::nullopt;
+                lu_.factor(matrix(to.w, row));
+                Eigen::VectorXd F(n + 1);
+                F << tier_.system().residual(to.u()), row.dot(to.w - from.w) - distance;
+                const Eigen::VectorXd step = lu_.solve(F);
+                to.w -= step;
+                const double length = std::sqrt(inner(step, step));
+                // Quadratic convergence; or, on fine meshes, that of rounding errors.
+                const bool converged = length < 1e-8 || (length < 1e-6 && length > before / 4);
+                if (!(length < 0.5) || (iterations > 4 && length > 10 * before)) return std::nullopt;
+                before = length;
+                if (converged) {
+                    set_tangent(to, from.tangent);
+                    return to;
+                }
+            }
+        } catch (const SolveError&) {
+        } catch (const std::invalid_argument&) {  // the parameter has left what is possible
+        }
+        return std::nullopt;
+    }
+
+    int index(const Place& p) {
+        tier_.system().set_problem(problem_at(p.parameter()));
+        return tier_.index(p.u());
+    }
+    double eigenvalue(const Place& p, int which) {
+        tier_.system().set_problem(problem_at(p.parameter()));
+        return tier_.lowest(p.u(), which + 1)[which];
+    }
+
+    // Where f vanishes between a and b, at distance `step` from it: regula falsi (Illinois).
+    template <class F>
+    std::optional<At> locate(const Place& a, const Place& b, double step, F&& f) {
+        double low = 0, high = step, at_a = f(a), at_b = f(b);
+        // Another mesh has moved a zero past an end.
+        if ((at_a < 0) == (at_b < 0)) return std::abs(at_a) < std::abs(at_b) ? At{0, a} : At{step, b};
+        const double scale = std::abs(at_a) + std::abs(at_b);
+        std::optional<At> best;
+        for (int k = 0; k < 25 && high - low > 1e-10 * step; ++k) {
+            const double middle = (low * at_b - high * at_a) / (at_b - at_a);
+            int iterations = 0;
+            const auto place = advance(a, middle, iterations);
+            if (!place) return best;
+            best = {middle, *place};
+            const double value = f(*place);
+            if (std::abs(value) < 1e-9 * scale) break;
+            if ((value < 0) == (at_a < 0)) {
+                low = middle, at_a = value, at_b /= 2;
+            } else {
+                high = middle, at_b = value, at_a /= 2;
+            }
+        }
+        return best;
+    }
+
+    // Everything to report between two points of the branch, in its order. False if a point is not found.
+    bool record_between(const Place& a, const Place& b, double step) {
+        std::vector<std::pair<double, Point>> found;
+        bool complete = true;
+        const auto note = [&](const std::optional<At>& at, PointKind kind) {
+            if (!at) complete = false;
+            if (!at || at->second.parameter() < low_ || at->second.parameter() > high_) return;
+            found.emplace_back(at->first, point(at->second, kind));
+        };
+        const bool turned = a.tangent[last()] * b.tangent[last()] < 0;
+        if (turned) note(locate(a, b, step, [&](const Place& p) { return p.tangent[last()]; }), PointKind::fold);
+        const int after = index(b), before = index_ < 0 ? after : index_;
+        if (after != before && (!turned || std::abs(after - before) > 1)) {
+            const int which = std::min(before, after);  // ascending: the eigenvalue that changes its sign
+            const auto at = locate(a, b, step, [&](const Place& p) { return eigenvalue(p, which); });
+            note(at, PointKind::bifurcation);
+            if (settings_.switches && !switched_ && at) switch_ = {at->second, which};
+        }
+        for (double wanted : settings_.output) {
+            const double left = a.parameter() - wanted, right = b.parameter() - wanted;
+            if (wanted != settings_.from || branch_.steps > 1)
+                if (left * right < 0 || right == 0) {
+                    auto at = locate(a, b, step, [&](const Place& p) { return p.parameter() - wanted; });
+                    if (at) at->second.w[last()] = wanted;
+                    note(at, PointKind::regular);
+                }
+        }
+        std::sort(found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
+        for (auto& [distance, p] : found) {
+            if (met_itself(tier_.meets_itself(p.shape), p.parameter)) break;
+            p.index = tier_.index_of(p, problem_at(p.parameter), before);
+            branch_.points.push_back(std::move(p));
+            settings_.found(branch_.points.back());
+            if (switch_ && branch_.points.back().kind == PointKind::bifurcation) break;
+        }
+        index_ = after;
+        return complete;
+    }
+
+    // The branch goes on from the bifurcation along the critical displacement, the parameter at rest.
+    void take_switch() {
+        const int which = switch_->second;
+        place_ = std::move(switch_->first);
+        switch_.reset(), switched_ = true;
+        renew();
+        tier_.system().set_problem(problem_at(place_.parameter()));
+        const Eigen::VectorXd along = tier_.critical(place_.u(), which);
+        lu_ = tier_.factors();
+        place_.tangent.setZero(place_.w.size());
+        place_.tangent.head(along.size()) = along;
+        place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
+        index_ = -1;
+    }
+
+    // Whether the shape intersects itself; if so, sets the message of the branch.
+    bool met_itself(const std::string& where, double parameter) {
+        if (where.empty()) return false;
+        branch_.message = fmt::format("at parameter {:.6g} the shape intersects itself{}", parameter, where);
+        return true;
+    }
+
+    void output_at(double parameter) {
+        for (double wanted : settings_.output)
+            if (wanted == parameter) {
+                branch_.points.push_back(point(place_, PointKind::regular));
+                branch_.points.back().index = index_;
+                settings_.found(branch_.points.back());
+            }
+    }
+
+    Point point(const Place& place, PointKind kind) {
+        const StationaryProblem problem = problem_at(place.parameter());
+        tier_.system().set_problem(problem);
+        return {kind, place.parameter(), 0, tier_.report(place, problem, kind)};
+    }
+
+    // Other unknowns where these are not the best. False if there are none.
+    bool renew() {
+        tier_.system().set_problem(problem_at(place_.parameter()));
+        switch (tier_.renew(place_)) {
+            case Renewal::none:
+                return true;
+            case Renewal::same_size:
+                place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
+                return true;
+            case Renewal::impossible:
+                return false;
+            case Renewal::new_mesh:
+                break;
+        }
+        lu_ = tier_.factors();
+        int iterations = 0;
+        const auto corrected = advance(place_, 0, iterations);
+        if (!corrected) return false;
+        place_ = *corrected;
+        return true;
+    }
+
+    Tier& tier_;
+    StationaryProblem problem_;
+    const SetParameter& set_;
+    const Settings& settings_;
+    double range_, low_ = 0, high_ = 0;
+    decltype(std::declval<Tier&>().factors()) lu_;
+    Place place_;
+    int index_ = 0;  // at the place; -1: the place is a bifurcation
+    std::optional<std::pair<Place, int>> switch_;  // where to leave the branch, and along which eigenvector
+    bool switched_ = false;
+    Branch<Shape> branch_;
+};
+
+}  // namespace tubule
