@@ -215,12 +215,12 @@ struct DiscreteEnergy::EdgeSides {
 struct DiscreteEnergy::Block {
     EnergyValues values;
     Row energy, area, volume, M;
-    Square second;
+    Square second;  // empty: not asked for
 
-    void reset(int n) {
+    void reset(int n, bool derive_twice) {
         values = {};
         for (Row* row : {&energy, &area, &volume, &M}) row->setZero(n);
-        second.setZero(n, n);
+        second.setZero(derive_twice ? n : 0, derive_twice ? n : 0);
     }
 };
 
@@ -335,14 +335,15 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
         out.energy.noalias() += weight * slope.transpose() * change.forms;
         out.area.noalias() += weight * f.area_slope.transpose() * change.tangents;
         out.M.noalias() += weight * gradient(M).transpose() * change.forms;
-        change.add_second(f, weight * (slope + sigma * gradient(at.area)),
-                          weight * (hessian(energy) + sigma * hessian(at.area)), out.second);
         Columns3 moved(3, n);  // of the points
         moved.leftCols(space_.width()) = D * table.value.col(q).asDiagonal();
         if (d.stretch) moved.col(n - 1) = stretch * table.value.col(q);
         out.volume.leftCols(space_.width()).noalias() +=
             weight * f.area * f.normal.transpose() * moved.leftCols(space_.width());
         if (d.stretch) out.volume[n - 1] += weight * 0.5 * (from.dot(f.cross * change.tangents.col(n - 1)));
+        if (out.second.size() == 0) continue;
+        change.add_second(f, weight * (slope + sigma * gradient(at.area)),
+                          weight * (hessian(energy) + sigma * hessian(at.area)), out.second);
         const Columns3 turned = f.cross * change.tangents;  // change of t x c
         Square part = weight * lambda * 0.5 * moved.transpose() * turned;
         if (d.stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
@@ -413,6 +414,7 @@ void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, do
         spread(by_forms.transpose() * change.forms, first.row(s));
         spread(change.tangents.bottomRows<3>(), corner.middleRows<3>(3 + 3 * s));
         if (s == 0) spread(change.tangents.topRows<3>(), corner.topRows<3>());  // both sides share it
+        if (out.second.size() == 0) continue;
         Square own = Square::Zero(n + stretch, n + stretch);
         change.add_second(p.frame[s], slope[s] * by_forms, slope[s] * hessian(p.moment[s]), own);
         out.second.block(s * n, s * n, n, n) += own.topLeftCorner(n, n);
@@ -429,6 +431,7 @@ void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, do
     twice(2, 2) = weight * penalty * ds;
     out.energy.noalias() += slope * first;
     out.M.noalias() += weight * (ds * first.row(2) + angle * first.row(3));
+    if (out.second.size() == 0) return;
     const Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> twice_first = twice * first;
     const Columns9 corner_part = (slope[2] * hessian(p.angle) + slope[3] * hessian(p.length)) * corner;
     out.second.noalias() += first.transpose() * twice_first;
@@ -461,21 +464,23 @@ void DiscreteEnergy::add(const Block& block, const std::vector<int>& nodes, cons
     for (int i = 0; i < n; ++i) {
         out.energy[nodes[i]] += block.energy[i], out.area[nodes[i]] += block.area[i];
         out.volume[nodes[i]] += block.volume[i], out.M[nodes[i]] += block.M[i];
-        for (int j = 0; j < n; ++j) out.hessian.valuePtr()[slots[i * n + j]] += block.second(j, i);
+        for (int j = 0; j < block.second.cols() && j < n; ++j) out.hessian.valuePtr()[slots[i * n + j]] += block.second(j, i);
     }
     if (out.with_stretch.size() == 0) return;
     out.energy[N] += block.energy[n], out.area[N] += block.area[n], out.volume[N] += block.volume[n];
-    out.M[N] += block.M[n], out.stretch_twice += block.second(n, n);
+    out.M[N] += block.M[n];
+    if (block.second.size() == 0) return;
+    out.stretch_twice += block.second(n, n);
     for (int i = 0; i < n; ++i) out.with_stretch[nodes[i]] += block.second(i, n);
 }
 
 EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Directions& directions,
                                               const Bending& bending, double sigma, double lambda,
-                                              const Eigen::VectorXd& H0) const {
+                                              const Eigen::VectorXd& H0, bool second) const {
     EnergyDerivatives out;
     const int N = space_.size() + directions.stretch, n = space_.width(), cells = space_.cells();
     for (Eigen::VectorXd* v : {&out.energy, &out.area, &out.volume, &out.M}) v->setZero(N);
-    out.hessian = pattern_;
+    if (second) out.hessian = pattern_;
     if (directions.stretch) out.with_stretch.setZero(space_.size());
     constexpr int batch = 256;  // blocks that are in memory at once
     std::vector<Block> blocks(batch);
@@ -487,7 +492,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
         parallel_for(end - begin, [&](std::size_t j) {
             Block& block = blocks[j];
             const int i = begin + static_cast<int>(j);
-            block.reset((i < cells ? n : 2 * n) + directions.stretch);
+            block.reset((i < cells ? n : 2 * n) + directions.stretch, second);
             if (i < cells)
                 cell_block(mesh, directions, bending, sigma, lambda, H0, i, block);
             else

@@ -28,7 +28,8 @@ struct EnergyValues {
 struct EnergyDerivatives {
     EnergyValues values;
     Eigen::VectorXd energy, area, volume, M;
-    // Second derivatives of energy + sigma area + lambda volume; among nodes, and with the stretch (else empty).
+    // Second derivatives of energy + sigma area + lambda volume; among nodes, and with the stretch (else empty). Zero
+    // where the first alone are asked for, at a fraction of the cost.
     Eigen::SparseMatrix<double> hessian;
     Eigen::VectorXd with_stretch;
     double stretch_twice = 0;
@@ -48,7 +49,7 @@ public:
     // Of a mesh with these triangles; where areas differ, of an energy with_M(). H0 at the nodes, where it varies.
     EnergyValues values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0 = {}) const;
     EnergyDerivatives derivatives(const CurvedMesh& mesh, const Directions& directions, const Bending& bending,
-                                  double sigma, double lambda, const Eigen::VectorXd& H0 = {}) const;
+                                  double sigma, double lambda, const Eigen::VectorXd& H0 = {}, bool second = true) const;
     // INT w_i w_j (n.nu)^2 dS
     Eigen::SparseMatrix<double> mass(const CurvedMesh& mesh, const Directions& directions) const;
 
