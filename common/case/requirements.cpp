@@ -111,7 +111,6 @@ const std::vector<Requirement> rows{
     key("equilibrium", {named_tier}),
     key("equilibrium.family", {axisym}, "begin with a shape of the case, or with a result of tier axisym"),
     key("equilibrium.rates", {surface}, "the rates of each m are those of equilibrium.modes"),
-    key("equilibrium.branch", {axisym}),
     key("equilibrium.modes", {axisym, no_inertia}, "growth rates neglect inertia"),
     value(
         "shape.kind", [](P p) { return std::holds_alternative<Torus>(p.shape) && p.tier == Tier::axisym; }, {motion},

@@ -104,6 +104,10 @@ int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift
     return Shifted(A, ordering, shift).negative();
 }
 
+int count_negative(const ConstrainedForm& A, const Ordering& ordering, double scale) {
+    return factored_near(A, ordering, 0, 1e-9 * scale).first.negative();
+}
+
 SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale) {
     const Eigen::Index n = A.form.rows();
     count = static_cast<int>(std::min<Eigen::Index>(count, n - 1 - A.constraints.cols()));
@@ -132,7 +136,7 @@ SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ord
     int last = count - 1;
     while (last > 0 && out.values[last] - out.values[last - 1] < 1e-6 * spread) --last;
     try {
-        out.negative = factored_near(A, ordering, 0, 1e-9 * scale).first.negative();
+        out.negative = count_negative(A, ordering, scale);
         if (last > 0) {
             const double between = (out.values[last] + out.values[last - 1]) / 2;
             const int below = count_below(A, ordering, between);

@@ -31,5 +31,6 @@ SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ord
 
 // The number of eigenvalues below `shift`: Sylvester's law for the form with its constraints.
 int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift);
+int count_negative(const ConstrainedForm& A, const Ordering& ordering, double scale);
 
 }  // namespace tubule::surface3d

@@ -52,6 +52,14 @@ bool scale_free(const StationaryProblem& p) {
            p.loads.pressure == 0 && p.loads.force == 0;
 }
 
+// Whether both have the same first and second derivatives at given multipliers.
+bool same_energy(const Bending& a, const Bending& b) {
+    if (a.H0 != b.H0 || count_terms(a) != count_terms(b) || a.alpha.has_value() != b.alpha.has_value()) return false;
+    for (std::size_t i = 0; i < count_terms(a); ++i)
+        if (modulus(a, i) != modulus(b, i)) return false;
+    return true;
+}
+
 }  // namespace
 
 VectorField node_normals(const SurfaceSpace& space, const CurvedMesh& mesh) {
@@ -89,8 +97,8 @@ void SurfaceSystem::set_mesh(const CurvedMesh& mesh) {
 
 void SurfaceSystem::set_problem(const StationaryProblem& problem) {
     check_problem(problem, base_.period);
+    if (!same_energy(problem.bending, problem_.bending)) last_.reset();
     problem_ = problem;
-    last_.reset();
 }
 
 void SurfaceSystem::set_base(const CurvedMesh& mesh) {
@@ -221,7 +229,11 @@ double SurfaceSystem::constraint_error(const Eigen::VectorXd& u) const {
 }
 
 Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
-    const EnergyDerivatives& d = derivatives(u);
+    const bool known = last_ && at_ == u;
+    const EnergyDerivatives first = known ? EnergyDerivatives{}
+                                          : energy_->derivatives(mesh(u), directions_, bending(u), u[sigma()],
+                                                                 u[lambda()], H0_, false);
+    const EnergyDerivatives& d = known ? *last_ : first;
     Eigen::VectorXd F(unknowns());
     F.head(shape_size()) = d.energy + u[sigma()] * d.area + u[lambda()] * d.volume +
                            motions_ * u.segment(mu() + 1, motions_.cols());
@@ -305,24 +317,46 @@ bool SurfaceSystem::admissible(const Eigen::VectorXd& u) const {
     return energy_->values(at, problem_.bending, H0_).kinks < most_kinks * scale_;
 }
 
-bool SurfaceSystem::rebase(Eigen::VectorXd& u) {
-    CurvedMesh next = mesh(u);
-    const int before = shape_size();
-    if (H0_.size() == 0 && mesh_quality(next).worst < good_quality) {
-        RemeshOptions options;
-        options.quality = good_quality;
-        auto better = remesh(next, Eigen::MatrixXd(0, next.size()), options);
-        if (auto* found = std::get_if<Remeshed>(&better)) {
-            const Eigen::VectorXd multipliers = u.tail(u.size() - before);
-            set_mesh(found->mesh);
-            u.setZero(unknowns());
-            u.tail(multipliers.size()) = multipliers;
-            return true;
-        }
-    }
+bool SurfaceSystem::rebase(Eigen::VectorXd& u, Eigen::VectorXd* along, int triangles) {
+    const CurvedMesh next = mesh(u);
+    const int N = space().size();
+    if (along && problem_.free_period) (*along)[N] /= 1 + u[N];
+    if (H0_.size() == 0 && (triangles > 0 || mesh_quality(next).worst < good_quality) &&
+        take_new_mesh(next, triangles, u, along))
+        return true;
+    const VectorField before = directions_.normal;
     set_base(next);
-    u.head(before).setZero();
+    u.head(shape_size()).setZero();
+    if (along) along->head(N).array() *= before.cwiseProduct(directions_.normal).colwise().sum().transpose().array();
     return false;
+}
+
+// False if there is no good one.
+bool SurfaceSystem::take_new_mesh(const CurvedMesh& shape, int triangles, Eigen::VectorXd& u, Eigen::VectorXd* along) {
+    const int N = space().size(), before = shape_size();
+    const Eigen::MatrixXd fields = along ? Eigen::MatrixXd(along->head(N).transpose()) : Eigen::MatrixXd(0, N);
+    RemeshOptions options;
+    options.quality = good_quality, options.triangles = triangles;
+    auto better = remesh(shape, fields, options);
+    auto* found = std::get_if<Remeshed>(&better);
+    if (!found) return false;
+    const Eigen::VectorXd multipliers = u.tail(u.size() - before);
+    set_mesh(found->mesh);
+    u.setZero(unknowns());
+    u.tail(multipliers.size()) = multipliers;
+    if (along) {
+        const double stretch = along->tail(1)[0];
+        *along = Eigen::VectorXd::Constant(shape_size(), stretch);
+        along->head(space().size()) = found->fields.row(0).transpose();
+    }
+    return true;
+}
+
+void SurfaceSystem::hold(const Eigen::VectorXd& displacement) {
+    const Eigen::VectorXd image = mass_ * displacement.head(mass_.rows());
+    motions_.conservativeResize(shape_size(), motions_.cols() + 1);
+    motions_.rightCols<1>().setZero();
+    motions_.rightCols<1>().head(mass_.rows()) = image / std::sqrt(image.dot(displacement.head(mass_.rows())));
 }
 
 Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
@@ -332,7 +366,7 @@ Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
     return u;
 }
 
-SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) const {
+ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u) const {
     const EnergyDerivatives& d = derivatives(u);
     const Constraints& c = problem_.constraints;
     const int N = space().size(), n = shape_size();
@@ -370,12 +404,29 @@ SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) con
             append(A.low_rank, d.area), weigh(weight);
     }
     if (problem_.bending.alpha.value_or(0) != 0) append(A.low_rank, d.M), weigh(*problem_.bending.alpha);
-    return lowest_eigenvalues(A, ordering_, count, reference_energy(u) / (d.values.area * d.values.area));
+    return A;
+}
+
+double SurfaceSystem::stiffness(const Eigen::VectorXd& u) const {
+    return reference_energy(u) / std::pow(derivatives(u).values.area, 2);
+}
+
+SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) const {
+    return lowest_eigenvalues(second_variation(u), ordering_, count, stiffness(u));
+}
+
+int SurfaceSystem::index(const Eigen::VectorXd& u) const {
+    const ConstrainedForm A = second_variation(u);
+    try {
+        return count_negative(A, ordering_, stiffness(u));
+    } catch (const SolveError&) {  // no factors without pivoting
+        return lowest_eigenvalues(A, ordering_, 12, stiffness(u)).negative;
+    }
 }
 
 Eigen::VectorXd SurfaceSystem::way_down(const Eigen::VectorXd& u) const {
     const SurfaceSpectrum s = spectrum(u, 1);
-    if (s.values[0] > -1e-6 * reference_energy(u) / std::pow(derivatives(u).values.area, 2)) return {};
+    if (s.values[0] > -1e-6 * stiffness(u)) return {};
     return s.vectors.col(0);
 }
 

@@ -41,11 +41,11 @@ public:
     double size(const Eigen::VectorXd& u) const;
     double reference_energy(const Eigen::VectorXd& u) const;
     bool admissible(const Eigen::VectorXd& u) const;
-    // Makes the shape the base; where its triangles have become bad, on a new mesh. Whether that was so, and u has
-    // another size.
-    bool rebase(Eigen::VectorXd& u);
+    // Makes the shape the base; on a new mesh where its triangles have become bad, or about this many are asked for.
+    // Whether that was so, and u has another size. `along`, a change of the shape's unknowns, stays the same motion.
+    bool rebase(Eigen::VectorXd& u, Eigen::VectorXd* along = nullptr, int triangles = 0);
     Eigen::VectorXd way_down(const Eigen::VectorXd& u) const;
-    BorderedLdlt factors() const { return BorderedLdlt(ordering_, unknowns() - shape_size()); }
+    BorderedLdlt factors(int more = 0) const { return BorderedLdlt(ordering_, unknowns() - shape_size() + more); }
 
     // The multipliers of the given shape, by least squares: u with w = 0.
     Eigen::VectorXd unknowns_at_base() const;
@@ -57,9 +57,13 @@ public:
     EnergyValues values(const Eigen::VectorXd& u) const;
     // The second variation under what is held, of displacements that are no held motion; `count` lowest.
     SurfaceSpectrum spectrum(const Eigen::VectorXd& u, int count) const;
+    // Its negative directions alone.
+    int index(const Eigen::VectorXd& u) const;
     // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each, if
     // that has one; -1 where there is none.
     std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
+    // Holds this displacement, too, until the base changes.
+    void hold(const Eigen::VectorXd& displacement);
     int held_motions() const { return static_cast<int>(motions_.cols()); }
 
 private:
@@ -67,6 +71,9 @@ private:
     MultiplierEquations equations(const EnergyValues& v, const Eigen::VectorXd& u) const;
     void set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     const EnergyDerivatives& derivatives(const Eigen::VectorXd& u) const;
+    ConstrainedForm second_variation(const Eigen::VectorXd& u) const;
+    double stiffness(const Eigen::VectorXd& u) const;  // a size of its eigenvalues
+    bool take_new_mesh(const CurvedMesh& shape, int triangles, Eigen::VectorXd& u, Eigen::VectorXd* along);
     void set_mesh(const CurvedMesh& mesh);
     void set_base(const CurvedMesh& mesh);
     void set_motions();

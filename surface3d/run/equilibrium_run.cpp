@@ -9,7 +9,7 @@
 #include "common/equilibrium/equilibrium_task.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/series/table.hpp"
-#include "surface3d/equilibrium/surface_equilibrium.hpp"
+#include "surface3d/equilibrium/surface_branch.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
@@ -22,12 +22,14 @@ constexpr int many = 2000;  // triangles, for the area and volume of an initial 
 struct Task {
     StationaryProblem problem;
     SurfaceEquilibriumSettings settings;
+    SetParameter set;  // of a branch
+    BranchSettings branch;
 };
 
 Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
-    Task task{stationary_problem(c, v.area, v.volume), {}};
+    Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
     SurfaceEquilibriumSettings& s = task.settings;
     s.accuracy = c.accuracy.energy;
@@ -38,12 +40,19 @@ Task task_of(const Problem& c, const Start& start) {
         s.triangles = mesh.triangles();
     else
         s.triangles = c.surface.elements.value_or(0);
+    if (const BranchChoices& b = c.equilibrium->branch; b.parameter) {
+        task.set = setter(*b.parameter);
+        task.branch.shapes = s;
+        task.branch.output = branch_outputs(c, task.problem);
+        task.branch.from = task.branch.output.front(), task.branch.to = task.branch.output.back();
+    }
     return task;
 }
 
 struct ShapeRow {
-    const Problem& c;
-    const Task& task;
+    int number;
+    const BranchPoint& point;
+    const StationaryProblem& problem;
     const SurfaceEquilibrium& shape;
     const std::vector<double>& terms;
     double height, r_max, wall_seconds;
@@ -64,18 +73,21 @@ std::array<double, 2> height_and_radius(const CurvedMesh& mesh) {
 
 SeriesTable<ShapeRow> shape_series(const Problem& c) {
     SeriesTable<ShapeRow> table;
-    table.add({{"time", [](const ShapeRow&) { return 0.0; }},
-               {"energy", [](const ShapeRow& r) { return r.shape.values.energy; }}});
+    table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
+    if (c.equilibrium->branch.parameter)
+        table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
+                   {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
+    table.add({{"energy", [](const ShapeRow& r) { return r.shape.values.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.terms[term]; });
     if (c.energy.alpha)
         table.add({{"energy_alpha",
-                    [](const ShapeRow& r) { return area_difference_energy(r.c.energy, r.shape.values.M); }},
+                    [](const ShapeRow& r) { return area_difference_energy(r.problem.bending, r.shape.values.M); }},
                    {"M", [](const ShapeRow& r) { return r.shape.values.M; }}});
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
                     const EnergyValues& v = r.shape.values;
-                    return v.energy + r.task.problem.loads.energy(v.area, v.volume, r.shape.mesh.period);
+                    return v.energy + r.problem.loads.energy(v.area, v.volume, r.shape.mesh.period);
                 }},
                {"area", [](const ShapeRow& r) { return r.shape.values.area; }},
                {"volume", [](const ShapeRow& r) { return r.shape.values.volume; }},
@@ -85,7 +97,7 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
                {"pressure", [](const ShapeRow& r) { return -r.shape.lambda; }},
                {"negative_directions",
                 [](const ShapeRow& r) {
-                    return r.shape.stop == Stop::finished ? static_cast<double>(r.shape.spectrum.negative) : -1.0;
+                    return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
                 }}});
     std::vector<std::string> numbers;
     for (int i = 1; i <= c.equilibrium->rates.value_or(0); ++i) numbers.push_back(std::to_string(i));
@@ -118,17 +130,18 @@ std::vector<double> energy_terms(const Bending& energy, const CurvedMesh& mesh) 
     return out;
 }
 
-Record frame_of(const Problem& c, const SurfaceEquilibrium& shape, std::size_t mesh_number) {
+Record frame_of(const ShapeRow& row, std::size_t mesh_number, int modes) {
+    const SurfaceEquilibrium& shape = row.shape;
     Record out;
-    out.mesh = mesh_number, out.kind = RecordKind::surface;
+    out.time = row.number, out.mesh = mesh_number, out.kind = RecordKind::surface;
     const CurvedMesh& mesh = shape.mesh;
     const CurvatureField field = PatchRecovery(mesh).projected(SurfaceSpace(mesh), mesh);
     Eigen::RowVectorXd energy_density(mesh.size());
-    for (int i = 0; i < mesh.size(); ++i) energy_density[i] = density(c.energy, field.H[i], field.K[i]).f;
+    for (int i = 0; i < mesh.size(); ++i) energy_density[i] = density(row.problem.bending, field.H[i], field.K[i]).f;
     out.numbers = {{"energy", shape.values.energy}, {"tension", shape.sigma}, {"pressure", -shape.lambda}};
     out.arrays = {array("points", node_positions(mesh)), array("normal", field.normal), array("H", field.H),
                   array("K", field.K), array("energy_density", energy_density)};
-    for (Eigen::Index i = 0; i < std::min<Eigen::Index>(shape.spectrum.vectors.cols(), c.equilibrium->rates.value_or(0)); ++i) {
+    for (Eigen::Index i = 0; i < std::min<Eigen::Index>(shape.spectrum.vectors.cols(), modes); ++i) {
         const Eigen::VectorXd w = shape.spectrum.vectors.col(i).head(mesh.size());
         out.arrays.push_back(array(fmt::format("mode_{}", i + 1), Eigen::VectorXd(w / w.cwiseAbs().maxCoeff())));
     }
@@ -150,26 +163,92 @@ std::string advice_for(Stop stop) {
     }
 }
 
-RunSummary summary_of(const Problem& c, SurfaceEquilibrium& shape) {
+// Rows, frames and meshes of the shapes, as they are found.
+class ShapeWriter {
+public:
+    ShapeWriter(const Problem& c, const Task& task, const RunClock& clock, RunObserver& observer)
+        : c_(c), task_(task), clock_(clock), observer_(observer), series_(shape_series(c)) {}
+
+    void operator()(const BranchPoint& point) {
+        const SurfaceEquilibrium& e = point.shape;
+        StationaryProblem problem = task_.problem;
+        if (task_.set) task_.set(problem, point.parameter);
+        const auto [height, r_max] = height_and_radius(e.mesh);
+        const std::vector<double> terms = energy_terms(problem.bending, e.mesh);
+        const ShapeRow row{count_, point, problem, e, terms, height, r_max, clock_.seconds()};
+        observer_.row(series_.values(row));
+        const std::size_t mesh_number = observer_.mesh(cells_of(e.mesh));
+        observer_.frame([&] {
+            Record out = frame_of(row, mesh_number, c_.equilibrium->rates.value_or(0));
+            if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
+            return out;
+        });
+        observer_.progress(point.parameter, e.values.energy, 0);
+        worst_ = std::max(worst_, e.estimated_error), iterations_ += e.iterations;
+        last_ = e;
+        ++count_;
+    }
+
+    int count() const { return count_; }
+    int iterations() const { return iterations_; }
+    double worst() const { return count_ > 0 ? std::min(worst_, 1.0) : 1; }
+    const SurfaceEquilibrium& last() const { return last_; }
+
+private:
+    const Problem& c_;
+    const Task& task_;
+    const RunClock& clock_;
+    RunObserver& observer_;
+    SeriesTable<ShapeRow> series_;
+    int count_ = 0, iterations_ = 0;
+    double worst_ = 0;
+    SurfaceEquilibrium last_;
+};
+
+// Writes the shape, or those of the branch, and says how it ended.
+StopReport find_shapes(const Problem& c, const Start& start, const Task& task, ShapeWriter& write) {
+    BranchPoint first;
+    first.shape = find_equilibrium(
+        task.problem, [&](int triangles) { return start.mesh(triangles, c.element_order).mesh; }, task.settings);
+    SurfaceEquilibrium& shape = first.shape;
     if (shape.stop == Stop::finished)
         if (const auto meets = find_self_intersection(shape.mesh))
             shape.stop = meets->reason, shape.message = meets->message;
+    if (shape.stop != Stop::finished || !task.set) {
+        first.parameter = task.branch.from, first.index = shape.spectrum.negative;
+        write(first);
+        return {shape.stop, 0, shape.stop == Stop::finished ? "the shape is stationary" : shape.message,
+                advice_for(shape.stop)};
+    }
+    BranchSettings settings = task.branch;
+    settings.found = [&](const BranchPoint& point) {
+        write(point);
+        pause_if_due();
+    };
+    const Branch branch = follow_branch(task.problem, shape, task.set, settings);
+    return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
+            advice_for(branch.stop)};
+}
+
+RunSummary summary_of(const Problem& c, const ShapeWriter& written, StopReport stop) {
+    const SurfaceEquilibrium& shape = written.last();
     RunSummary s;
     if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
-    s.stop = {shape.stop, 0, shape.stop == Stop::finished ? "the shape is stationary" : shape.message,
-              advice_for(shape.stop)};
+    stop.time = std::max(written.count() - 1, 0);
+    s.stop = std::move(stop);
     s.energy = shape.values.energy;
     s.reference_energy = shape.reference_energy;
     s.elements = shape.mesh.triangles();
-    s.estimated_error = std::min(shape.estimated_error, 1.0);
+    s.estimated_error = written.worst();
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    if (shape.stop == Stop::finished && !s.as_accurate_as_asked)
+    if (s.stop.reason == Stop::finished && !s.as_accurate_as_asked)
         s.warnings.push_back(fmt::format("the energy is less accurate than asked, {:.1e} for {:.1e} of E_ref: the "
                                          "triangles are given",
                                          s.estimated_error, c.accuracy.energy));
     s.effort = fmt::format("{} triangles of order {}, {} nodes, {} Newton steps", shape.mesh.triangles(),
-                           shape.mesh.order, shape.mesh.size(), shape.iterations);
-    s.details = {{"shapes", std::int64_t{1}},
+                           shape.mesh.order, shape.mesh.size(), written.iterations());
+    if (c.equilibrium->branch.parameter) s.effort = fmt::format("{} shapes; the last: {}", written.count(), s.effort);
+    s.details = {{"shapes", std::int64_t{written.count()}},
                  {"elements", std::int64_t{shape.mesh.triangles()}},
                  {"nodes", std::int64_t{shape.mesh.size()}},
                  {"order", std::int64_t{shape.mesh.order}}};
@@ -190,14 +269,17 @@ RunSummary run_equilibrium(const Problem& c, const Start& start, RunObserver& ob
     const RunClock clock(c.time, observer);
     return clock.pausing([&] {
         const Task task = task_of(c, start);
-        SurfaceEquilibrium shape = find_equilibrium(
-            task.problem, [&](int triangles) { return start.mesh(triangles, c.element_order).mesh; }, task.settings);
-        RunSummary s = summary_of(c, shape);
-        const auto [height, r_max] = height_and_radius(shape.mesh);
-        const std::vector<double> terms = energy_terms(c.energy, shape.mesh);
-        observer.row(shape_series(c).values({c, task, shape, terms, height, r_max, clock.seconds()}));
-        const std::size_t mesh_number = observer.mesh(cells_of(shape.mesh));
-        observer.frame([&] { return frame_of(c, shape, mesh_number); });
+        ShapeWriter write(c, task, clock, observer);
+        StopReport stop;
+        try {
+            stop = find_shapes(c, start, task, write);
+        } catch (const Paused& pause) {
+            if (write.count() == 0) throw;
+            stop = pause_report(pause, 0);
+            stop.message += " before all shapes were found";
+            stop.advice = "run the case again: equilibria are not resumed";
+        }
+        RunSummary s = summary_of(c, write, std::move(stop));
         s.warnings.insert(s.warnings.begin(), start.notes().begin(), start.notes().end());
         return s;
     });

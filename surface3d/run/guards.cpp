@@ -8,8 +8,7 @@
 
 #include "common/geometry/profile_point.hpp"
 #include "common/run/energy_checks.hpp"
-#include "surface3d/mesh/mapped_mesh.hpp"
-#include "surface3d/mesh/self_intersection.hpp"
+#include "surface3d/mesh/curved_intersection.hpp"
 
 namespace tubule::surface3d {
 
@@ -39,27 +38,10 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
     return std::nullopt;
 }
 
-namespace {
-
-// The number of periods of a tube among which are all triangles that may meet.
-int images(const CurvedMesh& mesh) {
-    if (mesh.period == 0) return 1;
-    double low = HUGE_VAL, high = -HUGE_VAL;
-    for (int cell = 0; cell < mesh.triangles(); ++cell)
-        for (int a = 0; a < mesh.nodes_per_cell(); ++a) {
-            const double z = mesh.position(cell, a).z();
-            low = std::min(low, z), high = std::max(high, z);
-        }
-    return 1 + static_cast<int>((high - low) / mesh.period);
-}
-
-}  // namespace
-
 std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
-    const TriangleMesh flat = node_triangles(mesh, images(mesh));
-    const auto pair = first_intersection(flat);
-    if (!pair) return std::nullopt;
-    const Eigen::Vector3d x = flat.corner(static_cast<int>(pair->first), 0);
+    const auto at = first_intersection(mesh);
+    if (!at) return std::nullopt;
+    const Eigen::Vector3d& x = *at;
     return StopReport{Stop::self_intersection, 0,
                       fmt::format("the surface intersects itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
                       "contact is not modelled: later results are invalid"};
