@@ -113,7 +113,7 @@ private:
 
 Branch follow_branch(const StationaryProblem& problem, const Equilibrium& start, const SetParameter& set,
                      const BranchSettings& settings) {
-    if (start.stop != Stop::finished) throw std::invalid_argument("a branch must start from an equilibrium");
+    check_branch(start.stop, settings.from, settings.to);
     CurveTier tier(problem, start, settings.shapes);
     return Follower(tier, problem, unknowns(start), set, settings).run();
 }

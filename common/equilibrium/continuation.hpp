@@ -19,6 +19,12 @@
 
 namespace tubule {
 
+// Throws std::invalid_argument for a branch that would not begin at an equilibrium, or end where it begins.
+inline void check_branch(Stop start, double from, double to) {
+    if (start != Stop::finished) throw std::invalid_argument("a branch must start from an equilibrium");
+    if (from == to) throw std::invalid_argument("the start and the end of a branch must differ");
+}
+
 enum class PointKind { regular, fold, bifurcation };
 
 template <class Shape>
@@ -90,7 +96,6 @@ public:
           settings_(settings),
           range_(std::abs(settings.to - settings.from)),
           lu_(tier.factors()) {
-        if (settings.from == settings.to) throw std::invalid_argument("the start and the end of a branch must differ");
         const double slack = 1e-9 * range_;
         low_ = std::min(settings.from, settings.to) - slack, high_ = low_ + range_ + 2 * slack;
         place_.w.resize(start.size() + 1);

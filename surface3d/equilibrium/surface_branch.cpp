@@ -136,7 +136,7 @@ private:
 
 Branch follow_branch(const StationaryProblem& problem, const SurfaceEquilibrium& start, const SetParameter& set,
                      const BranchSettings& settings) {
-    if (start.stop != Stop::finished) throw std::invalid_argument("a branch must start from an equilibrium");
+    check_branch(start.stop, settings.from, settings.to);
     try {
         SurfaceTier tier(problem, start, settings.shapes);
         return Follower(tier, problem, tier.start(), set, settings).run();

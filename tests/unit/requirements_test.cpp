@@ -35,7 +35,6 @@ const std::vector<Refused> refused{
     {moving, {"equilibrium.modes=2"}, "tier = \"axisym\""},
     {automatic, {"equilibrium.descend=true"}, "tier = \"axisym\" or"},
     {surface_equilibrium, {"equilibrium.family=prolate"}, "tier = \"axisym\""},
-    {surface_equilibrium, {"equilibrium.branch={vary=\"energy.k20\", to=2, step=0.1}"}, "tier = \"axisym\""},
     {surface_equilibrium, {H0_of_z}, "tier = \"axisym\" where [equilibrium] is"},
     {equilibrium, {"equilibrium.rates=2"}, "tier = \"surface3d\""},
     {equilibrium, {"model.kind=fluid", "equilibrium.modes=2"}, "a model without inertia"},
