@@ -107,6 +107,21 @@ InitialShape initial_shape(const Problem& c) {
             file ? start_profile(c, *file).note() : ""};
 }
 
+DerivativeCheck check_area_differences(const Problem& c) {
+    const Curve shape = meridian(std::get<Tube>(c.shape));
+    const CurveSpace space(Topology::tube, equal_breaks(12), 5, 4, shape.length);
+    const CurveForms forms(space, c.energy);
+    const auto M = [&](const Eigen::VectorXd& x) { return forms.M(x.data()); };
+    const auto weights = [&](const Eigen::VectorXd& x) { return Weights{.M = area_difference_force(c.energy, M(x))}; };
+    return check_derivatives([&](const Eigen::VectorXd& x) { return area_difference_energy(c.energy, M(x)); },
+                             [&](const Eigen::VectorXd& x) { return forms.gradient(weights(x), x); },
+                             [&](const Eigen::VectorXd& x, const Eigen::VectorXd& w) -> Eigen::VectorXd {
+                                 const Eigen::VectorXd slope = forms.gradient({.M = 1}, x);
+                                 return forms.hessian(weights(x), x) * w + *c.energy.alpha * slope.dot(w) * slope;
+                             },
+                             fit(space, shape));
+}
+
 double InitialShape::free_energy(const MotionLaw& law) const {
     return bending.energy + loads_at(law, 0).energy(area, volume, meridian.length);
 }

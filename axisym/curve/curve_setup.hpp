@@ -11,6 +11,7 @@
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/integration/time_integrator.hpp"
 #include "common/case/problem.hpp"
+#include "common/solve/derivative_check.hpp"
 
 namespace tubule::axisym {
 
@@ -27,6 +28,9 @@ struct InitialShape {
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
 };
 InitialShape initial_shape(const Problem& c);
+
+// Taylor slopes of alpha/2 (M - M0)^2 at the initial shape of a tube, with what its Hessian has of rank one.
+DerivativeCheck check_area_differences(const Problem& c);
 
 // The system of one run. Case and initial shape must outlive it.
 struct CurveSetup {

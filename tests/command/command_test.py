@@ -118,7 +118,11 @@ class Run(ProgramTest):
         for term in ("k20", "k42"):
             self.assertRegex(out, rf"case.toml: {term}\ngradient: right, .*\nHessian : right, ")
         self.assertNotIn("k40", out)  # not in use
+        self.assertNotIn("alpha", out)
         self.assertTrue(self.result.exists())
+        out, _ = self.tubule("run", self.case, "--check-derivatives", "--overwrite", "--set", "energy.alpha=0.3", "--set", "energy.M0=-20")
+        for term in ("k20", "k42", "alpha"):
+            self.assertRegex(out, rf"case.toml: {term}\ngradient: right, .*\nHessian : right, ")
 
 
 class Physics(ProgramTest):

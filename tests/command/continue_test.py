@@ -139,6 +139,19 @@ class Extended(Continued):
             self.assertAlmostEqual(ends[name][-1], whole[name][-1], delta=1e-6 * asked)
         self.assertEqual(self.frame_times(), [0, 0.02, 0.03, 0.045, 0.06])
 
+    def test_area_differences(self):
+        for case, first, end in ((CURVE, "0.03", "0.05"), (SURFACE[: SURFACE.index("output")], "0.01", "0.02")):
+            self.write("case.toml", case.replace("[energy]\n", "[energy]\nalpha = 0.4\nM0 = -30.0\n"))
+            self.tubule("run", "case.toml", "--until", end, "-o", "whole.hdf", "--overwrite")
+            self.tubule("run", "case.toml", "--until", first, "--overwrite")
+            self.tubule("run", "case.hdf", "--resume", "--until", end, "--set", "time.limit=1e-3", status=5)
+            self.tubule("run", "case.hdf", "--resume", "--set", "time.limit=1000")
+            ends, whole = series(self.result), series(self.folder / "whole.hdf")
+            self.assertEqual((ends["time"][-1], about(self.result)["stop"]), (float(end), "finished"))
+            self.assertGreater(abs(whole["M"][-1] - whole["M"][0]), 1e-2)
+            for name in ("energy", "energy_alpha", "M", "identity_defect"):
+                self.assertAlmostEqual(ends[name][-1], whole[name][-1], delta=1e-5 * whole["energy"][0], msg=name)
+
     def test_tier_auto(self):
         self.write("case.toml", QUICK.replace("axisym", "auto").replace("1e-6", "1e-4"))
         self.tubule("run", "case.toml", "--until", "0.4", "-o", "whole.hdf")

@@ -190,12 +190,15 @@ class Surface(ProgramTest):
 
     def test_a_state_of_another_version_is_refused(self):
         self.disturbed(signal.SIGTERM, 5)
-        with h5py.File(self.result, "r+") as file:
-            del file["checkpoint"].attrs["restart_lag"]
-        before = self.result.read_bytes()
-        err = self.tubule("run", self.case, "--resume", status=2)[1]
-        self.assertIn("restart_lag is missing; results of other versions may not have it", err)
-        self.assertEqual(self.result.read_bytes(), before)
+        kept = self.result.read_bytes()
+        for name in ("restart_lag", "restart_supplied"):
+            self.result.write_bytes(kept)
+            with h5py.File(self.result, "r+") as file:
+                del file["checkpoint"].attrs[name]
+            before = self.result.read_bytes()
+            err = self.tubule("run", self.case, "--resume", status=2)[1]
+            self.assertIn(f"{name} is missing; results of other versions may not have it", err)
+            self.assertEqual(self.result.read_bytes(), before)
 
     def test_kills_and_signals_lose_nothing(self):
         self.tubule("run", self.case, "-o", "whole.hdf")

@@ -121,14 +121,18 @@ class Found(EquilibriaTest):
         a = 0.5
         inside, beside = math.cos(a) ** 3 - math.sin(a) ** 3, math.cos(a) ** 3 + math.sin(a) ** 3
         neck = {inside: 1 / math.sin(a) - 1 / math.cos(a), beside: -1 / math.sin(a) - 1 / math.cos(a)}
-        for name, volume in (("sphere_in_sphere", inside), ("two_spheres", beside)):
-            self.scan("vesicle.toml", f"--over={VOLUME}={volume},{volume + 0.01}",
-                      f"--over={H0}={neck[volume] - 0.01},{neck[volume] + 0.01}", "--set=accuracy.energy=1e-2",
-                      f'--set={FAMILY}="prolate"', "-o", f"{name}.hdf")  # fmt: skip
-            with h5py.File(self.folder / f"{name}.hdf") as file:
-                values = file[f"thresholds/{name}/values"][()]
-            self.assertAlmostEqual(abs(values[0, 0]), 0.01, delta=1e-9)
-            self.assertAlmostEqual(values[0, 0], -values[0, 1], delta=1e-9)
+        # theory.md (2.20): with area differences for H0 - alpha (M - M0)/(2 k20), k20 = 1, M = -8 pi (R1 +- R2).
+        alpha, M0 = 0.7, -28
+        for name, volume, M in (("sphere_in_sphere", inside, -8 * math.pi * (math.cos(a) - math.sin(a))),
+                                ("two_spheres", beside, -8 * math.pi * (math.cos(a) + math.sin(a)))):  # fmt: skip
+            for sets, shift in ((), 0), ((f"--set=energy.alpha={alpha}", f"--set=energy.M0={M0}"), alpha * (M - M0) / 2):
+                at = neck[volume] + shift
+                self.scan("vesicle.toml", f"--over={VOLUME}={volume},{volume + 0.01}", f"--over={H0}={at - 0.01},{at + 0.01}",
+                          "--set=accuracy.energy=1e-2", f'--set={FAMILY}="prolate"', *sets, "-o", f"{name}.hdf", "--overwrite")  # fmt: skip
+                with h5py.File(self.folder / f"{name}.hdf") as file:
+                    values = file[f"thresholds/{name}/values"][()]
+                self.assertAlmostEqual(abs(values[0, 0]), 0.01, delta=1e-9)
+                self.assertAlmostEqual(values[0, 0], -values[0, 1], delta=1e-9)
 
     def test_along_a_line_only(self):
         """The points along the lines alone, and the crossings that the whole map has there."""

@@ -517,6 +517,11 @@ class Shown(ScanTest):
         picture = self.folder / "map.svg"
         self.plot(self.result, "-o", picture)
         self.assertIn("longest unduloid, L|H\u2080| = 2\u03c0", picture.read_text())
+        # Area differences cost energy on all of these but one: no line.
+        self.write("ade.toml", CASE.replace('parametrisation = "graph"', "").replace("k20 = ", "alpha = 0.01\nM0 = -20\nk20 = "))
+        self.scan("ade.toml", "--over", "shape.length=1.5:6:4", "--over", "energy.H0=-2:-1:3", "--set", "time.end=1e-3")
+        with h5py.File(self.result) as file:
+            self.assertEqual([name for name in file["thresholds"] if "unduloid" in name], [])
 
     def test_pearling_and_buckling(self):
         """theory.md (5.21), (5.23) with Sigma = 0 (free volume), c = H0 R, x = q^2: neutral where
@@ -524,19 +529,22 @@ class Shown(ScanTest):
         with m = 2 grows, as Sigma > -3 and c > -5/2, theory.md (5.24)."""
         case = CASE.replace("[shape]", '[model]\nkind = "overdamped"\nvolume = "free"\n[shape]')
         self.write("free.toml", case.replace('parametrisation = "graph"', ""))
-        self.scan("free.toml", "--over", "shape.length=3:12:4", "--over", f"{K42}=0:1:3", "--set", "time.end=1e-9")
-        with h5py.File(self.result) as file:
-            L, k42 = (file[f"axes/{i}/values"][:, 0] for i in (0, 1))
-            line = file["thresholds/pearling"]
-            found, first, second = (line[name][()] for name in ("values", "first", "second"))
-            buckling = file["thresholds/buckling/values"][()]
-            self.assertNotIn("rings", file["thresholds"])
-        k20, c, n = 0.2, -2, np.arange(1, 40)
-        x = (2 * np.pi * n / L[first, None]) ** 2
-        for j, k in enumerate(k42[second]):
-            np.testing.assert_allclose(found[:, j], -2 * k20 * ((1 + k / k20) * x**2 + 2 * c * x + 1).min(axis=1))
-            driven = -2 * k20 * x * ((1 + k / k20) * x + 2 * (1 + c))
-            np.testing.assert_allclose(buckling[:, j], driven.max(axis=1))
+        k20, M0, n = 0.2, -40, np.arange(1, 40)
+        for alpha in (0, 0.01):  # theory.md (2.20): H0 - alpha (M - M0)/(2 k20) stands for H0, M = -2 pi L
+            sets = ("--set", f"energy.alpha={alpha}", "--set", f"energy.M0={M0}") if alpha else ()
+            self.scan("free.toml", "--over", "shape.length=3:12:4", "--over", f"{K42}=0:1:3", "--set", "time.end=1e-9", *sets)
+            with h5py.File(self.result) as file:
+                L, k42 = (file[f"axes/{i}/values"][:, 0] for i in (0, 1))
+                line = file["thresholds/pearling"]
+                found, first, second = (line[name][()] for name in ("values", "first", "second"))
+                buckling = file["thresholds/buckling/values"][()]
+                self.assertNotIn("rings", file["thresholds"])
+            x = (2 * np.pi * n / L[first, None]) ** 2
+            c = -2 + alpha * (2 * np.pi * L[first, None] + M0) / (2 * k20)
+            for j, k in enumerate(k42[second]):
+                np.testing.assert_allclose(found[:, j], -2 * k20 * ((1 + k / k20) * x**2 + 2 * c * x + 1).min(axis=1))
+                driven = -2 * k20 * x * ((1 + k / k20) * x + 2 * (1 + c))
+                np.testing.assert_allclose(buckling[:, j], driven.max(axis=1))
 
     def test_thresholds_of_tensions(self):
         """theory.md (5.20), (5.21) at the tension of a reservoir, with c = H0 R and x = q^2."""

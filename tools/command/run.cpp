@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "axisym/curve/curve_setup.hpp"
 #include "axisym/graph/graph_derivatives.hpp"
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
@@ -187,7 +188,9 @@ bool derivatives_can_be_checked(const Problem& c) {
 // Prints the Taylor slopes of every term at the start; whether all are as they should be.
 bool derivatives_pass(const Problem& c) {
     bool pass = true;
-    for (const auto& [key, check] : axisym::check_terms(c)) {
+    std::vector<axisym::TermCheck> checks = axisym::check_terms(c);
+    if (c.energy.alpha) checks.push_back({"alpha", axisym::check_area_differences(c)});
+    for (const auto& [key, check] : checks) {
         say(stdout, "{}: {}\n{}\n", c.path, key, check.text());
         pass = pass && check.pass();
     }

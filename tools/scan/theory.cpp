@@ -24,23 +24,23 @@ int repeats(const Tube& tube) {
     return waves;
 }
 
-// E = INT k20 (H-H0)^2.
+// E = INT k20 (H-H0)^2, and area differences.
 bool only_k20(const Bending& energy) {
     bool only = true;
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only = only && (std::string_view(term.key) == "k20" ? energy.k[i] > 0 : energy.k[i] == 0);
     });
-    return only && energy.terms.empty() && !energy.alpha;
+    return only && energy.terms.empty();
 }
 
 // Whether its equilibria without energy are the surfaces of constant mean curvature H0, and of which period:
-// E = INT k20 (H-H0)^2 alone.
+// E = INT k20 (H-H0)^2 alone. Area differences cost energy on all of them but those with M = M0.
 std::optional<double> delaunay_period(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const MotionLaw& law = c.law;
     if (!tube || !law.unconstrained() || !law.without_loads()) return std::nullopt;
     const int waves = repeats(*tube);
-    if (!only_k20(c.energy) || waves == 0) return std::nullopt;
+    if (!only_k20(c.energy) || c.energy.alpha || waves == 0) return std::nullopt;
     return tube->length / waves;
 }
 
@@ -102,8 +102,8 @@ std::optional<double> waves_around(const Problem& c) {
     return driven_most(c, m);
 }
 
-// For a closed cell with given area and volume and the bending energy k20 alone: radius of the sphere of its area, and
-// its reduced volume.
+// For a closed cell with given area and volume and, but for area differences, the energy k20 alone: radius of the
+// sphere of its area, and its reduced volume.
 struct Vesicle {
     double radius, reduced_volume;
 };
@@ -117,7 +117,8 @@ std::optional<Vesicle> vesicle(const Problem& c) {
 }
 
 // Vesicles end as two spheres that touch in a neck without size, where -H0 is the sum of their mean curvatures,
-// 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): theory.md 8. `inside` -1: beside each other.
+// 1/R1 + 1/R2 (1/R1 - 1/R2 for one inside the other): theory.md 8. Area differences act as an H0, theory.md (2.20).
+// `inside` -1: beside each other.
 std::optional<double> spheres_with_neck(const Problem& c, double inside) {
     const auto v = vesicle(c);
     if (!v) return std::nullopt;
@@ -127,7 +128,9 @@ std::optional<double> spheres_with_neck(const Problem& c, double inside) {
     if (v->reduced_volume < volume(high)) return std::nullopt;
     for (int k = 0; k < 60; ++k) (volume((low + high) / 2) > v->reduced_volume ? low : high) = (low + high) / 2;
     const double neck = (inside / std::sin(low) - 1 / std::cos(low)) / v->radius;  // H0 of it
-    return inside * (c.energy.H0 - neck);
+    const double M = 8 * std::numbers::pi * v->radius * (inside * std::sin(low) - std::cos(low));
+    const double H0 = c.energy.H0 - area_difference_force(c.energy, M) / (2 * c.energy.k[term_number("k20")]);
+    return inside * (H0 - neck);
 }
 std::optional<double> two_spheres(const Problem& c) {
     return spheres_with_neck(c, -1);
