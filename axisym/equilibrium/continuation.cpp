@@ -28,7 +28,6 @@ public:
     double size() const { return size_; }
     int index(const Eigen::VectorXd& u) const { return static_cast<int>((lowest(u, 0).array() < 0).count()); }
     Eigen::VectorXd lowest(const Eigen::VectorXd& u, int) const { return system_->variation(u).eigenvalues; }
-    Eigen::VectorXd critical(const Eigen::VectorXd&, int) const { throw std::logic_error("this tier switches no branches"); }
 
     std::string meets_itself(const Eigen::VectorXd& u) const { return where(system_->space(), curve(u)); }
     std::string meets_itself(const Equilibrium& e) const { return where(*e.space, e.x); }

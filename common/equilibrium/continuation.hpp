@@ -41,7 +41,6 @@ struct BranchSettings {
     std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
     int max_steps = 500;
     ShapeSettings shapes;        // accuracy of each
-    bool switches = false;       // at the first bifurcation, to the branch along the critical displacement
     // Is given each as soon as it is known.
     std::function<void(const BranchPoint<Shape>&)> found = [](const BranchPoint<Shape>&) {};
 };
@@ -78,8 +77,6 @@ enum class Renewal { none, same_size, new_mesh, impossible };
 //   meets_itself(u), meets_itself(shape)   where, to follow "the shape intersects itself"; empty: nowhere
 //   report(place, problem, kind)           the shape; regular ones are found again with the parameter held
 //   index_of(point, problem, before)       of a point to report, given the number that the continuation counts
-//   critical(u, which)                     the eigenvector of that number, where the branch switches; what it needs to be
-//                                          simple is held
 template <class Tier>
 class Follower {
 public:
@@ -126,10 +123,6 @@ public:
                            fmt::format("no stationary shape found on the branch between the parameters {:.6g} and "
                                        "{:.6g}",
                                        before, next->parameter()));
-            if (switch_) {
-                take_switch(), step = 0.02;
-                continue;
-            }
             place_ = *next;
             if (auto stop = check()) return end(stop->first, std::move(stop->second));
             if (iterations <= 4) step = std::min(step * 1.6, 0.2);
@@ -284,12 +277,11 @@ private:
         };
         const bool turned = a.tangent[last()] * b.tangent[last()] < 0;
         if (turned) note(locate(a, b, step, [&](const Place& p) { return p.tangent[last()]; }), PointKind::fold);
-        const int after = index(b), before = index_ < 0 ? after : index_;
+        const int after = index(b), before = index_;
         if (after != before && (!turned || std::abs(after - before) > 1)) {
             const int which = std::min(before, after);  // ascending: the eigenvalue that changes its sign
             const auto at = locate(a, b, step, [&](const Place& p) { return eigenvalue(p, which); });
             note(at, PointKind::bifurcation);
-            if (settings_.switches && !switched_ && at) switch_ = {at->second, which};
         }
         for (double wanted : settings_.output) {
             const double left = a.parameter() - wanted, right = b.parameter() - wanted;
@@ -306,25 +298,9 @@ private:
             p.index = tier_.index_of(p, problem_at(p.parameter), before);
             branch_.points.push_back(std::move(p));
             settings_.found(branch_.points.back());
-            if (switch_ && branch_.points.back().kind == PointKind::bifurcation) break;
         }
         index_ = after;
         return complete;
-    }
-
-    // The branch goes on from the bifurcation along the critical displacement, the parameter at rest.
-    void take_switch() {
-        const int which = switch_->second;
-        place_ = std::move(switch_->first);
-        switch_.reset(), switched_ = true;
-        renew();
-        tier_.system().set_problem(problem_at(place_.parameter()));
-        const Eigen::VectorXd along = tier_.critical(place_.u(), which);
-        lu_ = tier_.factors();
-        place_.tangent.setZero(place_.w.size());
-        place_.tangent.head(along.size()) = along;
-        place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
-        index_ = -1;
     }
 
     // Whether the shape intersects itself; if so, sets the message of the branch.
@@ -378,9 +354,7 @@ private:
     double range_, low_ = 0, high_ = 0;
     decltype(std::declval<Tier&>().factors()) lu_;
     Place place_;
-    int index_ = 0;  // at the place; -1: the place is a bifurcation
-    std::optional<std::pair<Place, int>> switch_;  // where to leave the branch, and along which eigenvector
-    bool switched_ = false;
+    int index_ = 0;  // at the place
     Branch<Shape> branch_;
 };
 

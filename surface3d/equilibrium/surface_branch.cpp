@@ -95,21 +95,6 @@ public:
                            system_.base().triangles(), parameter, settings_.max_triangles);
     }
 
-    // On a surface of revolution the critical displacement can be turned around the axis: its phase is held.
-    Eigen::VectorXd critical(const Eigen::VectorXd& u, int which) {
-        const int n = static_cast<int>(system_.mesh(u).nodes.size());
-        const SurfaceSpectrum s = system_.spectrum(u, which + 4);
-        const std::vector<int> waves = system_.wave_numbers(u, s.vectors.topRows(n));
-        int partner = -1;
-        for (int j = 0; j < s.values.size(); ++j)
-            if (j != which && waves[which] > 0 && waves[j] == waves[which] &&
-                (partner < 0 ||
-                 std::abs(s.values[j] - s.values[which]) < std::abs(s.values[partner] - s.values[which])))
-                partner = j;
-        if (partner >= 0) system_.hold(s.vectors.col(partner));
-        return s.vectors.col(which);
-    }
-
 private:
     double kinks(const Eigen::VectorXd& u) const { return system_.values(u).kinks / system_.reference_energy(u); }
 

@@ -352,13 +352,6 @@ bool SurfaceSystem::take_new_mesh(const CurvedMesh& shape, int triangles, Eigen:
     return true;
 }
 
-void SurfaceSystem::hold(const Eigen::VectorXd& displacement) {
-    const Eigen::VectorXd image = mass_ * displacement.head(mass_.rows());
-    motions_.conservativeResize(shape_size(), motions_.cols() + 1);
-    motions_.rightCols<1>().setZero();
-    motions_.rightCols<1>().head(mass_.rows()) = image / std::sqrt(image.dot(displacement.head(mass_.rows())));
-}
-
 Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(unknowns());
     u[sigma()] = problem_.loads.tension, u[lambda()] = -problem_.loads.pressure;

@@ -62,8 +62,6 @@ public:
     // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each, if
     // that has one; -1 where there is none.
     std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
-    // Holds this displacement, too, until the base changes.
-    void hold(const Eigen::VectorXd& displacement);
     int held_motions() const { return static_cast<int>(motions_.cols()); }
 
 private:
