@@ -85,7 +85,7 @@ class FailedStart(ProgramTest):
 class Limits(ProgramTest):
     def test_the_time_limit_may_change_when_a_run_is_resumed(self):
         many = ["--set", "discretisation.elements=400"]
-        self.tubule("run", self.case, *many, "--set", "time.limit=1e-3", status=5)
+        self.tubule("run", self.case, *many, "--set", "time.limit=1e-9", status=5)
         self.assertIn("another case or other --set", self.refused("run", self.case, "--resume"))
         self.assertIn("another case or other --set",
                       self.refused("run", self.case, *many, "--resume", "--set", "energy.k20=0.6"))

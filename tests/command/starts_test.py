@@ -254,7 +254,7 @@ class DisturbedTest(Starts):
         small = self.write("small.toml", case('kind = "file"\npath = "mesh.off"\nscale = 0.01\n', more, "surface3d"))
         words = r"warning: time\.end = 1 is \S+e\+07 times the \S+e-08 in which bending moves .* set time\.end to \de-08 or so"
         self.assertRegex(self.tubule("check", small, "--quick")[1], words)
-        self.assertRegex(self.tubule("run", small, "--set", "time.limit=1e-3", status=5)[1], words)
+        self.assertRegex(self.tubule("run", small, "--set", "time.limit=1e-9", status=5)[1], words)
         fits = self.write("fits.toml", case('kind = "file"\npath = "mesh.off"\n', more, "surface3d"))
         self.assertNotIn("warning", self.tubule("check", fits, "--quick")[1])
 
