@@ -143,7 +143,7 @@ class Extended(Continued):
             self.write("case.toml", case.replace("[energy]\n", "[energy]\nalpha = 0.4\nM0 = -30.0\n"))
             self.tubule("run", "case.toml", "--until", end, "-o", "whole.hdf", "--overwrite")
             self.tubule("run", "case.toml", "--until", first, "--overwrite")
-            self.tubule("run", "case.hdf", "--resume", "--until", end, "--set", "time.limit=1e-3", status=5)
+            self.tubule("run", "case.hdf", "--resume", "--until", end, "--set", "time.limit=1e-9", status=5)
             self.tubule("run", "case.hdf", "--resume", "--set", "time.limit=1000")
             ends, whole = series(self.result), series(self.folder / "whole.hdf")
             self.assertEqual((ends["time"][-1], about(self.result)["stop"]), (float(end), "finished"))
