@@ -49,7 +49,7 @@ TEST(SurfaceBranch, prolates) {
         EXPECT_EQ(branch.points[i].parameter, settings.output[i]);
         EXPECT_EQ(branch.points[i].index, 0);
         EXPECT_LE(e.estimated_error, 3e-4);
-        EXPECT_NEAR(e.values.energy, energies[i], e.estimated_error * e.reference_energy) << i;
+        EXPECT_NEAR(e.values.energy, energies[i], 2 * e.estimated_error * e.reference_energy) << i;  // not a bound
     }
 }
 

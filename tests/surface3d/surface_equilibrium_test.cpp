@@ -35,7 +35,7 @@ TEST(SurfaceEquilibrium, prolateOfTheAxisymmetricTier) {
     const SurfaceEquilibrium e =
         find_equilibrium(vesicle(0.8), make, {.accuracy = 1e-4, .first_triangles = 80, .modes = 6});
     ASSERT_EQ(e.stop, Stop::finished) << e.message;
-    EXPECT_NEAR(e.values.energy, 34.870181359, e.estimated_error * e.reference_energy);
+    EXPECT_NEAR(e.values.energy, 34.870181359, 2 * e.estimated_error * e.reference_energy);  // not a bound
     EXPECT_LT(e.estimated_error, 1e-4);
     EXPECT_NEAR(e.sigma, -5.11116342, 5e-3);
     EXPECT_EQ(e.held_motions, 5);
