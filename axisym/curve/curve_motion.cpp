@@ -84,7 +84,9 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     S force_z = law.friction * v + drift;
     const S tension = ((2 * law.viscosity) * stretch_s - p) * ig2;
     if (law.inertia != 0) {
-        const S half = 0.5 * (divergence - n.supply), advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
+        // What a reservoir feeds has the velocity of the membrane at every point: only the pressure sees it.
+        const S half = law.reservoir ? S(0.0) : 0.5 * divergence,
+                advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
         force_r += law.inertia * (f.ur_t + advect * f.v[ur1] + half * u - w * w * inverse_r);
         force_z += law.inertia * (f.uz_t + advect * f.v[uz1] + half * v);
         if (law.swirls) {
@@ -411,12 +413,7 @@ void CurveMotion::add_law(double t, const double* y, const double* rate, double 
             const auto& f = at.fields;
             const Pack dS = (2 * pi) * f.v[r0] * sqrt(f.v[r1] * f.v[r1] + f.v[z1] * f.v[z1]);
             if (at_.drift >= 0) add_column(at_.drift, velocity_z, e, g, weight * dS, values);
-            if (at_.supply >= 0) {
-                add_column(at_.supply, pressure, e, g, weight * dS, values);
-                for (const int part : {velocity_r, velocity_z, swirl})
-                    add_column(at_.supply, part, e, g,
-                               (-0.5 * law_.inertia) * weight * dS * f.v[Local::first_slot(part)], values);
-            }
+            if (at_.supply >= 0) add_column(at_.supply, pressure, e, g, weight * dS, values);
             if (at_.shift >= 0) {
                 add_column(at_.shift, curve_r, e, g, weight * (2 * pi) * f.v[r0] * f.v[r1], values);
                 add_column(at_.shift, curve_z, e, g, weight * (2 * pi) * f.v[r0] * f.v[z1], values);
@@ -577,7 +574,8 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
     const PointNumbers numbers = point_numbers(t, y);
     Balance out;
     Pack pressure_sum{0.0}, area{0.0}, pull{0.0};
-    Pack kinetic{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0}, acceleration{0.0};
+    Pack kinetic{0.0}, supplied{0.0}, dissipation{0.0}, momentum{0.0}, angular{0.0}, divergence{0.0}, speed{0.0},
+        acceleration{0.0};
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const Local at(*this, e, g, y, rate);
@@ -595,7 +593,9 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             const Pack square = u * u + v * v + w * w;
             const Pack ss = (r_s * f.v[ur1] + z_s * (f.v[uz1] + numbers.stretch * z_s)) * ig * ig, tt = u / r;
             const Pack shear = 0.5 * (f.v[w1] - w * r_s / r) * ig;
-            kinetic += (0.5 * law_.inertia) * dS * square;
+            const Pack kinetic_here = (0.5 * law_.inertia) * dS * square;
+            kinetic += kinetic_here;
+            if (law_.reservoir) supplied += kinetic_here * (ss + tt);
             dissipation += dS * (law_.friction * square + 2 * law_.viscosity * (ss * ss + tt * tt + 2 * shear * shear));
             acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
             momentum += dS * v;
@@ -606,7 +606,7 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             pull += dS * (2 * law_.viscosity * ss - f.v[p0]) * z_s * z_s * ig * ig;
             speed = stdx::max(speed, square);
         }
-    out.kinetic = stdx::reduce(kinetic), out.supplied = numbers.supply * out.kinetic;
+    out.kinetic = stdx::reduce(kinetic), out.supplied = stdx::reduce(supplied);
     out.dissipation = stdx::reduce(dissipation);
     out.momentum_z = space().images() == 2 ? 0 : stdx::reduce(momentum);  // the other half has the opposite
     out.angular_z = stdx::reduce(angular);

@@ -1,5 +1,6 @@
 #include "surface3d/motion/mesh_motion.hpp"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 
@@ -79,6 +80,17 @@ VectorField tangential(const VectorField& v, const VectorField& normal) {
     return v - normal * along(v, normal).asDiagonal();
 }
 
+// The translation whose flux is nearest to that given. A tube may be nearly straight: none along its axis.
+Eigen::Vector3d translation(const System& system, const VectorField& normal, const Eigen::VectorXd& flux, bool tube) {
+    const int free = tube ? 2 : 3;
+    Eigen::MatrixXd of_unit(flux.size(), free);
+    for (int d = 0; d < free; ++d) of_unit.col(d) = system.flux[d] * Eigen::VectorXd::Ones(flux.size());
+    const Eigen::MatrixXd across = normal.topRows(free);
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    out.head(free) = (across * of_unit).partialPivLu().solve(across * flux);
+    return out;
+}
+
 // Tangential motions of the nodes. A uniform motion along a tube is excluded: nothing resists it on a straight tube,
 // and on a nearly straight one it would be amplified noise.
 struct AlongSurface {
@@ -153,14 +165,20 @@ VectorField MeshMotion::velocity(const SurfaceSpace& space, const CurvedMesh& me
     shifted.diagonal().array() += shift / space.size();
     laplacian_.factor(shifted);
 
+    // Relative to a frame that moves with the surface, so that a motion does not depend on the frame.
+    const bool tube = mesh.period > 0;
+    const VectorField frame = translation(system, normal, flux, tube).replicate(1, space.size());
+    Eigen::VectorXd relative = flux;
+    for (int d = 0; d < 3; ++d) relative -= system.flux[d] * frame.row(d).transpose();
+
     VectorField w = VectorField::Zero(3, space.size());
-    meet_flux(system, project, normal, flux, w);
+    meet_flux(system, project, normal, relative, w);
     const VectorField left = system.pull / relaxation - times(system.L, w);
-    const AlongSurface along_surface(normal, mesh.period > 0);
+    const AlongSurface along_surface(normal, tube);
     w += solve_along(along_surface, system.L, laplacian_,
                      without_multiplier(system, project, normal, along_surface, left));
-    meet_flux(system, project, normal, flux, w);
-    return w;
+    meet_flux(system, project, normal, relative, w);
+    return w + frame;
 }
 
 }  // namespace tubule::surface3d

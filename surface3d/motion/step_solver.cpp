@@ -199,7 +199,8 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     if (surface_.law().inertia == 0) return flux;
     using Row = Eigen::Matrix<double, 1, Eigen::Dynamic>;
     const Eigen::SparseMatrix<double>& along = system_.advection;
-    const Row back = base.displacement.cwiseProduct(base.fields.normal).colwise().sum();
+    const Eigen::VectorXd moved = base.displacement.transpose().reshaped();
+    const Row back = surface_.projection()(Row(surface_.flux(moved, *base.mesh, base.fields).transpose()));
     const Eigen::VectorXd b = flux + along * back.transpose();
     Eigen::VectorXd out = b;
     const auto carried = [&](const Eigen::VectorXd& x, Eigen::VectorXd& y) {

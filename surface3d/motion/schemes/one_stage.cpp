@@ -30,12 +30,16 @@ double estimated_error(const MotionState& from, const PastState* past, const One
 
 StageSolution OneStageScheme::solve(const MotionState& from, const PastState* past, const OneStage& stage, double tau,
                                     const Extent& missed) {
-    const double r = past ? tau / from.step : 0;
+    // Without a past: with inertia the nodes have moved as they do now, so that a surface that drifts keeps its
+    // velocity; without it the first motion of the nodes may be one that fades within a step.
+    const bool drifts = !past && surface().law().inertia != 0;
+    const double r = past ? tau / from.step : drifts ? 1 : 0;
     const auto ahead = [&](double level, const auto& now, const auto& before) {
         using Value = std::decay_t<decltype(now)>;
-        return past ? Value((1 + level * r) * now - level * r * before) : now;
+        return r != 0 ? Value((1 + level * r) * now - level * r * before) : now;
     };
-    const PastState before = past ? *past : PastState(from);
+    PastState before = past ? *past : PastState(from);
+    if (drifts) before.X -= tau * from.w;
     const Stage expected{from.time + stage.level * tau,
                          stage.te,
                          stage.Xbar,
