@@ -29,6 +29,14 @@ public:
     int index(const Eigen::VectorXd& u) const { return static_cast<int>((lowest(u, 0).array() < 0).count()); }
     Eigen::VectorXd lowest(const Eigen::VectorXd& u, int) const { return system_->variation(u).eigenvalues; }
 
+    void leave(Place& place, int mode, double far) const {
+        const int n = system_->space().size();
+        const Eigen::VectorXd along = system_->variation(place.u(), mode).vectors.col(mode - 1);
+        place.w.head(n) += far / along.cwiseAbs().maxCoeff() * along;
+        place.tangent = Eigen::VectorXd::Zero(place.w.size());
+        place.tangent.head(n) = along;
+    }
+
     std::string meets_itself(const Eigen::VectorXd& u) const { return where(system_->space(), curve(u)); }
     std::string meets_itself(const Equilibrium& e) const { return where(*e.space, e.x); }
 
@@ -64,8 +72,8 @@ public:
         const double allowed = std::max(settings_.accuracy, 1e-11) * system_->forms().reference_energy(x);
         if (lost(defect) <= allowed) return Renewal::none;
         const SplineSpace& splines = system_->space().splines();
-        std::vector<double> breaks = adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(),
-                                                    settings_.max_elements + 1);
+        std::vector<double> breaks =
+            adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(), settings_.max_elements + 1);
         if (static_cast<int>(breaks.size()) - 1 > settings_.max_elements) return Renewal::impossible;
         const auto finer =
             std::make_shared<CurveSpace>(system_->space().topology(), breaks, splines.degree(), splines.smoothness(),

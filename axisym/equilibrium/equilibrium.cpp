@@ -135,12 +135,12 @@ double StationarySystem::merit(const Eigen::VectorXd& u) const {
 }
 
 Eigen::VectorXd StationarySystem::way_down(const Eigen::VectorXd& u) const {
-    Variation v = variation(u, true);
+    const Variation v = variation(u, 1);
     if (v.eigenvalues[0] >= -1e-9 * reference_energy(u)) return {};
-    return std::move(v.lowest);
+    return v.vectors.col(0);
 }
 
-Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) const {
+Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) const {
     check_pause();
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
@@ -168,12 +168,12 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, bool vectors) co
         hessian.applyOnTheLeft(qr.householderQ().transpose());
         hessian.applyOnTheRight(qr.householderQ());
     }
-    const Eigenpairs eigen = eigenpairs(hessian.bottomRightCorner(free, free), vectors);
+    const Eigenpairs eigen = eigenpairs(hessian.bottomRightCorner(free, free), vectors > 0);
     Variation out{eigen.values, {}};
-    if (!vectors) return out;
-    out.lowest = Eigen::VectorXd::Zero(n);
-    out.lowest.tail(free) = eigen.vectors.col(0);
-    if (constraints > 0) out.lowest.applyOnTheLeft(qr.householderQ());
+    if (vectors == 0) return out;
+    out.vectors = Eigen::MatrixXd::Zero(n, std::min(vectors, free));
+    out.vectors.bottomRows(free) = eigen.vectors.leftCols(out.vectors.cols());
+    if (constraints > 0) out.vectors.applyOnTheLeft(qr.householderQ());
     return out;
 }
 

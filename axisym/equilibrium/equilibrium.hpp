@@ -17,9 +17,10 @@
 
 namespace tubule::axisym {
 
-// Eigenvalues, ascending, of which only the signs have a meaning of their own; and the direction of the first.
+// Eigenvalues, ascending, of which only the signs have a meaning of their own; and the directions of the first ones.
 struct Variation {
-    Eigen::VectorXd eigenvalues, lowest;
+    Eigen::VectorXd eigenvalues;
+    Eigen::MatrixXd vectors;
 };
 
 // The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve (the last of them the
@@ -53,9 +54,9 @@ public:
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping = 0) const;
     // E + gauge J + multipliers times the constraints they belong to: its derivative is F, where the constraints hold.
     double merit(const Eigen::VectorXd& u) const;
-    // The second variation of that on the displacements (of coefficients) which keep the constraints and the place;
-    // `lowest` with `vectors` only.
-    Variation variation(const Eigen::VectorXd& u, bool vectors = false) const;
+    // The second variation of that on the displacements (of coefficients) which keep the constraints and the place,
+    // with this many of its vectors.
+    Variation variation(const Eigen::VectorXd& u, int vectors = 0) const;
 
     // What Newton's method asks for (common/equilibrium/newton.hpp).
     Eigen::VectorXd constraint_residual(const Eigen::VectorXd& u) const;

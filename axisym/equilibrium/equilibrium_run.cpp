@@ -99,6 +99,7 @@ Task task_of(const Problem& c) {
         branch.shapes = task.settings;
         branch.output = branch_outputs(c, task.problem);
         branch.from = branch.output.front(), branch.to = branch.output.back();
+        branch.mode = b.mode.value_or(0), branch.amplitude = b.amplitude.value_or(branch.amplitude);
     }
     const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
     check_problem(c, task.problem, closed ? 0 : task.start.length);

@@ -28,6 +28,8 @@ inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduce
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
     std::optional<double> to, step;
+    std::optional<int> mode;          // it bifurcates from the first shape along this mode, 1 the lowest
+    std::optional<double> amplitude;  // of that mode where the branch begins, over the radius of a sphere of this area
 };
 
 // Words if a branch has no shapes, or too many; else empty.
@@ -133,9 +135,13 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         k.choice("vary", e.branch.parameter, parameters);
         k.number("to", e.branch.to);
         k.number("step", e.branch.step, {.above = 0});
+        k.integer("mode", e.branch.mode, {.from = 1, .to = 100});
+        k.number("amplitude", e.branch.amplitude, {.from = 0.001, .to = 0.5});
+        k.check("amplitude", [&] { return e.branch.amplitude && !e.branch.mode ? "is that of a mode: see mode" : ""; });
         k.check("", [&] {
             const BranchChoices& b = e.branch;
-            if (!b.parameter) return b.to || b.step ? "needs vary: the key that changes along the branch" : "";
+            if (!b.parameter)
+                return b.to || b.step || b.mode ? "needs vary: the key that changes along the branch" : "";
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
             if (*b.parameter == vary_alpha || *b.parameter == vary_M0)
                 return energy.alpha ? "" : "varies what the energy does not have: see energy.alpha";

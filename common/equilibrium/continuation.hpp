@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/equilibrium/equilibrium_task.hpp"
+#include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
 
@@ -40,7 +41,11 @@ struct BranchSettings {
     double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
     std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
     int max_steps = 500;
-    ShapeSettings shapes;        // accuracy of each
+    // Not 0: the branch that leaves the first shape along this mode, 1 the lowest of the second variation. It begins
+    // where the mode's largest displacement is `amplitude` times the radius of a sphere of the same area.
+    int mode = 0;
+    double amplitude = 0.05;
+    ShapeSettings shapes;  // accuracy of each
     // Is given each as soon as it is known.
     std::function<void(const BranchPoint<Shape>&)> found = [](const BranchPoint<Shape>&) {};
 };
@@ -72,6 +77,7 @@ enum class Renewal { none, same_size, new_mesh, impossible };
 //   size()                    the length that displacements are compared with
 //   index(u)                  negative directions
 //   lowest(u, count)          at least that many lowest eigenvalues of the second variation, ascending
+//   leave(place, mode, far)   moves the place by a mode, its largest displacement `far`; this is the tangent then
 //   renew(place)              other unknowns for the same shape and tangent, a better mesh where this one is too coarse
 //   why_not_renewed(parameter)             words for the latter
 //   meets_itself(u), meets_itself(shape)   where, to follow "the shape intersects itself"; empty: nowhere
@@ -100,11 +106,15 @@ public:
     }
 
     Branch<Shape> run() {
-        set_tangent(place_, unit_parameter());
-        if ((settings_.to - settings_.from) * place_.tangent[last()] < 0) place_.tangent *= -1;
-        renew();
-        index_ = index(place_);
-        output_at(settings_.from);
+        if (settings_.mode > 0) {
+            if (auto stop = leave()) return end(stop->first, std::move(stop->second));
+        } else {
+            set_tangent(place_, unit_parameter());
+            if ((settings_.to - settings_.from) * place_.tangent[last()] < 0) place_.tangent *= -1;
+            renew();
+            index_ = index(place_);
+            output_at(settings_.from);
+        }
         double step = 0.02;
         while (branch_.steps < settings_.max_steps) {
             int iterations = 0;
@@ -140,6 +150,40 @@ private:
         return std::move(branch_);
     }
     int last() const { return static_cast<int>(place_.w.size()) - 1; }
+
+    // From the first shape to the branch that bifurcates along a mode: at a given distance along it, with the parameter
+    // to be found. The branch of the first shape, where the mode's amplitude is zero, is excluded.
+    std::optional<std::pair<Stop, std::string>> leave() {
+        const Place first = place_;
+        double far = settings_.amplitude * tier_.size() / std::sqrt(4 * pi);
+        for (int attempt = 0; attempt < 4; ++attempt, far /= 2) {
+            place_ = first;
+            tier_.system().set_problem(problem_at(first.parameter()));
+            tier_.leave(place_, settings_.mode, far);
+            place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
+            lu_ = tier_.factors();
+            int iterations = 0;
+            const auto found = advance(place_, 0, iterations);
+            if (!found) continue;
+            place_ = *found;
+            // It may begin a little outside of the interval, and lead into it.
+            low_ = std::min(low_, place_.parameter()), high_ = std::max(high_, place_.parameter());
+            renew();
+            index_ = index(place_);
+            record(point(place_, PointKind::bifurcation), index_);
+            return std::nullopt;
+        }
+        return {
+            {Stop::solver_failed, fmt::format("no branch was found along mode {} of the first shape: its eigenvalue "
+                                              "must be nearly zero",
+                                              settings_.mode)}};
+    }
+
+    void record(Point p, int index) {
+        p.index = index;
+        branch_.points.push_back(std::move(p));
+        settings_.found(branch_.points.back());
+    }
 
     // Whether the branch ends at the place reached; if not, with new unknowns where that is better.
     std::optional<std::pair<Stop, std::string>> check() {
@@ -241,9 +285,10 @@ private:
         return tier_.lowest(p.u(), which + 1)[which];
     }
 
-    // Where f vanishes between a and b, at distance `step` from it: regula falsi (Illinois).
+    // Where f vanishes between a and b, at distance `step` from it, up to this fraction of its change: regula falsi
+    // (Illinois).
     template <class F>
-    std::optional<At> locate(const Place& a, const Place& b, double step, F&& f) {
+    std::optional<At> locate(const Place& a, const Place& b, double step, F&& f, double tolerance = 1e-9) {
         double low = 0, high = step, at_a = f(a), at_b = f(b);
         // Another mesh has moved a zero past an end.
         if ((at_a < 0) == (at_b < 0)) return std::abs(at_a) < std::abs(at_b) ? At{0, a} : At{step, b};
@@ -256,7 +301,7 @@ private:
             if (!place) return best;
             best = {middle, *place};
             const double value = f(*place);
-            if (std::abs(value) < 1e-9 * scale) break;
+            if (std::abs(value) < tolerance * scale) break;
             if ((value < 0) == (at_a < 0)) {
                 low = middle, at_a = value, at_b /= 2;
             } else {
@@ -266,8 +311,28 @@ private:
         return best;
     }
 
+    // The place at a parameter between those of a and b: near it, then by Newton's method with the parameter held,
+    // which only a fold close by prevents.
+    std::optional<At> at_parameter(const Place& a, const Place& b, double step, double wanted) {
+        const auto past = [&](const Place& p) { return p.parameter() - wanted; };
+        std::optional<At> at = locate(a, b, step, past, 1e-2);
+        if (!at) return at;
+        Place held{at->second.w, unit_parameter()};
+        if (at->second.tangent[last()] < 0) held.tangent *= -1;
+        held.w[last()] = wanted;
+        int iterations = 0;
+        if (auto exact = advance(held, 0, iterations)) return At{at->first, std::move(*exact)};
+        at = locate(a, b, step, past);
+        if (at) at->second.w[last()] = wanted;
+        return at;
+    }
+
     // Everything to report between two points of the branch, in its order. False if a point is not found.
-    bool record_between(const Place& a, const Place& b, double step) {
+    bool record_between(const Place& a, Place b, double step) {
+        // Nothing is looked for beyond the end of the interval.
+        const double end = std::clamp(b.parameter(), low_, high_);
+        if (end != b.parameter())
+            if (const auto at = at_parameter(a, b, step, end)) step = at->first, b = at->second;
         std::vector<std::pair<double, Point>> found;
         bool complete = true;
         const auto note = [&](const std::optional<At>& at, PointKind kind) {
@@ -285,19 +350,14 @@ private:
         }
         for (double wanted : settings_.output) {
             const double left = a.parameter() - wanted, right = b.parameter() - wanted;
-            if (wanted != settings_.from || branch_.steps > 1)
-                if (left * right < 0 || right == 0) {
-                    auto at = locate(a, b, step, [&](const Place& p) { return p.parameter() - wanted; });
-                    if (at) at->second.w[last()] = wanted;
-                    note(at, PointKind::regular);
-                }
+            if (wanted != settings_.from || branch_.steps > 1 || settings_.mode > 0)
+                if (left * right < 0 || right == 0) note(at_parameter(a, b, step, wanted), PointKind::regular);
         }
         std::sort(found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
         for (auto& [distance, p] : found) {
             if (met_itself(tier_.meets_itself(p.shape), p.parameter)) break;
-            p.index = tier_.index_of(p, problem_at(p.parameter), before);
-            branch_.points.push_back(std::move(p));
-            settings_.found(branch_.points.back());
+            const int counted = tier_.index_of(p, problem_at(p.parameter), before);
+            record(std::move(p), counted);
         }
         index_ = after;
         return complete;
@@ -312,11 +372,7 @@ private:
 
     void output_at(double parameter) {
         for (double wanted : settings_.output)
-            if (wanted == parameter) {
-                branch_.points.push_back(point(place_, PointKind::regular));
-                branch_.points.back().index = index_;
-                settings_.found(branch_.points.back());
-            }
+            if (wanted == parameter) record(point(place_, PointKind::regular), index_);
     }
 
     Point point(const Place& place, PointKind kind) {

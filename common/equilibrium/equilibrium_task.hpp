@@ -21,8 +21,8 @@ SetParameter setter(int parameter);
 // Its value in the problem.
 double parameter_value(int parameter, const StationaryProblem& p);
 
-// The parameters at which shapes of the branch are asked for, in order, from the problem's value to equilibrium.branch's
-// end. Throws CaseError where these are none, or too many.
+// The parameters at which shapes of the branch are asked for, in order, from the problem's value to
+// equilibrium.branch's end. Throws CaseError where these are none, or too many.
 std::vector<double> branch_outputs(const Problem& c, const StationaryProblem& problem);
 
 // What is wrong with the problem on a shape of this period (0: closed), as a CaseError that names the key.

@@ -89,7 +89,9 @@ private:
     }
 
     auto shape(const Eigen::VectorXd& u) const { return u.head(system_.shape_size()); }
-    double relative(const Eigen::VectorXd& step) const { return shape(step).template lpNorm<Eigen::Infinity>() / size_; }
+    double relative(const Eigen::VectorXd& step) const {
+        return shape(step).template lpNorm<Eigen::Infinity>() / size_;
+    }
     // The merit of a shape with the multipliers of u.
     double merit_at(const Eigen::VectorXd& x, Eigen::VectorXd u) const {
         u.head(x.size()) = x;

@@ -58,7 +58,8 @@ struct Frame {
         }
         area_slope = cross.transpose() * normal;
         normal_slope = (cross - normal * area_slope.transpose()) / area;
-        area_second = (cross.transpose() * cross - area_slope * area_slope.transpose()) / area + along(normal / area) * area;
+        area_second =
+            (cross.transpose() * cross - area_slope * area_slope.transpose()) / area + along(normal / area) * area;
     }
     // Second derivatives of v . (t x c) in (t, c).
     static Matrix6 along(const Eigen::Vector3d& v) {
@@ -77,12 +78,13 @@ struct Frame {
         return out / area;
     }
     Curvatures curvatures() const {
-        const Form g11 = Form::variable(t.dot(t), 0), g12 = Form::variable(t.dot(c), 1), g22 = Form::variable(c.dot(c), 2);
+        const Form g11 = Form::variable(t.dot(t), 0), g12 = Form::variable(t.dot(c), 1),
+                   g22 = Form::variable(c.dot(c), 2);
         const Form b11 = Form::variable(second[0].dot(normal), 3), b12 = Form::variable(second[1].dot(normal), 4),
                    b22 = Form::variable(second[2].dot(normal), 5);
         const Form det = g11 * g22 - g12 * g12, inverse_det = inverse(det);
-        return {sqrt(det), (b11 * g22 - 2.0 * (b12 * g12) + b22 * g11) * inverse_det, (b11 * b22 - b12 * b12) * inverse_det,
-                g11, b11};
+        return {sqrt(det), (b11 * g22 - 2.0 * (b12 * g12) + b22 * g11) * inverse_det,
+                (b11 * b22 - b12 * b12) * inverse_det, g11, b11};
     }
 };
 
@@ -348,7 +350,8 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
         Square part = weight * lambda * 0.5 * moved.transpose() * turned;
         if (d.stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
             part.col(n - 1).setZero(), part.row(n - 1).setZero();
-            part.row(n - 1).head(n - 1) = weight * lambda * (moved.leftCols(n - 1).transpose() * turned.col(n - 1)).transpose();
+            part.row(n - 1).head(n - 1) =
+                weight * lambda * (moved.leftCols(n - 1).transpose() * turned.col(n - 1)).transpose();
         }
         out.second += part + part.transpose();
     }
@@ -464,7 +467,8 @@ void DiscreteEnergy::add(const Block& block, const std::vector<int>& nodes, cons
     for (int i = 0; i < n; ++i) {
         out.energy[nodes[i]] += block.energy[i], out.area[nodes[i]] += block.area[i];
         out.volume[nodes[i]] += block.volume[i], out.M[nodes[i]] += block.M[i];
-        for (int j = 0; j < block.second.cols() && j < n; ++j) out.hessian.valuePtr()[slots[i * n + j]] += block.second(j, i);
+        for (int j = 0; j < block.second.cols() && j < n; ++j)
+            out.hessian.valuePtr()[slots[i * n + j]] += block.second(j, i);
     }
     if (out.with_stretch.size() == 0) return;
     out.energy[N] += block.energy[n], out.area[N] += block.area[n], out.volume[N] += block.volume[n];
@@ -502,8 +506,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
             nodes.clear();
             const bool is_cell = i < cells;
             for (int s = 0; s < (is_cell ? 1 : 2); ++s)
-                for (int a = 0; a < n; ++a)
-                    nodes.push_back(space_.node(is_cell ? i : edges_[i - cells].cell[s], a));
+                for (int a = 0; a < n; ++a) nodes.push_back(space_.node(is_cell ? i : edges_[i - cells].cell[s], a));
             const int* slots = is_cell ? &cell_slots_[static_cast<std::size_t>(i) * n * n]
                                        : &edge_slots_[static_cast<std::size_t>(i - cells) * 4 * n * n];
             add(blocks[i - begin], nodes, slots, out);

@@ -49,12 +49,13 @@ public:
     // Of a mesh with these triangles; where areas differ, of an energy with_M(). H0 at the nodes, where it varies.
     EnergyValues values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0 = {}) const;
     EnergyDerivatives derivatives(const CurvedMesh& mesh, const Directions& directions, const Bending& bending,
-                                  double sigma, double lambda, const Eigen::VectorXd& H0 = {}, bool second = true) const;
+                                  double sigma, double lambda, const Eigen::VectorXd& H0 = {},
+                                  bool second = true) const;
     // INT w_i w_j (n.nu)^2 dS
     Eigen::SparseMatrix<double> mass(const CurvedMesh& mesh, const Directions& directions) const;
 
     // Beside the least that makes elements of this order stable in theory: docs/decisions/equilibria.md
-    double penalty_factor = getenv("PF") ? atof(getenv("PF")) : 4;
+    static constexpr double penalty_factor = 4;
 
 private:
     struct Edge {

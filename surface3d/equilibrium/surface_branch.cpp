@@ -41,6 +41,20 @@ public:
     // One more than asked for: the last one is the least accurate.
     Eigen::VectorXd lowest(const Eigen::VectorXd& u, int count) const { return system_.spectrum(u, count + 1).values; }
 
+    // The displaced shape becomes the base, so that its turns, which were none on a surface of revolution, are held.
+    void leave(Place& place, int mode, double far) {
+        Eigen::VectorXd u = place.u();
+        Eigen::VectorXd along = system_.spectrum(u, mode + 1).vectors.col(mode - 1);
+        u.head(along.size()) += far / along.head(system_.space().size()).cwiseAbs().maxCoeff() * along;
+        const double parameter = place.parameter();
+        system_.rebase(u, &along);
+        u.tail(SurfaceSystem::most_motions).setZero();
+        place.w.resize(u.size() + 1);
+        place.w << u, parameter;
+        place.tangent = Eigen::VectorXd::Zero(place.w.size());
+        place.tangent.head(along.size()) = along;
+    }
+
     std::string meets_itself(const Eigen::VectorXd& u) const { return where(system_.mesh(u)); }
     std::string meets_itself(const SurfaceEquilibrium& e) const { return where(e.mesh); }
 
@@ -62,10 +76,13 @@ public:
             Settings settings = settings_;
             settings.descend = false, settings.near = true;
             settings.first_triangles = static_cast<int>(e.mesh.triangles() / finer_by);
-            SurfaceEquilibrium better =
-                find_equilibrium(problem, [&](int triangles) { return meshed(e.mesh, triangles); }, settings);
-            if (better.stop == Stop::finished) return better;
-            e.estimated_error = std::max(e.estimated_error, better.estimated_error);
+            SurfaceEquilibrium better = find_equilibrium(
+                problem, [&](int triangles) { return meshed(e.mesh, triangles); }, settings);
+            // Close to a bifurcation other meshes may lead to the other branch.
+            const bool found = better.stop == Stop::finished;
+            if (found && better.spectrum.negative == system_.index(u)) return better;
+            const double apart = std::abs(better.values.energy - e.values.energy) / e.reference_energy;
+            e.estimated_error = std::max(e.estimated_error, found ? apart : better.estimated_error);
         }
         e.spectrum = system_.spectrum(u, std::max(settings_.modes, 1));
         e.wave_numbers = system_.wave_numbers(u, e.spectrum.vectors.topRows(e.mesh.size()));
@@ -90,9 +107,10 @@ public:
         return remeshed ? Renewal::new_mesh : Renewal::same_size;
     }
     std::string why_not_renewed(double parameter) const {
-        return fmt::format("the mesh of {} triangles does not resolve the shape at parameter {:.6g}, and there is no "
-                           "better one of at most {}",
-                           system_.base().triangles(), parameter, settings_.max_triangles);
+        return fmt::format(
+            "the mesh of {} triangles does not resolve the shape at parameter {:.6g}, and there is no "
+            "better one of at most {}",
+            system_.base().triangles(), parameter, settings_.max_triangles);
     }
 
 private:

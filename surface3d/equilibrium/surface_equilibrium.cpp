@@ -13,7 +13,7 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr double refinement = 1.8;   // triangles of a mesh over those of the one before
+constexpr double refinement = 1.8;  // triangles of a mesh over those of the one before
 constexpr double least_quality = 0.3;
 constexpr int most_attempts = 5;  // meshes on which no shape is found
 
@@ -34,8 +34,8 @@ public:
 
     SurfaceEquilibrium run(const MakeMesh& initial) {
         const bool given = settings_.triangles > 0;
-        int triangles = given ? std::max(static_cast<int>(settings_.triangles / refinement), 40)
-                              : settings_.first_triangles;
+        int triangles =
+            given ? std::max(static_cast<int>(settings_.triangles / refinement), 40) : settings_.first_triangles;
         for (;;) {
             SurfaceSystem system(next_mesh(initial, triangles), problem_);
             Eigen::VectorXd u = system.unknowns_at_base();
@@ -55,7 +55,8 @@ public:
             keep(system, u);
             ++rounds_;
             const bool enough = given ? rounds_ > 1 : found && out_.estimated_error <= settings_.accuracy;
-            triangles = given ? settings_.triangles : static_cast<int>(refinement * std::max(triangles, out_.mesh.triangles()));
+            triangles =
+                given ? settings_.triangles : static_cast<int>(refinement * std::max(triangles, out_.mesh.triangles()));
             if (enough || triangles > settings_.max_triangles || (!found && !given && rounds_ == most_attempts))
                 return found ? finish(system, u) : end(out_.stop, why_none(system, u));
         }
@@ -79,8 +80,8 @@ private:
         out_.values = system.values(u);
         out_.reference_energy = reference_energy(problem_, system, u);
         out_.held_motions = system.held_motions();
-        const double energy = out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume,
-                                                                        out_.mesh.period);
+        const double energy =
+            out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume, out_.mesh.period);
         multipliers_ = u.tail(u.size() - system.shape_size());
         if (out_.stop != Stop::finished) {
             before_.reset(), out_.estimated_error = 1;
@@ -106,9 +107,8 @@ private:
             return end(Stop::solver_failed, fmt::format("the second variation: {}", error.what()));
         }
         if (settings_.triangles == 0 && out_.estimated_error > settings_.accuracy)
-            return end(Stop::resolution_lost,
-                       fmt::format("with {} triangles, the error of the energy is still {:.1e}", out_.mesh.triangles(),
-                                   out_.estimated_error));
+            return end(Stop::resolution_lost, fmt::format("with {} triangles, the error of the energy is still {:.1e}",
+                                                          out_.mesh.triangles(), out_.estimated_error));
         if (!out_.spectrum.doubt.empty())
             return end(Stop::resolution_lost, "the stability is undetermined: " + out_.spectrum.doubt);
         return end(Stop::finished, "");

@@ -12,13 +12,13 @@
 namespace tubule::surface3d {
 
 struct SurfaceEquilibriumSettings {
-    double accuracy = 1e-4;      // of the energy, relative to E_ref
-    int triangles = 0;           // exactly about these, and fewer to compare with; 0: as many as the accuracy needs
-    int first_triangles = 160;   // to begin with
-    int max_triangles = 20000;   // more are never taken
-    bool descend = true;         // look for a minimum; if not, for a stationary shape near the initial one
-    bool near = false;           // the initial shape is an equilibrium of a nearby problem, or of the other tier
-    int modes = 1;               // lowest eigenvalues of the second variation
+    double accuracy = 1e-4;     // of the energy, relative to E_ref
+    int triangles = 0;          // exactly about these, and fewer to compare with; 0: as many as the accuracy needs
+    int first_triangles = 160;  // to begin with
+    int max_triangles = 20000;  // more are never taken
+    bool descend = true;        // look for a minimum; if not, for a stationary shape near the initial one
+    bool near = false;          // the initial shape is an equilibrium of a nearby problem, or of the other tier
+    int modes = 1;              // lowest eigenvalues of the second variation
 };
 
 struct SurfaceEquilibrium {

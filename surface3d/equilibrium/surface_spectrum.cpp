@@ -1,14 +1,14 @@
 #include "surface3d/equilibrium/surface_spectrum.hpp"
 
+#include <Spectra/SymGEigsShiftSolver.h>
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Spectra/SymGEigsShiftSolver.h>
 #include <algorithm>
 #include <optional>
 
-#include "common/solve/pause.hpp"
 #include "common/solve/bordered_ldlt.hpp"
+#include "common/solve/pause.hpp"
 
 namespace tubule::surface3d {
 namespace {

@@ -1,4 +1,5 @@
-// The lowest eigenvalues of a sparse symmetric form under constraints, by Lanczos' method with a shift that is inverted.
+// The lowest eigenvalues of a sparse symmetric form under constraints, by Lanczos' method with a shift that is
+// inverted.
 #pragma once
 
 #include <Eigen/Core>

@@ -157,7 +157,8 @@ std::vector<int> SurfaceSystem::wave_numbers(const Eigen::VectorXd& u, const Eig
         for (int a = 0; a < space().width(); ++a) w.row(a) = displacements.row(space().node(cell, a));
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = tangent_point(X, table, q);
-            const Eigen::RowVectorXd along = (turn_->velocity + turn_->omega.cross(p.x)).transpose() * gradients(p, table, q) * w;
+            const Eigen::RowVectorXd along =
+                (turn_->velocity + turn_->omega.cross(p.x)).transpose() * gradients(p, table, q) * w;
             turned += table.weight[q] * p.area * along.cwiseAbs2().transpose();
             all += table.weight[q] * p.area * (table.value.col(q).transpose() * w).cwiseAbs2().transpose();
         }
@@ -230,13 +231,13 @@ double SurfaceSystem::constraint_error(const Eigen::VectorXd& u) const {
 
 Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
     const bool known = last_ && at_ == u;
-    const EnergyDerivatives first = known ? EnergyDerivatives{}
-                                          : energy_->derivatives(mesh(u), directions_, bending(u), u[sigma()],
-                                                                 u[lambda()], H0_, false);
+    const EnergyDerivatives first =
+        known ? EnergyDerivatives{}
+              : energy_->derivatives(mesh(u), directions_, bending(u), u[sigma()], u[lambda()], H0_, false);
     const EnergyDerivatives& d = known ? *last_ : first;
     Eigen::VectorXd F(unknowns());
-    F.head(shape_size()) = d.energy + u[sigma()] * d.area + u[lambda()] * d.volume +
-                           motions_ * u.segment(mu() + 1, motions_.cols());
+    F.head(shape_size()) =
+        d.energy + u[sigma()] * d.area + u[lambda()] * d.volume + motions_ * u.segment(mu() + 1, motions_.cols());
     if (problem_.free_period) F[shape_size() - 1] -= problem_.loads.force * base_.period;
     set_constraints(d.values, u, F);
     return F;
@@ -371,7 +372,8 @@ ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u) const 
         for (int j = 0; j < N; ++j) {
             for (Eigen::SparseMatrix<double>::InnerIterator it(M, j); it; ++it)
                 entries.emplace_back(it.row(), j, it.value());
-            entries.emplace_back(N, j, form ? d.with_stretch[j] : 0), entries.emplace_back(j, N, form ? d.with_stretch[j] : 0);
+            entries.emplace_back(N, j, form ? d.with_stretch[j] : 0),
+                entries.emplace_back(j, N, form ? d.with_stretch[j] : 0);
         }
         entries.emplace_back(N, N, form ? d.stretch_twice : 0);
         out.setFromTriplets(entries.begin(), entries.end());

@@ -13,9 +13,9 @@
 
 namespace tubule::surface3d {
 
-// u holds the displacements w_i along the normals of a base mesh, of a free period the stretch, then sigma, lambda, mu =
-// alpha (M - M0), and one multiplier for each motion that costs no energy and is held: rigid ones, and where the energy
-// has them dilations and conformal maps. These multipliers vanish up to the error of the mesh.
+// u holds the displacements w_i along the normals of a base mesh, of a free period the stretch, then sigma, lambda, mu
+// = alpha (M - M0), and one multiplier for each motion that costs no energy and is held: rigid ones, and where the
+// energy has them dilations and conformal maps. These multipliers vanish up to the error of the mesh.
 class SurfaceSystem {
 public:
     static constexpr int most_motions = 10;
@@ -59,8 +59,8 @@ public:
     SurfaceSpectrum spectrum(const Eigen::VectorXd& u, int count) const;
     // Its negative directions alone.
     int index(const Eigen::VectorXd& u) const;
-    // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each, if
-    // that has one; -1 where there is none.
+    // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each,
+    // if that has one; -1 where there is none.
     std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
     int held_motions() const { return static_cast<int>(motions_.cols()); }
 

@@ -45,6 +45,7 @@ Task task_of(const Problem& c, const Start& start) {
         task.branch.shapes = s;
         task.branch.output = branch_outputs(c, task.problem);
         task.branch.from = task.branch.output.front(), task.branch.to = task.branch.output.back();
+        task.branch.mode = b.mode.value_or(0), task.branch.amplitude = b.amplitude.value_or(task.branch.amplitude);
     }
     return task;
 }
@@ -95,8 +96,7 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
                 [](const ShapeRow& r) { return reduced_volume(r.shape.values.area, r.shape.values.volume); }},
                {"tension", [](const ShapeRow& r) { return r.shape.sigma; }},
                {"pressure", [](const ShapeRow& r) { return -r.shape.lambda; }},
-               {"negative_directions",
-                [](const ShapeRow& r) {
+               {"negative_directions", [](const ShapeRow& r) {
                     return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
                 }}});
     std::vector<std::string> numbers;
@@ -242,9 +242,10 @@ RunSummary summary_of(const Problem& c, const ShapeWriter& written, StopReport s
     s.estimated_error = written.worst();
     s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
     if (s.stop.reason == Stop::finished && !s.as_accurate_as_asked)
-        s.warnings.push_back(fmt::format("the energy is less accurate than asked, {:.1e} for {:.1e} of E_ref: the "
-                                         "triangles are given",
-                                         s.estimated_error, c.accuracy.energy));
+        s.warnings.push_back(
+            fmt::format("the energy is less accurate than asked, {:.1e} for {:.1e} of E_ref: the "
+                        "triangles are given",
+                        s.estimated_error, c.accuracy.energy));
     s.effort = fmt::format("{} triangles of order {}, {} nodes, {} Newton steps", shape.mesh.triangles(),
                            shape.mesh.order, shape.mesh.size(), written.iterations());
     if (c.equilibrium->branch.parameter) s.effort = fmt::format("{} shapes; the last: {}", written.count(), s.effort);

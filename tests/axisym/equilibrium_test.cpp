@@ -435,6 +435,39 @@ TEST(Branch, bifurcationOfTheOblates) {
     EXPECT_LT(std::abs(spectrum[0]), 1e-4 * spectrum[1]);
 }
 
+TEST(Branch, leavesOblatesTowardsStomatocytes) {
+    // The pitchfork of the oblates leads to the stomatocytes, whose branch ends at the fold near 0.66: Seifert, Berndl and
+    // Lipowsky 1991. Beyond the fold the shapes are those that a search from a bowl finds.
+    const double v = 0.52;
+    const auto start = find_equilibrium(vesicle(v), spheroid(v, false), accurate(1e-8));
+    ASSERT_EQ(start.stop, Stop::finished) << start.message;
+    BranchSettings settings = outputs(v, 0.7, {0.6});
+    settings.shapes.accuracy = 1e-8, settings.mode = 1;
+    std::vector<double> begins;
+    for (const double amplitude : {0.02, 0.04}) {
+        settings.amplitude = amplitude;
+        const Branch branch = follow_branch(vesicle(v), start, set_reduced_volume, settings);
+        ASSERT_EQ(branch.points.size(), 4u) << branch.message;
+        EXPECT_EQ(branch.points[0].kind, PointKind::bifurcation);
+        begins.push_back(branch.points[0].parameter);
+        if (amplitude > 0.03) continue;
+        EXPECT_EQ(branch.points[1].index, 1);
+        EXPECT_EQ(branch.points[2].kind, PointKind::fold);
+        EXPECT_EQ(branch.points[3].index, 0);
+        const auto bowl_shaped = find_equilibrium(vesicle(0.6), bowl(0.3, 2.3), accurate(1e-8));
+        EXPECT_NEAR(branch.points[3].shape.observed.energy, bowl_shaped.observed.energy, 1e-6);
+    }
+    // Where the amplitude vanishes the oblates have a direction without curvature.
+    const double critical = (4 * begins[0] - begins[1]) / 3;
+    settings = outputs(0.55, 0.5, {});
+    settings.shapes.accuracy = 1e-8;
+    const auto before = find_equilibrium(vesicle(0.55), spheroid(0.55, false), accurate(1e-8));
+    const Branch oblates = follow_branch(vesicle(0.55), before, set_reduced_volume, settings);
+    ASSERT_EQ(oblates.points.size(), 1u);
+    EXPECT_GT(begins[0], critical);
+    EXPECT_NEAR(critical, oblates.points[0].parameter, 1e-5);
+}
+
 TEST(Branch, refusals) {
     Equilibrium none;
     EXPECT_EQ(message_of<std::invalid_argument>([&] { follow_branch(vesicle(0.9), none, set_reduced_volume, {}); }),

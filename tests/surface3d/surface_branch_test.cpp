@@ -1,10 +1,11 @@
 // Branches of stationary surfaces, against those of the axisymmetric tier.
+#include "surface3d/equilibrium/surface_branch.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
-#include "surface3d/equilibrium/surface_branch.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 
@@ -21,21 +22,23 @@ StationaryProblem vesicle(double v) {
     return out;
 }
 
-SurfaceEquilibrium prolate_at_rest(double v) {
-    return find_equilibrium(vesicle(v),
-                            [](int triangles) {
-                                const int n = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 20.0))));
-                                return mapped_mesh(icosphere(n), 4, [](const Eigen::Vector3d& p) {
-                                    const Eigen::Vector3d q = p.normalized();
-                                    return Eigen::Vector3d(0.9 * q.x(), 0.9 * q.y(), 1.4 * q.z());
-                                });
-                            },
-                            {.accuracy = 3e-4, .first_triangles = 80});
+// From a spheroid of this radius and half this height.
+SurfaceEquilibrium at_rest(double v, double radius, double half, const SurfaceEquilibriumSettings& settings) {
+    return find_equilibrium(
+        vesicle(v),
+        [=](int triangles) {
+            const int n = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 20.0))));
+            return mapped_mesh(icosphere(n), 4, [=](const Eigen::Vector3d& p) {
+                const Eigen::Vector3d q = p.normalized();
+                return Eigen::Vector3d(radius * q.x(), radius * q.y(), half * q.z());
+            });
+        },
+        settings);
 }
 
 // Energies of `tubule equilibrium` in tier axisym, with accuracy.energy = 1e-10.
 TEST(SurfaceBranch, prolates) {
-    const SurfaceEquilibrium start = prolate_at_rest(0.9);
+    const SurfaceEquilibrium start = at_rest(0.9, 0.9, 1.4, {.accuracy = 3e-4, .first_triangles = 80});
     ASSERT_EQ(start.stop, Stop::finished) << start.message;
     BranchSettings settings;
     settings.from = 0.9, settings.to = 0.85, settings.output = {0.9, 0.85}, settings.shapes.accuracy = 3e-4;
@@ -51,6 +54,29 @@ TEST(SurfaceBranch, prolates) {
         EXPECT_LE(e.estimated_error, 3e-4);
         EXPECT_NEAR(e.values.energy, energies[i], 2 * e.estimated_error * e.reference_energy) << i;  // not a bound
     }
+}
+
+// Tier axisym: growth_2 of the oblates, accuracy.energy = 1e-11, vanishes at v = 0.749729. Shapes of three axes exist
+// below that, with one negative direction: they separate oblates from prolates.
+TEST(SurfaceBranch, triaxialFromOblates) {
+    const double v = 0.745;
+    SurfaceEquilibriumSettings shapes{.accuracy = 2e-3, .triangles = 320, .descend = false};
+    const SurfaceEquilibrium start = at_rest(v, 1.24, 0.55, shapes);
+    ASSERT_EQ(start.stop, Stop::finished) << start.message;
+    EXPECT_EQ(start.spectrum.negative, 0);
+    BranchSettings settings;
+    settings.from = v, settings.to = 0.735, settings.shapes = shapes, settings.mode = 1;
+    std::vector<double> begins;
+    for (const double amplitude : {0.05, 0.1}) {
+        settings.amplitude = amplitude, settings.max_steps = 0;
+        const Branch branch = follow_branch(vesicle(v), start, set_reduced_volume, settings);
+        ASSERT_EQ(branch.points.size(), 1) << branch.message;
+        EXPECT_EQ(branch.points[0].kind, PointKind::bifurcation);
+        EXPECT_EQ(branch.points[0].index, 1);
+        begins.push_back(branch.points[0].parameter);
+    }
+    EXPECT_NEAR((4 * begins[0] - begins[1]) / 3, 0.749729, 5e-4);
+    EXPECT_LT(begins[1], begins[0]);
 }
 
 }  // namespace surface_branch_test
