@@ -316,8 +316,8 @@ std::optional<theory::LimitShape> limit_of(const Task& task) {
     return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);
 }
 
-// Writes the shape, or those of the branch, and says how it ended.
-StopReport find_shapes(const Task& task, Writer& write) {
+// Writes the shape, or those of the branch, and says how it ended; adds what to warn of.
+StopReport find_shapes(const Task& task, Writer& write, std::vector<std::string>& warnings) {
     const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
     if (first.stop != Stop::finished || !task.set) {
         BranchPoint only;
@@ -333,7 +333,8 @@ StopReport find_shapes(const Task& task, Writer& write) {
         write(point);
         pause_if_due();
     };
-    const Branch branch = follow_branch(task.problem, first, task.set, settings);
+    Branch branch = follow_branch(task.problem, first, task.set, settings);
+    warnings = std::move(branch.warnings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
             advice_for(branch.stop)};
 }
@@ -362,15 +363,15 @@ RunSummary run_equilibrium(const Problem& c, RunObserver& observer) {
     const RunClock clock(c.time, observer);
     const Task task = task_of(c);
     Writer write(c, task, observer);
+    RunSummary s;
     StopReport stop;
     try {
-        stop = find_shapes(task, write);
+        stop = find_shapes(task, write, s.warnings);
     } catch (const Paused& pause) {
         stop = pause_report(pause, 0);
         stop.message += " before all shapes were found";
         stop.advice = "run the case again: equilibria are not resumed";
     }
-    RunSummary s;
     if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
     if (const auto limit = limit_of(task);
         limit && !task.set && stop.reason == Stop::finished && limit->energy < write.last().observed.energy)

@@ -56,6 +56,7 @@ struct Branch {
     int steps = 0;
     Stop stop = Stop::finished;  // or why it ends inside the interval
     std::string message;
+    std::vector<std::string> warnings;
 };
 
 // A point of the branch on one mesh: unknowns, then the parameter; and the direction of the branch there, of unit
@@ -345,7 +346,14 @@ private:
         const int after = index(b), before = index_;
         if (after != before && (!turned || std::abs(after - before) > 1)) {
             const int which = std::min(before, after);  // ascending: the eigenvalue that changes its sign
-            const auto at = locate(a, b, step, [&](const Place& p) { return eigenvalue(p, which); });
+            auto at = locate(a, b, step, [&](const Place& p) { return eigenvalue(p, which); });
+            if (!at) {  // Newton's method fails beside it, or a mesh without the shape's symmetry has smeared it out
+                branch_.warnings.push_back(
+                    fmt::format("a bifurcation between the parameters {:.6g} and {:.6g} could not be located: it is "
+                                "written at the latter",
+                                a.parameter(), b.parameter()));
+                at = {step, b};
+            }
             note(at, PointKind::bifurcation);
         }
         for (double wanted : settings_.output) {

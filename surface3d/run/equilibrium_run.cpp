@@ -205,8 +205,9 @@ private:
     SurfaceEquilibrium last_;
 };
 
-// Writes the shape, or those of the branch, and says how it ended.
-StopReport find_shapes(const Problem& c, const Start& start, const Task& task, ShapeWriter& write) {
+// Writes the shape, or those of the branch, and says how it ended; adds what to warn of.
+StopReport find_shapes(const Problem& c, const Start& start, const Task& task, ShapeWriter& write,
+                       std::vector<std::string>& warnings) {
     BranchPoint first;
     first.shape = find_equilibrium(
         task.problem, [&](int triangles) { return start.mesh(triangles, c.element_order).mesh; }, task.settings);
@@ -225,7 +226,8 @@ StopReport find_shapes(const Problem& c, const Start& start, const Task& task, S
         write(point);
         pause_if_due();
     };
-    const Branch branch = follow_branch(task.problem, shape, task.set, settings);
+    Branch branch = follow_branch(task.problem, shape, task.set, settings);
+    warnings = std::move(branch.warnings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
             advice_for(branch.stop)};
 }
@@ -272,8 +274,9 @@ RunSummary run_equilibrium(const Problem& c, const Start& start, RunObserver& ob
         const Task task = task_of(c, start);
         ShapeWriter write(c, task, clock, observer);
         StopReport stop;
+        std::vector<std::string> warnings;
         try {
-            stop = find_shapes(c, start, task, write);
+            stop = find_shapes(c, start, task, write, warnings);
         } catch (const Paused& pause) {
             if (write.count() == 0) throw;
             stop = pause_report(pause, 0);
@@ -281,6 +284,7 @@ RunSummary run_equilibrium(const Problem& c, const Start& start, RunObserver& ob
             stop.advice = "run the case again: equilibria are not resumed";
         }
         RunSummary s = summary_of(c, write, std::move(stop));
+        s.warnings.insert(s.warnings.end(), warnings.begin(), warnings.end());
         s.warnings.insert(s.warnings.begin(), start.notes().begin(), start.notes().end());
         return s;
     });
