@@ -121,6 +121,42 @@ class Confirm(ProgramTest):
         self.assertAlmostEqual(float(ring["rate"]) / 2.4, 1, delta=0.1)
 
 
+VESICLE = """tier = "axisym"
+[energy]
+k20 = 0.5
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 1.0
+c = 1.5
+[accuracy]
+energy = 1e-6
+[equilibrium]
+reduced_volume = 0.9
+area = 12.566370614359172
+"""
+
+
+class Equilibria(ProgramTest):
+    def test_a_prolate_is_stable_and_an_oblate_flattens(self):
+        # Oblates above v = 0.7497 are unstable against m = 2: cases/surface_branch_triaxial.toml.
+        self.write("vesicle.toml", VESICLE)
+        self.tubule("scan", "vesicle.toml", "--over", 'equilibrium.family="prolate","oblate"', "-o", "scan.hdf")
+        out, _ = self.tubule("confirm", "scan.hdf", "--csv", "--quiet", status=1)
+        prolate, oblate = csv.DictReader(io.StringIO(out))
+        self.assertEqual(prolate["set"], 'equilibrium.family="prolate"')
+        self.assertEqual((prolate["verdict"], prolate["growing"]), ("agrees", "none"))
+        self.assertEqual((oblate["verdict"], oblate["growing"], oblate["axisym_growing"]), ("symmetry-broken", "2", "2"))
+        for row in prolate, oblate:
+            self.assertLess(abs(float(row["energy_difference"])), 1e-4)
+            self.assertAlmostEqual(float(row["rate"]) / float(row["axisym_rate"]), 1, delta=0.01)
+        before = {path: path.stat().st_mtime_ns for path in (self.folder / "scan_confirm").glob("*.hdf")}
+        self.assertEqual(len(before), 4)
+        self.assertIn("1 of 2 points agree", self.tubule("confirm", "scan.hdf", "--quiet", status=1)[0])
+        self.assertEqual({path: path.stat().st_mtime_ns for path in before}, before)
+        self.assertIn("--end is for scans of motions", self.tubule("confirm", "scan.hdf", "--end", "1", status=2)[1])
+
+
 @unittest.skipUnless(MPIRUN, "built without MPI")
 class Ranks(ProgramTest):
     """Across the processes of an mpirun: the same points, and none is lost when a rank dies."""

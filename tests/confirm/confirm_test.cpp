@@ -9,6 +9,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/start.hpp"
+#include "tools/confirm/equilibrium_pair.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 
@@ -162,6 +163,45 @@ TEST(Confirm, refusesShapesThatItCannotPerturb) {
         "tier = \"axisym\"\n[energy]\nk20 = 1.0\n[shape]\nkind = \"ellipsoid\"\n"
         "a = 1.0\nb = 1.0\nc = 0.8\n[time]\nend = 1.0\n";
     EXPECT_THROW(surface_case(parse_case(ellipsoid, {}, "ellipsoid.toml"), straight(), {}), CaseError);
+}
+
+// Results of an equilibrium, with rates of m = 0 and 2 that are these, the pair of m = 2 in three dimensions.
+EquilibriumEnd pair(double energy, double rate_0, double rate_2, double rate_2_in_3d) {
+    Result profile, surface;
+    profile.about = surface.about = {{"stop", std::string("finished")}, {"E_ref", 50.0}};
+    profile.series = {{"energy", {50}}, {"energy_error", {1e-8}}, {"growth_0", {rate_0}}, {"growth_2", {rate_2}}};
+    surface.series = {{"energy", {energy}}, {"energy_error", {1e-3}}};
+    const double values[]{rate_2_in_3d, rate_2_in_3d, rate_0};
+    for (int i = 0; i < 3; ++i) {
+        surface.series["rate_" + std::to_string(i + 1)] = {values[i]};
+        surface.series["wave_number_" + std::to_string(i + 1)] = {i < 2 ? 2.0 : 0.0};
+    }
+    return equilibrium_end(profile, surface);
+}
+
+TEST(ConfirmEquilibria, verdicts) {
+    EXPECT_EQ(pair(50, -30, -2, -2.01).verdict, Verdict::agrees);
+    EXPECT_EQ(pair(50, 3, -2, -2.01).verdict, Verdict::agrees);  // tier axisym has seen m = 0
+    EXPECT_EQ(pair(50, -30, 2, 2.01).verdict, Verdict::symmetry_broken);
+    EXPECT_EQ(pair(50, -30, 0.02, -0.02).verdict, Verdict::agrees);  // neutral
+    EXPECT_EQ(pair(50, -30, -2, 2).verdict, Verdict::other_outcome);
+    EXPECT_EQ(pair(50, -30, 2, -2).verdict, Verdict::other_outcome);
+    EXPECT_EQ(pair(50.002, -30, -2, -2).verdict, Verdict::agrees);
+    EXPECT_EQ(pair(50.004, -30, -2, -2).verdict, Verdict::other_outcome);
+    const EquilibriumEnd e = pair(50.002, -30, 2, 2.01);
+    EXPECT_NEAR(e.energy_difference, 4e-5, 1e-12);
+    EXPECT_EQ(e.m, 2);
+    EXPECT_EQ(e.rate, 2.01);
+    EXPECT_EQ(e.axisym_rate, 2);
+    EXPECT_EQ(e.growing, std::set<int>{2});
+}
+
+TEST(ConfirmEquilibria, noAnswerWhereThereIsNoEquilibrium) {
+    Result profile, surface;
+    profile.about = {{"stop", std::string("finished")}};
+    surface.about = {{"stop", std::string("resolution-lost")}};
+    EXPECT_EQ(equilibrium_end(profile, surface).verdict, Verdict::no_answer);
+    EXPECT_THROW(equilibrium_end(profile, Result{}), std::runtime_error);
 }
 
 // A result as a run in three dimensions would leave it: a straight tube whose wave n = 1, m = 1 grows from `first` by

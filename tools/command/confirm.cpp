@@ -1,4 +1,5 @@
-// tubule confirm SCAN: some points of a scan again in three dimensions, to see whether they say the same.
+// tubule confirm SCAN: some points of a scan again in three dimensions, to see whether they say the same: motions from
+// shapes with waves, equilibria from those of tier axisym.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -27,6 +28,8 @@
 #include "tools/command/ranked.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/compare/results.hpp"
+#include "tools/confirm/equilibrium_pair.hpp"
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 #include "tools/scan/packet.hpp"
@@ -56,11 +59,15 @@ struct ConfirmedPoint {
     Problem c;
     PointResult axisymmetric;
     std::string surface_case, file;  // text; result
-    confirm::SurfaceEnd surface;
+    confirm::SurfaceEnd surface;     // of a motion
+    std::string profile_file;        // of an equilibrium: that of tier axisym
+    confirm::EquilibriumEnd equilibrium;
+
+    Verdict verdict() const { return c.is_equilibrium() ? equilibrium.verdict : surface.verdict; }
 };
 
 bool agrees(const ConfirmedPoint& p) {
-    return p.surface.verdict == Verdict::agrees;
+    return p.verdict() == Verdict::agrees;
 }
 
 std::string outcome_words(const ConfirmedPoint& p) {
@@ -92,7 +99,29 @@ std::string shown(double value) {
     return std::isnan(value) ? "-" : fmt::format("{:.3g}", value);
 }
 
-std::string words(const std::vector<ConfirmedPoint>& points) {
+std::string waves(const std::set<int>& m) {
+    return m.empty() ? "none" : fmt::format("{}", fmt::join(m, " "));
+}
+
+std::string words_of_equilibria(const std::vector<ConfirmedPoint>& points) {
+    std::string out;
+    add(out, "{:>7}  {:8}  {:12}  {:>12}  {:>9}  {:>8}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n", "point", "why",
+        "shape", "energy", "dE/E_ref", "stated", "grow: m", "in 3D", "m", "rate", "in 3D", "verdict");
+    for (const ConfirmedPoint& p : points) {
+        const confirm::EquilibriumEnd& e = p.equilibrium;
+        add(out, "{:>7}  {:8}  {:12}  {:>12.7g}  {:>9}  {:>8}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n", p.pick.point,
+            name(p.pick.why), name(p.axisymmetric.outcome), e.axisym_energy, shown(e.energy_difference),
+            shown(e.energy_error), waves(e.axisym_growing), waves(e.growing), e.m, shown(e.axisym_rate), shown(e.rate),
+            name(e.verdict));
+    }
+    for (const ConfirmedPoint& p : points)
+        if (!agrees(p))
+            add(out, "\npoint {}: {}; {}, axisym {}, surface3d {}; {}\n", p.pick.point, fmt::join(p.sets, ", "),
+                name(p.verdict()), p.equilibrium.axisym_stop, p.equilibrium.stop, p.file);
+    return out;
+}
+
+std::string words_of_motions(const std::vector<ConfirmedPoint>& points) {
     std::string out;
     add(out, "{:>7}  {:8}  {:12}  {:12}  {:>8}  {:>8}  {:>5}  {:>8}  {:>8}  {:>16}  {:>8}  {}\n", "point", "why",
         "tier 1", "surface3d", "t", "dE/E_ref", "wave", "size", "growth", "rate", "linear", "verdict");
@@ -111,6 +140,11 @@ std::string words(const std::vector<ConfirmedPoint>& points) {
         add_fit(out, p.surface);
         add_spectrum(out, p);
     }
+    return out;
+}
+
+std::string words(const std::vector<ConfirmedPoint>& points) {
+    std::string out = points.front().c.is_equilibrium() ? words_of_equilibria(points) : words_of_motions(points);
     add(out, "\n{} of {} points agree\n", std::count_if(points.begin(), points.end(), agrees), points.size());
     return out;
 }
@@ -119,7 +153,27 @@ std::string words(const std::vector<ConfirmedPoint>& points) {
 
 using Columns = std::vector<std::pair<std::string, Value>>;
 
+Columns columns_of_equilibrium(const ConfirmedPoint& p) {
+    const confirm::EquilibriumEnd& e = p.equilibrium;
+    return {{"why", std::string(name(p.pick.why))},
+            {"axisym_outcome", std::string(name(p.axisymmetric.outcome))},
+            {"axisym_stop", e.axisym_stop},
+            {"stop", e.stop},
+            {"axisym_energy", e.axisym_energy},
+            {"energy", e.energy},
+            {"energy_difference", e.energy_difference},
+            {"energy_error", e.energy_error},
+            {"axisym_growing", waves(e.axisym_growing)},
+            {"growing", waves(e.growing)},
+            {"m", std::int64_t{e.m}},
+            {"axisym_rate", e.axisym_rate},
+            {"rate", e.rate},
+            {"verdict", std::string(name(e.verdict))},
+            {"file", p.file}};
+}
+
 Columns columns(const ConfirmedPoint& p) {
+    if (p.c.is_equilibrium()) return columns_of_equilibrium(p);
     const confirm::SurfaceEnd& a = p.surface;
     Columns all{{"why", std::string(name(p.pick.why))},
                 {"axisym_outcome", std::string(name(p.axisymmetric.outcome))},
@@ -149,7 +203,7 @@ std::string csv(const std::vector<ConfirmedPoint>& points) {
     std::string out = "point,set";
     for (const auto& [key, value] : columns(points.front())) add(out, ",{}", key);
     for (const ConfirmedPoint& p : points) {
-        add(out, "\n{},\"{}\"", p.pick.point, fmt::join(p.sets, " "));
+        add(out, "\n{},{}", p.pick.point, quoted(fmt::format("{}", fmt::join(p.sets, " "))));
         for (const auto& [key, value] : columns(p)) std::visit([&](const auto& v) { add(out, ",{}", v); }, value);
     }
     return out + "\n";
@@ -159,11 +213,12 @@ std::string json_text(const ConfirmOptions& options, const std::vector<Confirmed
     Json list = Json::array();
     for (const ConfirmedPoint& p : points)
         list.push_back({{"point", p.pick.point}, {"set", p.sets}, {"values", json_object(columns(p))}});
-    return line_of({{"scan", options.scan},
-                    {"seed", options.seed},
-                    {"elements", options.choices.elements},
-                    {"noise", options.choices.noise},
-                    {"points", list}});
+    Json all{{"scan", options.scan}, {"seed", options.seed}};
+    const bool motions = !points.front().c.is_equilibrium();
+    if (options.choices.elements || motions) all["elements"] = options.choices.elements.value_or(200);
+    if (motions) all["noise"] = options.choices.noise;
+    all["points"] = list;
+    return line_of(all);
 }
 
 // ---- the whole
@@ -171,8 +226,8 @@ std::string json_text(const ConfirmOptions& options, const std::vector<Confirmed
 void check(const ConfirmOptions& options) {
     const auto refuse = [](const std::string& why) { throw CaseError(why); };
     if (options.points < 1) refuse(fmt::format("--points must be 1 or more, not {}", options.points));
-    if (options.choices.elements < 20 || options.choices.elements > 1000000)
-        refuse(fmt::format("--elements must be an integer from 20 to 1000000, not {}", options.choices.elements));
+    if (const auto n = options.choices.elements; n && (*n < 20 || *n > 1000000))
+        refuse(fmt::format("--elements must be an integer from 20 to 1000000, not {}", *n));
     if (!(options.choices.noise > 0 && options.choices.noise < 0.1))
         refuse(fmt::format("--noise must be above 0 and below 0.1, not {}", options.choices.noise));
     if (options.choices.end && !(*options.choices.end > 0))
@@ -199,11 +254,11 @@ std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult
         p.c = result.scan.case_of(pick.point);
         p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
-        if (p.c.is_equilibrium())
-            throw CaseError(options.scan + ": is a scan of equilibria: nothing moves there");
         if (!p.c.is_axisymmetric())
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");
-        p.surface_case = confirm::surface_case(p.c, p.axisymmetric, options.choices);
+        if (p.c.is_equilibrium() && options.choices.end)
+            throw CaseError("--end is for scans of motions: " + options.scan + " is one of equilibria");
+        if (!p.c.is_equilibrium()) p.surface_case = confirm::surface_case(p.c, p.axisymmetric, options.choices);
         all.push_back(std::move(p));
     }
     if (all.empty()) throw CaseError(options.scan + ": has no points to confirm: none was run without failing");
@@ -220,32 +275,37 @@ fs::path make_folder(const ConfirmOptions& options) {
     return folder;
 }
 
+// Equilibria are not resumed: those that were interrupted are searched again.
 bool holds(const fs::path& result, const std::string& case_text) {
     try {
-        return fs::exists(result) && read_result(result).case_text.text == case_text;
+        if (!fs::exists(result)) return false;
+        const Result found = read_result(result);
+        const std::string stop = compare::stop_word(found);
+        const bool over = stop_from_name(stop) && stop != name(Stop::interrupted) && stop != name(Stop::time_limit);
+        return found.case_text.text == case_text && (over || !found.series.contains("negative_directions"));
     } catch (const std::runtime_error&) {  // killed before it was a result
         return false;
     }
 }
 
-// A run in three dimensions and how it ended: the exit status, and the result if there is one.
-struct SurfaceRun {
+// A case to run and how it ended: the exit status, and the result if there is one.
+struct CaseToRun {
     std::string case_text, toml;
 };
-struct SurfaceRunEnd {
+struct CaseEnd {
     int status = 0;
     std::string file;
 };
 
 // Runs it, or goes on with it, or finds it done by an earlier call that asked the same.
-SurfaceRunEnd run_in_3d(const SurfaceRun& task) {
+CaseEnd run_once(const CaseToRun& task) {
     const fs::path hdf = fs::path(task.toml).replace_extension(".hdf");
     RunOptions run{.cases = {task.toml}, .sets = {}, .output = hdf.string()};
     run.overwrite = true;
     run.resume = holds(hdf, task.case_text);
     run.quiet = run.silent = true;
     std::ofstream(task.toml, std::ios::binary) << task.case_text;
-    SurfaceRunEnd end;
+    CaseEnd end;
     end.file = run.resume ? hdf.string() : "";
     run.written = [&](const fs::path& file) { end.file = file.string(); };
     try {
@@ -257,12 +317,24 @@ SurfaceRunEnd run_in_3d(const SurfaceRun& task) {
     return end;
 }
 
+// Equilibria of tier axisym, alone and with their growth rates (milliseconds each), and the cases that lift them.
+void prepare_equilibria(std::vector<ConfirmedPoint>& points, const fs::path& folder, const ConfirmOptions& options) {
+    for (ConfirmedPoint& p : points) {
+        if (!p.c.is_equilibrium()) continue;
+        const fs::path toml = folder / fmt::format("point_{:06}_axisym.toml", p.pick.point);
+        p.profile_file = run_once({confirm::profile_case(p.c), toml.string()}).file;
+        if (p.profile_file.empty()) continue;
+        p.surface_case = confirm::lifted_case(p.c, read_result(p.profile_file),
+                                              fs::path(p.profile_file).filename().string(), options.choices.elements);
+    }
+}
+
 // ---- on several ranks
 
 // A task: the number of a point and its run. A result: the number, and how the run ended.
 Packet run_task(const Packet& task) {
     const auto words = unpacked(task);
-    const SurfaceRunEnd end = run_in_3d({words[1], words[2]});
+    const CaseEnd end = run_once({words[1], words[2]});
     return packed({words[0], end.status, end.file});
 }
 
@@ -274,6 +346,7 @@ public:
 
     NextTask take(Packet& task, bool) override {
         const std::lock_guard lock(mutex_);
+        while (next_ < points_.size() && points_[next_].surface_case.empty()) ++next_;  // no shape to lift
         if (next_ == points_.size() || status_ != 0 || interrupted()) return NextTask::over;
         const ConfirmedPoint& p = points_[next_];
         if (!quiet_)
@@ -326,7 +399,9 @@ int run_all(SurfaceRuns& runs, Ranks* ranks) {
 int confirm_scan(const ConfirmOptions& options, Ranks* ranks) {
     check(options);
     std::vector<ConfirmedPoint> points = plan(options, read_scan_result(options.scan));
-    SurfaceRuns runs(points, make_folder(options), options.quiet);
+    const fs::path folder = make_folder(options);
+    prepare_equilibria(points, folder, options);
+    SurfaceRuns runs(points, folder, options.quiet);
     if (const int status = run_all(runs, ranks); status != 0) return status;
     for (ConfirmedPoint& p : points) {
         if (p.file.empty()) {
@@ -335,7 +410,10 @@ int confirm_scan(const ConfirmOptions& options, Ranks* ranks) {
             continue;
         }
         try {
-            p.surface = confirm::surface_end(p.axisymmetric, read_result(p.file));
+            if (p.c.is_equilibrium())
+                p.equilibrium = confirm::equilibrium_end(read_result(p.profile_file), read_result(p.file));
+            else
+                p.surface = confirm::surface_end(p.axisymmetric, read_result(p.file));
         } catch (const std::runtime_error& error) {  // given up without a result
             say(stderr, "{}: {}\n", p.file, error.what());
         }
@@ -354,17 +432,20 @@ int confirm_ranked(const ConfirmOptions& options) {
 }  // namespace
 
 void add_confirm(CLI::App& app, int& exit_status) {
-    CLI::App* command = app.add_subcommand("confirm",
-                                           "Run some points of a scan in three dimensions, from starts that are not "
-                                           "quite symmetric: exit status 1 if any comes out differently");
+    CLI::App* command =
+        app.add_subcommand("confirm",
+                           "Run some points of a scan in three dimensions: motions from shapes that are "
+                           "not quite symmetric, equilibria from those of tier axisym. Exit status 1 if "
+                           "any comes out differently, or has lost its symmetry");
     const auto o = std::make_shared<ConfirmOptions>();
     command->add_option("SCAN", o->scan, "result of tubule scan")->required();
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
     command->add_option("--seed", o->seed, "of the random choice (1)");
-    command->add_option("--elements", o->choices.elements, "about how many triangles (200)");
-    command->add_option("--noise", o->choices.noise, "amplitude of the added waves, part of the radius (1e-3)")
+    command->add_option("--elements", o->choices.elements,
+                        "about how many triangles (motions: 200; equilibria: as many as an error of 1e-4 needs)");
+    command->add_option("--noise", o->choices.noise, "motions: amplitude of the added waves, part of the radius (1e-3)")
         ->check(refuse_infinite);
-    command->add_option("--end", o->choices.end, "run until then instead of time.end of the case")
+    command->add_option("--end", o->choices.end, "motions: run until then instead of time.end of the case")
         ->check(refuse_infinite);
     command->add_option("-o,--output", o->folder, "folder of the results (default: beside the scan, NAME_confirm)");
     CLI::Option* csv = command->add_flag("--csv", o->csv, "the table, in full precision");

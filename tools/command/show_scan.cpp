@@ -67,12 +67,6 @@ Json equal_energies(const ScanResult& result) {
 
 // ---- CSV and JSON
 
-std::string quoted(const std::string& text) {
-    std::string out = "\"";
-    for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
-    return out + '"';
-}
-
 std::string stop_of(const PointResult& p) {
     return p.outcome == Outcome::not_run ? "" : stop_words()[static_cast<std::size_t>(p.stop)];
 }

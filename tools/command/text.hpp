@@ -34,6 +34,13 @@ void add(Out& out, fmt::format_string<Args...> format, Args&&... args) {
     fmt::vformat_to(std::back_inserter(out), format, fmt::make_format_args(plain(args)...));
 }
 
+// A field of CSV.
+inline std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+    return out + '"';
+}
+
 // The words of an error, for people: those of the standard library are none.
 inline std::string explanation(const std::exception& error) {
     if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error))

@@ -147,7 +147,7 @@ std::string surface_case(const Problem& c, const PointResult& axisymmetric, cons
     s.accuracy.energy = std::max(c.accuracy.energy, rough);
     s.discretisation = {};
     s.surface = {};
-    s.surface.elements = choices.elements;
+    s.surface.elements = choices.elements.value_or(200);
     s.expect = {};
     s.time.stationary.reset();
     s.time.end = choices.end.value_or(c.time.end);

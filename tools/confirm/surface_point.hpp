@@ -16,9 +16,9 @@
 namespace tubule::confirm {
 
 struct Choices {
-    int elements = 200;         // about how many triangles
-    double noise = 1e-3;        // amplitude of each wave that is added, relative to the radius
-    std::optional<double> end;  // instead of time.end of the case
+    std::optional<int> elements;  // about how many triangles; 200 for motions
+    double noise = 1e-3;          // amplitude of each wave that is added, relative to the radius
+    std::optional<double> end;    // instead of time.end of the case
 };
 
 // The case as one of tier surface3d, as TOML text. Waves with m >= 1 are added to its start: to a tube n = 1 with m = 1
