@@ -136,7 +136,7 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         k.number("to", e.branch.to);
         k.number("step", e.branch.step, {.above = 0});
         k.integer("mode", e.branch.mode, {.from = 1, .to = 100});
-        k.number("amplitude", e.branch.amplitude, {.from = 0.001, .to = 0.5});
+        k.number("amplitude", e.branch.amplitude, {.above = 0, .to = 0.5});
         k.check("amplitude", [&] { return e.branch.amplitude && !e.branch.mode ? "is that of a mode: see mode" : ""; });
         k.check("", [&] {
             const BranchChoices& b = e.branch;

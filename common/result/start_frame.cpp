@@ -20,6 +20,15 @@ bool is_of_run(const std::string& name) {
     return name.starts_with("restart_");
 }
 
+StartFrame without_restart(Record frame, const std::vector<SurfaceCells>& meshes) {
+    StartFrame out{std::move(frame), {}};
+    std::erase_if(out.record.numbers, [](const auto& number) { return is_of_run(number.first); });
+    std::erase_if(out.record.arrays, [](const Array& array) { return is_of_run(array.name); });
+    out.record.kind = kind_of(out.record);
+    if (out.record.mesh) out.cells = meshes.at(*std::exchange(out.record.mesh, 0));
+    return out;
+}
+
 StartFrame read_frame(const Case& c, const ResultFrame& from) {
     Result result;
     try {
@@ -31,12 +40,7 @@ StartFrame read_frame(const Case& c, const ResultFrame& from) {
     if (number < 0 || number >= count)
         throw complaint(c, "shape.frame",
                         fmt::format("must be one of the {} frames of {}, not {}", count, from.path, from.frame));
-    StartFrame out{std::move(result.frames[number]), {}};
-    std::erase_if(out.record.numbers, [](const auto& number) { return is_of_run(number.first); });
-    std::erase_if(out.record.arrays, [](const Array& array) { return is_of_run(array.name); });
-    out.record.kind = kind_of(out.record);
-    if (out.record.mesh) out.cells = result.meshes.at(*std::exchange(out.record.mesh, 0));
-    return out;
+    return without_restart(std::move(result.frames[number]), result.meshes);
 }
 
 std::string to_bytes(const StartFrame& frame) {
@@ -79,6 +83,15 @@ PerturbedCurve disturbed_curve(const Case& c, const Record& frame) {
     } catch (const std::invalid_argument& error) {
         throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
     }
+}
+
+std::shared_ptr<const CaseInput> frame_as_input(const ResultFrame& shape, const Result& result) {
+    const std::size_t number = shape.frame < 0 ? result.frames.size() + shape.frame : shape.frame;
+    CaseInput out;
+    out.name = input_name(shape);
+    out.bytes = to_bytes(without_restart(result.frames.at(number), result.meshes));
+    out.size = out.bytes.size(), out.crc = crc32(0, std::as_bytes(std::span(out.bytes)));
+    return std::make_shared<const CaseInput>(std::move(out));
 }
 
 std::shared_ptr<const CaseInput> current_input(const Case& c) {

@@ -21,6 +21,9 @@ StartFrame start_frame(const Case& c);
 // std::invalid_argument for a frame that has no profile.
 PerturbedCurve disturbed_curve(const Case& c, const Record& frame);
 
+// A frame of a result in memory, as what a case reads whose shape is this frame: then it needs no file.
+std::shared_ptr<const CaseInput> frame_as_input(const ResultFrame& shape, const Result& result);
+
 // What the case reads, as it is now: with its bytes if they are few. Nothing where it reads nothing, or what cannot be
 // read.
 std::shared_ptr<const CaseInput> current_input(const Case& c);

@@ -242,7 +242,7 @@ std::array<double, 2> tangent(const PerturbedCurve& curve, double s) {
 
 // The sum over terms, times weights, that is nearest to the values at s.
 std::array<double, CurveMode::terms> fitted(const PerturbedCurve& curve, const std::vector<double>& s,
-                                            const std::vector<double>& values, int power_of_sine) {
+                                            const std::vector<double>& values, int power_of_sine, double tolerance) {
     const auto n = static_cast<Eigen::Index>(s.size());
     Eigen::MatrixXd functions(n, CurveMode::terms);
     Eigen::VectorXd right(n);
@@ -254,6 +254,9 @@ std::array<double, CurveMode::terms> fitted(const PerturbedCurve& curve, const s
     }
     const Eigen::VectorXd coefficients =
         Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(functions).solve(right);
+    if ((functions * coefficients - right).lpNorm<Eigen::Infinity>() > tolerance)
+        throw std::invalid_argument(
+            fmt::format("a mode varies too fast along the profile for {} functions", CurveMode::terms));
     std::array<double, CurveMode::terms> out;
     for (int k = 0; k < CurveMode::terms; ++k) out[k] = coefficients[k];
     return out;
@@ -282,7 +285,9 @@ CurveMode normal_mode(const PerturbedCurve& curve, int m, const std::vector<doub
         const auto [t_r, t_z] = pole ? std::array{0.0, 0.0} : tangent(curve, s.back());
         radial.push_back(w[i] * t_z), axial.push_back(-w[i] * t_r);
     }
-    return {m, fitted(curve, s, radial, m + 1), fitted(curve, s, axial, m)};
+    double largest = 0;
+    for (const double value : w) largest = std::max(largest, std::abs(value));
+    return {m, fitted(curve, s, radial, m + 1, 0.01 * largest), fitted(curve, s, axial, m, 0.01 * largest)};
 }
 
 PerturbedCurve disturbed(PerturbedCurve curve, const ResultFrame& frame) {

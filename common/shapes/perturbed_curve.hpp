@@ -108,7 +108,7 @@ CurveFunctions functions_along(const PerturbedCurve& curve, const std::vector<do
 PerturbedCurve disturbed(PerturbedCurve curve, const ResultFrame& frame);
 
 // The normal displacement w(s) cos(m phi) of the curve; w at equally spaced s, both ends included. Throws
-// std::invalid_argument for m < 1 or fewer values than terms.
+// std::invalid_argument for m < 1, fewer values than terms, and a mode that the terms cannot follow.
 CurveMode normal_mode(const PerturbedCurve& curve, int m, const std::vector<double>& w);
 
 // Outward, along the curve in its direction, and around the axis (or empty); at each break of `functions`.

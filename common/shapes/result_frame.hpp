@@ -23,12 +23,19 @@ struct FrameNoise {
     int around = 0, seed = 1;
 };
 
+// A mode that the frame holds, along the normal: "mode_1" of tier surface3d, "displacement_2" (m = 2) of tier axisym.
+struct FrameEigenmode {
+    std::string of;
+    double amplitude = 0;  // largest displacement
+};
+
 struct ResultFrame {
     static constexpr const char* kind = "result";
     std::string path;  // relative to the case file
     int frame = -1;    // from 0; negative: from the end
     std::vector<FrameMode> modes = {};
     std::vector<FrameNoise> noise = {};  // becomes modes once the case is read
+    std::vector<FrameEigenmode> eigenmodes = {};
 
     bool closed() const { return !modes.empty() && modes.front().l.has_value(); }  // what its modes take it for
 };
@@ -37,6 +44,8 @@ struct ResultFrame {
 void make_noise(ResultFrame& result);
 
 inline Asymmetry asymmetry(const ResultFrame& result) {
+    if (!result.eigenmodes.empty())
+        return {"shape.eigenmode", "needs tier \"surface3d\": the mode of a frame may have no axis"};
     const Asymmetry noise = noise_around(result.noise);
     return noise.first.empty() ? mode_around(result.modes) : noise;
 }
@@ -75,6 +84,10 @@ void keys(Keys& k, ResultFrame& result) {
         k.integer("n", noise.n, {.from = 1, .to = 100});
         k.integer("m", noise.around, {.from = 0, .to = 100});
         k.integer("seed", noise.seed, {.from = 0, .to = 1e9});
+    });
+    k.tables("eigenmode", result.eigenmodes, [](auto& k, FrameEigenmode& mode) {
+        k.text("of", mode.of, k.required);
+        k.number("amplitude", mode.amplitude, {}, k.required);
     });
     const bool closed = result.modes.empty() ? !result.noise.empty() && result.noise.front().l : result.closed();
     check_waves(k, "mode", result.modes, closed);

@@ -1,6 +1,7 @@
 #include "surface3d/run/start.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -325,7 +326,7 @@ struct Prepare {
         const auto [frame, cells] = start_frame(c);
         if (cells) {
             refuse_what_needs_a_shape();
-            const CurvedMesh mesh = disturbed(frame_surface(frame, *cells), from);
+            const CurvedMesh mesh = along_eigenmodes(disturbed(frame_surface(frame, *cells), from), frame, from);
             return {[mesh, moves = velocities(frame, mesh)](int, int order) {
                         if (mesh.order == order) return StartMesh{mesh, {}, moves ? columns(*moves) : VectorField()};
                         return StartMesh{
@@ -337,6 +338,8 @@ struct Prepare {
             PerturbedCurve start = disturbed_curve(c, frame);
             if (asks_for_velocity()) start.velocity = frame_velocity(frame, start);
             if (asks_for_velocity() && !start.velocity) throw without_velocity();
+            for (std::size_t i = 0; i < from.eigenmodes.size(); ++i)
+                start.modes.push_back(profile_mode(start, frame, from, i));
             return (*this)(start);
         } catch (const std::invalid_argument& error) {
             throw complaint(c, "shape.path", fmt::format("cannot be used: {}: {}", from.path, error.what()));
@@ -351,6 +354,45 @@ struct Prepare {
         } catch (const std::invalid_argument& error) {
             throw complaint(c, c.places.contains("shape.mode") ? "shape.mode" : "shape.noise", error.what());
         }
+    }
+    // The i-th of the frame's modes that the case asks for, its largest value the amplitude asked for.
+    std::vector<double> eigenmode(const Record& frame, const ResultFrame& from, std::size_t i, std::size_t size) const {
+        const auto& [of, amplitude] = from.eigenmodes[i];
+        const Array* found = is_mode(of) ? find_array(frame, of) : nullptr;
+        if (!found || found->data.size() != size) {
+            std::vector<std::string> there;
+            for (const Array& array : frame.arrays)
+                if (is_mode(array.name)) there.push_back(array.name);
+            throw complaint(c, fmt::format("shape.eigenmode.{}.of", i),
+                            fmt::format("must be a mode of the frame, {}, not \"{}\"",
+                                        there.empty() ? "which has none (equilibrium.rates or .modes writes them)"
+                                                      : fmt::format("{}", fmt::join(there, " or ")),
+                                        of));
+        }
+        double largest = 0;
+        for (const double w : found->data) largest = std::max(largest, std::abs(w));
+        std::vector<double> out = found->data;
+        for (double& w : out) w *= amplitude / largest;
+        return out;
+    }
+    static bool is_mode(const std::string& name) {
+        return name.starts_with("mode_") || (name.starts_with("displacement_") && name != "displacement_0");
+    }
+    CurvedMesh along_eigenmodes(CurvedMesh mesh, const Record& frame, const ResultFrame& from) const {
+        if (from.eigenmodes.empty()) return mesh;
+        const VectorField normal = PatchRecovery(mesh).nodal(mesh).normal;
+        for (std::size_t i = 0; i < from.eigenmodes.size(); ++i) {
+            const std::vector<double> w = eigenmode(frame, from, i, mesh.nodes.size());
+            for (int a = 0; a < mesh.size(); ++a) mesh.nodes[a] += w[a] * normal.col(a);
+        }
+        return mesh;
+    }
+    CurveMode profile_mode(const PerturbedCurve& curve, const Record& frame, const ResultFrame& from,
+                           std::size_t i) const {
+        const std::string& of = from.eigenmodes[i].of;
+        const Array* found = find_array(frame, of);
+        const std::vector<double> w = eigenmode(frame, from, i, found ? found->data.size() : 0);
+        return normal_mode(curve, std::stoi(of.substr(of.find('_') + 1)), w);
     }
     bool asks_for_velocity() const { return c.velocity.initial == InitialVelocity::result; }
     CaseError without_velocity() const {

@@ -125,6 +125,9 @@ TEST(PerturbedCurve, refusesWhatIsNoMode) {
     const PerturbedCurve surface = tube();
     EXPECT_THROW(normal_mode(surface, 0, std::vector<double>(201, 1.0)), std::invalid_argument);
     EXPECT_THROW(normal_mode(surface, 1, std::vector<double>(9, 1.0)), std::invalid_argument);
+    std::vector<double> rough;
+    for (int i = 0; i <= 200; ++i) rough.push_back(i % 2 ? 1 : -1);
+    EXPECT_THROW(normal_mode(surface, 1, rough), std::invalid_argument);
     EXPECT_THROW(functions_along(surface, {1.0}, {1.0}), std::invalid_argument);
 }
 

@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """`tubule equilibrium`: its table, its result, results as starts, refusals. Argument: the program."""
+import json
 import subprocess
 import unittest
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from program import CAPSULE, ProgramTest, about, series
 
@@ -72,9 +74,52 @@ class Equilibrium(ProgramTest):
             for i in (1, 2, 3):
                 self.assertAlmostEqual(abs(frame[f"PointData/mode_{i}"][()]).max(), 1)
         self.assertIn("complete", self.tubule("run", case, "--resume")[0])
+        self.stability_of_the_surface(case, result)
+        self.begins_along_its_modes(cell, text)
         sphere = self.write("sphere.toml", text.replace('"result"\npath = "cell.hdf"', '"sphere"\nradius = 1.0') + "\nreduced_volume = 0.9\n")
         out, _ = self.tubule("equilibrium", sphere, status=4)
         self.assertIn("start at an ellipsoid or a sphere with waves", out)
+
+    def stability_of_the_surface(self, case, result):
+        for source in (case, self.folder / "surface.hdf"):
+            answer = json.loads(self.tubule("stability", source, "--json", "--rates", "3")[0])
+            self.assertEqual((answer["shape"], answer["negative_directions"]), ("surface", 0))
+            self.assertEqual([mode["m"] for mode in answer["modes"]], [2, 2, 1])
+            for i, mode in enumerate(answer["modes"]):
+                self.assertAlmostEqual(mode["rate"] / result[f"rate_{i + 1}"][0], 1, delta=1e-3)
+        self.assertIn("gradient flow", self.tubule("stability", case)[0])
+        self.assertIn("signs all models share", self.tubule("stability", case, "--model", "stokes", status=2)[1])
+        self.assertIn("--kT does not apply", self.tubule("stability", case, "--kT", "1", status=2)[1])
+
+    def begins_along_its_modes(self, cell, text):
+        """Displaced by the amplitude times the mode, along the normal; m = 2 of a profile in both directions."""
+
+        def points(name):
+            with h5py.File(self.folder / f"{name}.hdf") as file:
+                frame = file["frames/000000"]
+                return frame["Points"][()], {key: value[()] for key, value in frame.get("PointData", {}).items()}
+
+        begin = text[: text.index("[equilibrium]")].replace("cell.hdf", "{}").replace("[accuracy]", "[[shape.eigenmode]]\nof = '{}'\namplitude = {}\n[accuracy]")
+        case = self.write("along.toml", begin.format("surface.hdf", "mode_2", 0.05))
+        self.tubule("run", case, "--quiet")
+        (before, data), (after, _) = points("surface"), points("along")
+        expected = before + 0.05 * data["mode_2"][:, None] * data["normal"]
+        nearest = after[[abs(after - point).sum(axis=1).argmin() for point in expected]]
+        apart = abs(((nearest - expected) * data["normal"]).sum(axis=1))  # another mesh: its points lie in between
+        self.assertLess(apart.max(), 0.02)
+        self.assertLess(apart.mean(), 0.003)
+        refused = self.tubule("run", case, "-o", "no.hdf", "--set", "shape.eigenmode.0.of='mode_4'", status=2)[1]
+        self.assertIn('shape.eigenmode.0.of must be a mode of the frame, mode_1 or mode_2 or mode_3, not "mode_4"', refused)
+        self.assertIn('needs tier "surface3d"', self.tubule("run", case, "-o", "no.hdf", "--set", "tier='axisym'", "--set", "time.end=1", status=2)[1])
+        self.tubule("equilibrium", "--quiet", "--overwrite", cell, "--set", "equilibrium.modes=2")
+        self.write("along.toml", begin.format("cell.hdf", "displacement_2", 0.03))
+        self.tubule("run", case, "--quiet", "--overwrite", "--set", "discretisation.elements=300")
+        x, y, z = points("along")[0].T
+        middle = abs(z - z.mean()) < 0.05
+        turns = 2 * np.arctan2(y, x)[middle]
+        columns = np.stack([np.ones_like(turns), np.cos(turns), np.sin(turns)], axis=1)
+        _, *wave = np.linalg.lstsq(columns, np.hypot(x, y)[middle], rcond=None)[0]
+        self.assertAlmostEqual(np.hypot(*wave), 0.03, delta=0.002)
 
     def test_spheres_joined_by_points_are_named(self):
         """Closed form, theory.md (8.11): spheres of the radii cos a and sin a."""

@@ -194,7 +194,7 @@ class Shown(EquilibriaTest):
 
     def test_refusals(self):
         self.scan("vesicle.toml", f"--over={VOLUME}=0.6,0.7", "-o", "scan.hdf")
-        self.assertIn("nothing moves", self.refused("confirm", "scan.hdf"))
+        self.assertIn("--end is for scans of motions", self.refused("confirm", "scan.hdf", "--end", "1"))
         self.assertIn("refine must be absent", self.refused("scan", "vesicle.toml", f"--over={ALL}", f"--over={VOLUME}=0.6,0.7",
                                                             "--boundary", "outcome", "--refine", "2"))  # fmt: skip
         self.assertIn("is of closed cells", self.refused(

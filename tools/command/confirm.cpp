@@ -435,8 +435,7 @@ void add_confirm(CLI::App& app, int& exit_status) {
     CLI::App* command =
         app.add_subcommand("confirm",
                            "Run some points of a scan in three dimensions: motions from shapes that are "
-                           "not quite symmetric, equilibria from those of tier axisym. Exit status 1 if "
-                           "any comes out differently, or has lost its symmetry");
+                           "not quite symmetric, equilibria from those of tier axisym");
     const auto o = std::make_shared<ConfirmOptions>();
     command->add_option("SCAN", o->scan, "result of tubule scan")->required();
     command->add_option("--points", o->points, "how many (8): both sides of lines, corners of the grid, random ones");
@@ -453,7 +452,7 @@ void add_confirm(CLI::App& app, int& exit_status) {
     command->add_flag("--quiet", o->quiet, "no progress output");
     end_help(*command, {"tubule confirm k42.hdf --points 2"},
              {{0, "all points agree"},
-              {1, "a point does not agree"},
+              {1, "a point comes out differently, or has lost its symmetry"},
               {2},
               {4},
               {130, "interrupted; the same command continues"}},

@@ -220,9 +220,8 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
         throw complaint(subject.c, "model.kind", "must not be \"auto\" for growth rates: name a model with --model");
     const std::vector<Problem> models = models_of(options, subject.c);
     std::optional<TubeSubject> tube;
-    if (subject.frame && subject.frame->mesh)
-        throw std::invalid_argument(
-            "the frame is a surface in three dimensions: spectra need tier \"axisym\"; --fit N,M gives growth rates");
+    if (subject.frame ? subject.frame->mesh.has_value() : subject.c.unknowns == Unknowns::surface_equilibrium)
+        return surface_report(options, subject);
     if (!options.numerical) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
     if (tube) {
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
@@ -239,7 +238,9 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
         return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
     if (options.waves) throw std::invalid_argument("--waves applies only to tubes and spheres, in closed form");
     if (subject.c.unknowns == Unknowns::surface || subject.c.unknowns == Unknowns::moving_surface)
-        throw std::invalid_argument("tier \"surface3d\" has spectra only for straight tubes and spheres");
+        throw std::invalid_argument(
+            "a surface in motion has rates only if it is a straight tube or sphere: give its result, or a case with "
+            "[equilibrium]");
     if (subject.c.equilibrium && !subject.frame) subject.frame = equilibrium_frame(subject.c);
     return spectrum_report(options, subject, models);
 }
@@ -247,7 +248,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
 // The one place that knows what each option may be, for the command and for Python.
 void refuse_values(const StabilityOptions& o) {
     require_within("--modes", o.modes, 0, most_modes);
-    require_within("--rates", o.rates, 1, 100);
+    if (o.rates) require_within("--rates", *o.rates, 1, 100);
     if (o.waves) require_within("--waves", *o.waves, 1, 10000);
     if (o.tension) require_within("--tension", *o.tension, -largest_number, largest_number);
     if (o.Re) require_within("--Re", *o.Re, 1 / largest_number, largest_number);
@@ -314,8 +315,8 @@ StabilitySubject stability_subject(Result result, const StabilityOptions& option
 }
 
 void add_stability(CLI::App& app, int& exit_status) {
-    CLI::App* command =
-        app.add_subcommand("stability", "Growth rates of waves: in closed form, of any profile, or fitted");
+    CLI::App* command = app.add_subcommand(
+        "stability", "Growth rates of waves: in closed form, of any profile or stationary surface, or fitted");
     const auto o = std::make_shared<StabilityOptions>();
     finds_installed_cases(*command->add_option("FILE", o->file, "a case, or a result NAME.hdf")->required());
     command->add_option("--set", o->sets, "override a key of the case, such as --set energy.k42=0.06")
@@ -331,8 +332,8 @@ void add_stability(CLI::App& app, int& exit_status) {
     command->add_option("--waves", o->waves,
                         "tube: n = 0 ... this, up to 10000; sphere: l (default: all that grow, and some)");
     command->add_option("--q", o->q, "tube: these wave numbers instead, as 0.5,1,1.5 or from:to:count");
-    command->add_option("--rates", o->rates, "other shapes: how many rates for each m, up to 100")
-        ->capture_default_str();
+    command->add_option("--rates", o->rates,
+                        "other shapes: how many rates for each m (3), or of a surface in all (10), up to 100");
     command->add_option("--frame", o->frame, "of a result (default: -1, the last one)");
     command->add_flag("--numerical", o->numerical, "the numerical spectrum, also for tubes and spheres");
     command->add_option("--fit", o->fit, "n[,m]: the growth rate of this wave (of a closed shape l[,m]) in a result");

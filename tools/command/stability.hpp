@@ -24,9 +24,9 @@ struct StabilityOptions {
     std::string file, model, q, fit, plot;
     std::vector<std::string> sets;
     std::optional<double> Re, gamma, tension, kT;
-    std::optional<int> waves;
+    std::optional<int> waves, rates;
     std::optional<long> frame;
-    int modes = 2, rates = 3;
+    int modes = 2;
     bool numerical = false, csv = false, json = false;
     Output output() const { return csv ? Output::csv : json ? Output::json : Output::words; }
 };
@@ -62,6 +62,7 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
                           const std::vector<Problem>& models);
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
                             const std::vector<Problem>& models);
+std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject);
 std::string fit_report(const StabilityOptions& options, const StabilitySubject& subject);
 // What the picture of --plot is drawn from, as JSON.
 std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,

@@ -158,7 +158,7 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
                             const std::vector<Problem>& models) {
     const Curve shape = subject.frame ? meridian(frame_curve(*subject.frame)) : axisym::initial_curve(subject.c);
     axisym::SpectrumSettings settings;
-    settings.last = options.modes, settings.count = options.rates;
+    settings.last = options.modes, settings.count = options.rates.value_or(3);
     std::vector<Found> found;
     std::string refused;
     const double time = subject.frame && !subject.c.equilibrium ? subject.frame->time : 0;  // of loads that change

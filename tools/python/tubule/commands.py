@@ -104,13 +104,14 @@ def equilibrium(case, **options) -> Result:
 
 def stability(subject, *, model: str = "", Re: float | None = None, gamma: float | None = None,
               tension: float | None = None, modes: int = 2, waves: int | None = None, q: Iterable[float] | None = None,
-              rates: int = 3, frame: int | None = None, numerical: bool = False, fit: tuple[int, ...] | None = None,
+              rates: int | None = None, frame: int | None = None, numerical: bool = False, fit: tuple[int, ...] | None = None,
               kT: float | None = None) -> dict:
     """Growth rates of a case or a result: `tubule stability --json`, docs/schemas/stability.json.
 
     model, Re, gamma, tension   instead of the case's; model "all" for every one
     modes, waves, q             m = 0 ... modes; n (spheres: l) up to waves, or these wave numbers
-    rates, numerical            numerical spectra: how many rates for each m; also where a closed form is known
+    rates, numerical            numerical spectra: how many rates for each m (3), of a surface in all (10); also where a
+                                closed form is known
     kT                          also mean squares of amplitudes at this temperature
     frame, fit                  of a result: which frame; or the rate of wave n or (n, m), fitted to its series
 

@@ -1,0 +1,130 @@
+// The slowest modes of a stationary surface in three dimensions.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <span>
+#include <stdexcept>
+
+#include "common/case/read.hpp"
+#include "common/result/start_frame.hpp"
+#include "common/solve/sparse.hpp"
+#include "surface3d/run/equilibrium_run.hpp"
+#include "tools/command/json.hpp"
+#include "tools/command/stability.hpp"
+#include "tools/command/text.hpp"
+
+namespace tubule {
+
+namespace {
+
+struct SurfaceMode {
+    double rate;
+    int m;  // around the axis; -1: none
+};
+
+struct SurfaceModes {
+    std::map<std::string, double> values;  // of the series, at the shape
+    std::vector<SurfaceMode> modes;        // slowest first
+};
+
+// The surface that the case looks for, or that nearest to the frame, with what the case holds.
+Problem problem_of(const StabilityOptions& options, const StabilitySubject& subject) {
+    Case c = subject.c;
+    c.tier = Tier::surface3d;
+    if (!c.equilibrium) c.equilibrium.emplace();
+    EquilibriumChoices& e = *c.equilibrium;
+    e.held = subject.c.equilibrium ? subject.c.held : default_held(c.model);
+    e.family.reset(), e.modes.reset();
+    e.branch = {};
+    e.rates = options.rates.value_or(10);
+    c.time = {}, c.velocity = {}, c.expect = {};
+    CaseInputs inputs;
+    if (subject.frame) {
+        const ResultFrame frame{.path = std::filesystem::path(options.file).filename().string(),
+                                .frame = static_cast<int>(options.frame.value_or(-1))};
+        c.shape = frame;
+        c.surface = {};
+        e.descend = false;
+        inputs = {frame_as_input(frame, *subject.result)};
+    }
+    return parse_case(effective_toml(c), {}, c.path, inputs);
+}
+
+SurfaceModes modes_of(const Problem& c) {
+    struct Keep : RunObserver {
+        std::vector<double> last;
+        void row(std::span<const double> values) override { last.assign(values.begin(), values.end()); }
+    } keep;
+    const RunSummary summary = surface3d::run_equilibrium(c, surface3d::Start(c), keep);
+    if (summary.stop.reason != Stop::finished)
+        throw SolveError(
+            fmt::format("{}: no equilibrium: {}: {}", c.path, name(summary.stop.reason), summary.stop.message));
+    SurfaceModes out;
+    const std::vector<std::string> names = surface3d::equilibrium_series_names(c);
+    for (std::size_t i = 0; i < names.size(); ++i) out.values[names[i]] = keep.last[i];
+    for (int i = 1; i <= *c.equilibrium->rates; ++i)
+        out.modes.push_back({out.values.at(fmt::format("rate_{}", i)),
+                             static_cast<int>(out.values.at(fmt::format("wave_number_{}", i)))});
+    return out;
+}
+
+std::string words_of(const SurfaceModes& found) {
+    const auto value = [&](const char* name) { return found.values.at(name); };
+    std::string out = "gradient flow\n";
+    add(out, "  at rest with energy {:.8g} +- {:.1e}, tension {:.8g}, pressure {:.8g}\n", value("energy"),
+        value("energy_error"), value("tension"), value("pressure"));
+    add(out, "  {:.0f} directions lower the energy under what is held\n", value("negative_directions"));
+    out += "    number    m           rate    e-fold in\n";
+    for (std::size_t i = 0; i < found.modes.size(); ++i) {
+        const auto& [rate, m] = found.modes[i];
+        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate,
+            1 / std::abs(rate), rate > 0 ? "  grows" : "");
+    }
+    add(out, "  {:.0f} triangles\n", value("elements"));
+    return out;
+}
+
+std::string csv_of(const SurfaceModes& found) {
+    std::string out = "model,number,m,rate\n";
+    for (std::size_t i = 0; i < found.modes.size(); ++i)
+        add(out, "gradient-flow,{},{},{:.17g}\n", i + 1, found.modes[i].m, found.modes[i].rate);
+    return out;
+}
+
+std::string json_text(const SurfaceModes& found) {
+    Json modes = Json::array();
+    for (const auto& [rate, m] : found.modes) modes.push_back({{"m", m}, {"rate", rate}});
+    Json out{{"shape", "surface"}};
+    for (const char* name : {"energy", "energy_error", "tension", "pressure"}) out[name] = found.values.at(name);
+    for (const char* name : {"negative_directions", "elements"})
+        out[name] = static_cast<std::int64_t>(found.values.at(name));
+    out["modes"] = modes;
+    return line_of(out);
+}
+
+}  // namespace
+
+std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject) {
+    const auto refuse = [](const char* option, const char* why) {
+        throw std::invalid_argument(
+            fmt::format("{} {} surfaces in three dimensions: {}", option, "does not apply to", why));
+    };
+    if (!options.model.empty() && options.model != "gradient-flow")
+        refuse("--model", "their rates are those of gradient flow, whose signs all models share");
+    if (options.tension) refuse("--tension", "give model.tension in the case");
+    if (options.kT) refuse("--kT", "only profiles of tier axisym, tubes and spheres have mean squares");
+    if (options.numerical || options.waves || !options.q.empty() || !options.plot.empty())
+        refuse("--numerical, --waves, --q and --plot", "their modes are found one by one, see --rates");
+    const SurfaceModes found = modes_of(problem_of(options, subject));
+    switch (options.output()) {
+        case Output::csv:
+            return csv_of(found);
+        case Output::json:
+            return json_text(found);
+        default:
+            return words_of(found);
+    }
+}
+
+}  // namespace tubule
