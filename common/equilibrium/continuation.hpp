@@ -164,7 +164,7 @@ private:
             place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
             lu_ = tier_.factors();
             int iterations = 0;
-            const auto found = advance(place_, 0, iterations);
+            const auto found = advance(place_, 0, iterations, 2);  // the bifurcation may be at the other end
             if (!found) continue;
             place_ = *found;
             // It may begin a little outside of the interval, and lead into it.
@@ -247,8 +247,8 @@ private:
         place.tangent = t / std::sqrt(inner(t, t));
     }
 
-    // The point of the branch at this distance along the tangent, by Newton's method across it.
-    std::optional<Place> advance(const Place& from, double distance, int& iterations) {
+    // The point of the branch at this distance along the tangent, by Newton's method across it in steps below `most`.
+    std::optional<Place> advance(const Place& from, double distance, int& iterations, double most = 0.5) {
         Place to{from.w + distance * from.tangent, from.tangent};
         const int n = static_cast<int>(to.w.size()) - 1;
         const Eigen::VectorXd row = covector(from.tangent);
@@ -264,7 +264,7 @@ private:
                 const double length = std::sqrt(inner(step, step));
                 // Quadratic convergence; or, on fine meshes, that of rounding errors.
                 const bool converged = length < 1e-8 || (length < 1e-6 && length > before / 4);
-                if (!(length < 0.5) || (iterations > 4 && length > 10 * before)) return std::nullopt;
+                if (!(length < most) || (iterations > 4 && length > 10 * before)) return std::nullopt;
                 before = length;
                 if (converged) {
                     set_tangent(to, from.tangent);

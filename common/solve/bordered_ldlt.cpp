@@ -18,6 +18,7 @@ void BorderedLdlt::factor(const Eigen::SparseMatrix<double>& whole) {
         if (!(ldlt_->pivots().growth < most_growth)) throw SolveError("the factors grow");
     } catch (const SolveError&) {
         ldlt_.reset();
+        if (otherwise_ == Otherwise::fail) throw;
         Ordering ordering = ordering_;
         for (Eigen::Index i = n; i < whole.rows(); ++i) ordering.push_back(static_cast<int>(i));
         lu_.emplace(std::move(ordering));

@@ -11,12 +11,15 @@
 namespace tubule {
 
 // Factors of [A C; R D] with A sparse and symmetric and few columns C: L D L^T of A without pivoting, and LU of the
-// complement D - R A^-1 C. Where A has no such factors (a pivot vanishes or they grow too much), LU factors of the whole
-// take their place. A matrix of the same pattern reuses the analysis. One thread at a time.
+// complement D - R A^-1 C. Where A has no such factors (a pivot vanishes or they grow too much), LU factors of the
+// whole take their place, unless SolveError is asked for. A matrix of the same pattern reuses the analysis. One thread
+// at a time.
 class BorderedLdlt {
 public:
-    // `ordering` of A; `border`: how many unknowns the last rows and columns have.
-    BorderedLdlt(Ordering ordering, int border) : ordering_(std::move(ordering)), border_(border) {}
+    enum class Otherwise { lu, fail };
+    // `ordering` of A; `border`: how many unknowns the last rows and columns have; what takes the place of L D L^T.
+    BorderedLdlt(Ordering ordering, int border, Otherwise otherwise = Otherwise::lu)
+        : ordering_(std::move(ordering)), border_(border), otherwise_(otherwise) {}
 
     // Throws SolveError. A matrix whose first unknowns are those of A.
     void factor(const Eigen::SparseMatrix<double>& whole);
@@ -34,6 +37,7 @@ private:
 
     Ordering ordering_;
     int border_;
+    Otherwise otherwise_;
     std::optional<SparseLdlt<double>> ldlt_;
     std::optional<SparseLuLarge> lu_;
     Eigen::SparseMatrix<double> whole_;

@@ -17,9 +17,10 @@ namespace {
 class Shifted {
 public:
     Shifted(const ConstrainedForm& A, const Ordering& ordering, double shift)
-        : size_(A.form.rows()), factors_(ordering, static_cast<int>(A.constraints.cols() + A.low_rank.cols())) {
+        : size_(A.form.rows()),
+          factors_(ordering, static_cast<int>(A.constraints.cols() + A.low_rank.cols()),
+                   BorderedLdlt::Otherwise::fail) {
         factors_.factor(bordered(A, shift));
-        if (factors_.pivoted()) throw SolveError("a shifted form needs pivoting");
         negative_ = factors_.negative() - static_cast<int>(A.constraints.cols());
         if (factors_.complement().size() == 0) return;
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(factors_.complement(), Eigen::EigenvaluesOnly);
@@ -65,11 +66,11 @@ private:
     int negative_ = 0;
 };
 
-// Near `shift`, where the form can be factored.
+// At `shift` or below, where the form can be factored: A alone may be singular, for what is held makes it regular.
 std::pair<Shifted, double> factored_near(const ConstrainedForm& A, const Ordering& ordering, double shift,
                                          double scale) {
     for (int k = 0;; ++k) try {
-            const double at = shift - 1e-3 * k * scale;
+            const double at = k == 0 ? shift : shift - scale * std::pow(10, k - 5);
             return {Shifted(A, ordering, at), at};
         } catch (const SolveError&) {
             if (k == 5) throw;
@@ -105,7 +106,7 @@ int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift
 }
 
 int count_negative(const ConstrainedForm& A, const Ordering& ordering, double scale) {
-    return factored_near(A, ordering, 0, 1e-9 * scale).first.negative();
+    return factored_near(A, ordering, 0, 1e-4 * scale).first.negative();
 }
 
 SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale) {

@@ -106,6 +106,21 @@ class Raster(unittest.TestCase):
         self.assertTrue((picture[r > 1.03][:, 3] == 0).all())
 
 
+class Tubes(unittest.TestCase):
+    def test_cells_that_are_periods_away_join_the_others(self):
+        x, z = np.meshgrid(np.arange(5.0), np.arange(0.25, 3, 0.5))
+        z = z.reshape(-1, 1) + [-0.2, 0.0, 0.2]  # cells of three nodes
+        points = np.stack([np.repeat(x.reshape(-1, 1), 3, axis=1), np.zeros_like(z), z], axis=-1)
+        moved = points.copy()
+        moved[3, :, 2] += 6
+        moved[20, :, 2] -= 3
+        results.join_periods(moved, 3.0)
+        apart = moved[..., 2] - z
+        self.assertLess(np.ptp(moved[..., 2].mean(axis=1)), 3)
+        np.testing.assert_allclose(apart, 3 * np.round(apart / 3), atol=1e-12)
+        np.testing.assert_array_equal(moved[..., :2], points[..., :2])
+
+
 class Surfaces(InFolder):
     @classmethod
     def setUpClass(cls):

@@ -315,6 +315,12 @@ def _profile(path, name, record):
     return Frame(float(record.attrs["time"]), **arrays, parameter=parameter, period=float(record.attrs.get("length", 0)))
 
 
+def join_periods(points, period):
+    """Moves cells [cell, node, 3] of a tube, which remeshing leaves whole periods away from the others, beside these."""
+    z = points[..., 2]
+    z -= period * np.round((z.mean(axis=1, keepdims=True) - np.median(z)) / period)
+
+
 def _surface(path, name, record, meshes):
     number = int(record.attrs["mesh"])
     order, period = (meshes[f"{number:06d}"].attrs[key] for key in ("order", "period"))
@@ -333,5 +339,7 @@ def _surface(path, name, record, meshes):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
     nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p")
     of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
+    if period > 0:
+        join_periods(of_cells["points"], period)
     modes = {key: array[cells] for key, array in nodes.items() if key.startswith("mode_")}
     return Surface(float(record.attrs["time"]), int(order), period == 0, **of_cells, modes=modes, period=float(period), mesh=number, cells=cells, nodes=nodes)
