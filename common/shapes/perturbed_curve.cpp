@@ -255,8 +255,8 @@ std::array<double, CurveMode::terms> fitted(const PerturbedCurve& curve, const s
     const Eigen::VectorXd coefficients =
         Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(functions).solve(right);
     if ((functions * coefficients - right).lpNorm<Eigen::Infinity>() > tolerance)
-        throw std::invalid_argument(
-            fmt::format("a mode varies too fast along the profile for {} functions", CurveMode::terms));
+        throw std::invalid_argument(fmt::format(
+            "a mode varies too fast along the profile for {} functions: take a slower one", CurveMode::terms));
     std::array<double, CurveMode::terms> out;
     for (int k = 0; k < CurveMode::terms; ++k) out[k] = coefficients[k];
     return out;

@@ -24,7 +24,7 @@ struct EnergyValues {
     double kinks = 0;  // INT angle^2 over all edges, times the penalty: of the order of the energy's error
 };
 
-// Of the same sums, with respect to the unknowns.
+// Derivatives of the same sums with respect to the unknowns.
 struct EnergyDerivatives {
     EnergyValues values;
     Eigen::VectorXd energy, area, volume, M;
@@ -46,7 +46,8 @@ public:
     // A zero matrix of the pattern of the Hessian.
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
 
-    // Of a mesh with these triangles; where areas differ, of an energy with_M(). H0 at the nodes, where it varies.
+    // The sums over a mesh with these triangles; where areas differ, with an energy with_M(). H0 at the nodes, where it
+    // varies.
     EnergyValues values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0 = {}) const;
     EnergyDerivatives derivatives(const CurvedMesh& mesh, const Directions& directions, const Bending& bending,
                                   double sigma, double lambda, const Eigen::VectorXd& H0 = {},

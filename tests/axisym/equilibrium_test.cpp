@@ -436,8 +436,8 @@ TEST(Branch, bifurcationOfTheOblates) {
 }
 
 TEST(Branch, leavesOblatesTowardsStomatocytes) {
-    // The pitchfork of the oblates leads to the stomatocytes, whose branch ends at the fold near 0.66: Seifert, Berndl and
-    // Lipowsky 1991. Beyond the fold the shapes are those that a search from a bowl finds.
+    // The pitchfork of the oblates leads to the stomatocytes, whose branch ends at the fold near 0.66: Seifert, Berndl
+    // and Lipowsky 1991. Beyond the fold the shapes are those that a search from a bowl finds.
     const double v = 0.52;
     const auto start = find_equilibrium(vesicle(v), spheroid(v, false), accurate(1e-8));
     ASSERT_EQ(start.stop, Stop::finished) << start.message;
@@ -459,6 +459,12 @@ TEST(Branch, leavesOblatesTowardsStomatocytes) {
     }
     // Where the amplitude vanishes the oblates have a direction without curvature.
     const double critical = (4 * begins[0] - begins[1]) / 3;
+    // The same beginning where the bifurcation is at the far end of a short interval.
+    settings = outputs(v, critical - 1e-3, {});
+    settings.shapes.accuracy = 1e-8, settings.mode = 1, settings.amplitude = 0.02;
+    const Branch beyond = follow_branch(vesicle(v), start, set_reduced_volume, settings);
+    ASSERT_GE(beyond.points.size(), 1u) << beyond.message;
+    EXPECT_NEAR(beyond.points[0].parameter, begins[0], 1e-6);
     settings = outputs(0.55, 0.5, {});
     settings.shapes.accuracy = 1e-8;
     const auto before = find_equilibrium(vesicle(0.55), spheroid(0.55, false), accurate(1e-8));
