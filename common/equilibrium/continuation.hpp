@@ -255,18 +255,20 @@ private:
         double before = 1;
         try {
             for (iterations = 1; iterations <= 12; ++iterations) {
-                if (!tier_.system().admissible(to.u())) return std::nullopt;
+                // A shape on a new mesh may have kinks, which the first iterations smooth.
+                if (distance != 0 && !tier_.system().admissible(to.u())) return std::nullopt;
                 lu_.factor(matrix(to.w, row));
                 Eigen::VectorXd F(n + 1);
                 F << tier_.system().residual(to.u()), row.dot(to.w - from.w) - distance;
                 const Eigen::VectorXd step = lu_.solve(F);
-                to.w -= step;
                 const double length = std::sqrt(inner(step, step));
+                to.w -= (distance == 0 && length > 1e-4 ? downhill_part(to.w, step, F.head(n).norm()) : 1) * step;
                 // Quadratic convergence; or, on fine meshes, that of rounding errors.
                 const bool converged = length < 1e-8 || (length < 1e-6 && length > before / 4);
                 if (!(length < most) || (iterations > 4 && length > 10 * before)) return std::nullopt;
                 before = length;
                 if (converged) {
+                    if (!tier_.system().admissible(to.u())) return std::nullopt;
                     set_tangent(to, from.tangent);
                     return to;
                 }
@@ -275,6 +277,16 @@ private:
         } catch (const std::invalid_argument&) {  // the parameter has left what is possible
         }
         return std::nullopt;
+    }
+
+    // How much of Newton's step reduces the force. All of it is too much where a new mesh has strong kinks.
+    double downhill_part(const Eigen::VectorXd& w, const Eigen::VectorXd& step, double force) {
+        double part = 1;
+        for (; part > 0.01; part /= 2) {
+            const Eigen::VectorXd to = w - part * step;
+            if (residual(to.head(last()), to[last()]).norm() < force) break;
+        }
+        return part;
     }
 
     int index(const Place& p) {
