@@ -63,8 +63,8 @@ public:
     }
 
 private:
-    // Of the shape found last; of the initial one where there is none, and where that is nearer than a new mesh of the
-    // old one.
+    // Meshes the shape found last; the initial one where there is none, and where that is nearer than a new mesh of
+    // the old one.
     CurvedMesh next_mesh(const MakeMesh& initial, int triangles) const {
         if (out_.stop == Stop::finished && !settings_.near) {
             auto finer = remesh(out_.mesh, Eigen::MatrixXd(0, out_.mesh.size()),
