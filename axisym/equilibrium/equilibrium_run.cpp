@@ -99,6 +99,7 @@ Task task_of(const Problem& c) {
         branch.shapes = task.settings;
         branch.output = branch_outputs(c, task.problem);
         branch.from = branch.output.front(), branch.to = branch.output.back();
+        branch.branches = b.branches;
         branch.mode = b.mode.value_or(0), branch.amplitude = b.amplitude.value_or(branch.amplitude);
     }
     const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
@@ -161,6 +162,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     if (choices.branch.parameter)
         table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
                    {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
+    if (choices.branch.branches)
+        table.add({{"branch", [](const ShapeRow& r) { return static_cast<double>(r.point.branch); }}});
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
@@ -333,7 +336,7 @@ StopReport find_shapes(const Task& task, Writer& write, std::vector<std::string>
         write(point);
         pause_if_due();
     };
-    Branch branch = follow_branch(task.problem, first, task.set, settings);
+    Branch branch = follow_branches(task.problem, first, task.set, settings, follow_branch);
     warnings = std::move(branch.warnings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
             advice_for(branch.stop)};

@@ -28,8 +28,10 @@ inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduce
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
     std::optional<double> to, step;
-    std::optional<int> mode;          // it bifurcates from the first shape along this mode, 1 the lowest
-    std::optional<double> amplitude;  // of that mode where the branch begins, over the radius of a sphere of this area
+    std::optional<int> mode;  // it bifurcates from the first shape along this mode, 1 the lowest
+    bool branches = false;    // also those that bifurcate from it, one after another
+    // Of the mode where a bifurcating branch begins, over the radius of a sphere of this area.
+    std::optional<double> amplitude;
 };
 
 // Words if a branch has no shapes, or too many; else empty.
@@ -137,11 +139,16 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         k.number("step", e.branch.step, {.above = 0});
         k.integer("mode", e.branch.mode, {.from = 1, .to = 100});
         k.number("amplitude", e.branch.amplitude, {.above = 0, .to = 0.5});
-        k.check("amplitude", [&] { return e.branch.amplitude && !e.branch.mode ? "is that of a mode: see mode" : ""; });
+        k.flag("branches", e.branch.branches);
+        k.check("amplitude", [&] {
+            const bool used = e.branch.mode || e.branch.branches;
+            return e.branch.amplitude && !used ? "is where a bifurcating branch begins: see mode and branches" : "";
+        });
         k.check("", [&] {
             const BranchChoices& b = e.branch;
             if (!b.parameter)
-                return b.to || b.step || b.mode ? "needs vary: the key that changes along the branch" : "";
+                return b.to || b.step || b.mode || b.branches ? "needs vary: the key that changes along the branch"
+                                                              : "";
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
             if (*b.parameter == vary_alpha || *b.parameter == vary_M0)
                 return energy.alpha ? "" : "varies what the energy does not have: see energy.alpha";

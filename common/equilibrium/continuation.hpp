@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -28,24 +29,34 @@ inline void check_branch(Stop start, double from, double to) {
 
 enum class PointKind { regular, fold, bifurcation };
 
+// Whether the halves of a branch that leaves at a parameter, which begin at these with amplitudes of opposite sign,
+// differ. By symmetry those of a pitchfork begin at the same one.
+inline bool transcritical(double leaves, double one, double other) {
+    return std::abs(one - other) > 0.05 * (std::abs(one - leaves) + std::abs(other - leaves));
+}
+
 template <class Shape>
 struct BranchPoint {
     PointKind kind = PointKind::regular;
     double parameter = 0;
-    int index = 0;  // negative directions that the continuation counts; at a special point, before it
-    Shape shape;    // at special points to about 1e-6 of the parameter's range
+    int index = 0;   // negative directions that the continuation counts; at a special point, before it
+    int mode = 0;    // at a bifurcation: which eigenvalue vanishes, 1 the lowest
+    int branch = 0;  // 0 of the first one, then the number of one that bifurcates from it
+    Shape shape;     // at special points to about 1e-6 of the parameter's range
 };
 
 template <class Shape, class ShapeSettings>
 struct BranchSettings {
-    double from = 0, to = 1;     // the branch starts at `from` and is left where it leaves the interval
-    std::vector<double> output;  // parameters at which shapes are output, each time the branch passes them
+    double from = 0, to = 1;      // the branch is left where it leaves the interval
+    std::optional<double> begin;  // the parameter of the first shape, if it is not `from`
+    std::vector<double> output;   // parameters at which shapes are output, each time the branch passes them
     int max_steps = 500;
     // Not 0: the branch that leaves the first shape along this mode, 1 the lowest of the second variation. It begins
     // where the mode's largest displacement is `amplitude` times the radius of a sphere of the same area.
     int mode = 0;
     double amplitude = 0.05;
-    ShapeSettings shapes;  // accuracy of each
+    bool branches = false;  // follow_branches() also follows those that bifurcate from it
+    ShapeSettings shapes;   // accuracy of each
     // Is given each as soon as it is known.
     std::function<void(const BranchPoint<Shape>&)> found = [](const BranchPoint<Shape>&) {};
 };
@@ -103,7 +114,7 @@ public:
         const double slack = 1e-9 * range_;
         low_ = std::min(settings.from, settings.to) - slack, high_ = low_ + range_ + 2 * slack;
         place_.w.resize(start.size() + 1);
-        place_.w << start, settings.from;
+        place_.w << start, settings.begin.value_or(settings.from);
     }
 
     Branch<Shape> run() {
@@ -161,7 +172,7 @@ private:
             place_ = first;
             tier_.system().set_problem(problem_at(first.parameter()));
             tier_.leave(place_, settings_.mode, far);
-            place_.tangent /= std::sqrt(inner(place_.tangent, place_.tangent));
+            place_.tangent *= std::copysign(1 / std::sqrt(inner(place_.tangent, place_.tangent)), far);
             lu_ = tier_.factors();
             int iterations = 0;
             const auto found = advance(place_, 0, iterations, 2);  // the bifurcation may be at the other end
@@ -348,10 +359,11 @@ private:
             if (const auto at = at_parameter(a, b, step, end)) step = at->first, b = at->second;
         std::vector<std::pair<double, Point>> found;
         bool complete = true;
-        const auto note = [&](const std::optional<At>& at, PointKind kind) {
+        const auto note = [&](const std::optional<At>& at, PointKind kind, int mode = 0) {
             if (!at) complete = false;
             if (!at || at->second.parameter() < low_ || at->second.parameter() > high_) return;
             found.emplace_back(at->first, point(at->second, kind));
+            found.back().second.mode = mode;
         };
         const bool turned = a.tangent[last()] * b.tangent[last()] < 0;
         if (turned) note(locate(a, b, step, [&](const Place& p) { return p.tangent[last()]; }), PointKind::fold);
@@ -366,12 +378,20 @@ private:
                                 a.parameter(), b.parameter()));
                 at = {step, b};
             }
-            note(at, PointKind::bifurcation);
+            note(at, PointKind::bifurcation, which + 1);
         }
         for (double wanted : settings_.output) {
             const double left = a.parameter() - wanted, right = b.parameter() - wanted;
             if (wanted != settings_.from || branch_.steps > 1 || settings_.mode > 0)
-                if (left * right < 0 || right == 0) note(at_parameter(a, b, step, wanted), PointKind::regular);
+                if (left * right < 0 || right == 0) {
+                    const auto at = at_parameter(a, b, step, wanted);
+                    if (at)
+                        note(at, PointKind::regular);
+                    else  // a bifurcation is too close for Newton's method
+                        branch_.warnings.push_back(fmt::format(
+                            "no shape was found at the parameter {:.6g}, beside a special point: it is left out",
+                            wanted));
+                }
         }
         std::sort(found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
         for (auto& [distance, p] : found) {
@@ -398,7 +418,7 @@ private:
     Point point(const Place& place, PointKind kind) {
         const StationaryProblem problem = problem_at(place.parameter());
         tier_.system().set_problem(problem);
-        return {kind, place.parameter(), 0, tier_.report(place, problem, kind)};
+        return {kind, place.parameter(), 0, 0, 0, tier_.report(place, problem, kind)};
     }
 
     // Other unknowns where these are not the best. False if there are none.
@@ -433,5 +453,52 @@ private:
     int index_ = 0;  // at the place
     Branch<Shape> branch_;
 };
+
+// The branch and, if settings.branches, those that bifurcate from it: of a pitchfork the half that its symmetry maps to
+// the other one, of a transcritical bifurcation both halves. `follow(problem, start, set, settings)` follows one. Its
+// end is that of the first; how others end too early is a warning.
+template <class Shape, class ShapeSettings, class Follow>
+Branch<Shape> follow_branches(const StationaryProblem& problem, const Shape& start, const SetParameter& set,
+                              const BranchSettings<Shape, ShapeSettings>& settings, Follow&& follow) {
+    if (!settings.branches) return follow(problem, start, set, settings);
+    std::vector<BranchPoint<Shape>> bifurcations;
+    BranchSettings<Shape, ShapeSettings> one = settings;
+    one.found = [&](const BranchPoint<Shape>& p) {
+        if (p.mode > 0) bifurcations.push_back(p);
+        settings.found(p);
+    };
+    Branch<Shape> all = follow(problem, start, set, one);
+    int branch = 0;
+    for (const BranchPoint<Shape>& from : bifurcations) {
+        StationaryProblem here = problem;
+        set(here, from.parameter);
+        one.mode = from.mode, one.begin = from.parameter;
+        std::optional<double> begins;  // of the first half
+        for (const double side : {1, -1}) {
+            one.amplitude = side * settings.amplitude;
+            if (begins) {
+                one.max_steps = 0, one.found = [](const BranchPoint<Shape>&) {};
+                const auto points = follow(here, from.shape, set, one).points;
+                if (points.empty() || !transcritical(from.parameter, *begins, points.front().parameter)) break;
+            }
+            ++branch;
+            one.max_steps = settings.max_steps;
+            one.found = [&](BranchPoint<Shape> p) {
+                p.branch = branch;
+                settings.found(p);
+                all.points.push_back(std::move(p));
+            };
+            Branch<Shape> found = follow(here, from.shape, set, one);
+            all.steps += found.steps;
+            std::move(found.warnings.begin(), found.warnings.end(), std::back_inserter(all.warnings));
+            if (found.stop != Stop::finished)
+                all.warnings.push_back(fmt::format("branch {}, which leaves at the parameter {:.6g}, ends: {}", branch,
+                                                   from.parameter, found.message));
+            if (found.points.empty()) break;
+            begins = found.points.front().parameter;
+        }
+    }
+    return all;
+}
 
 }  // namespace tubule

@@ -68,6 +68,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"turn", "radian", "largest angle between normals of neighbouring nodes", SeriesUse::diagnostic},
     {"parameter", "that of the key", "value of the key that varies along a branch"},
     {"special", "1", "1 at a fold, 2 at a bifurcation, else 0"},
+    {"branch", "1", "0 of the first branch, then the number of one that bifurcates from it"},
     {"negative_directions", "1", "number of directions in which the energy falls"},
     {"rate_<i>", "1/time", "growth rate of the <i>-th slowest mode"},
     {"wave_number_<i>", "1", "waves of mode <i> around the axis of the shape; -1 if there is none"},

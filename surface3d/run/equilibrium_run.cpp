@@ -45,6 +45,7 @@ Task task_of(const Problem& c, const Start& start) {
         task.branch.shapes = s;
         task.branch.output = branch_outputs(c, task.problem);
         task.branch.from = task.branch.output.front(), task.branch.to = task.branch.output.back();
+        task.branch.branches = b.branches;
         task.branch.mode = b.mode.value_or(0), task.branch.amplitude = b.amplitude.value_or(task.branch.amplitude);
     }
     return task;
@@ -78,6 +79,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     if (c.equilibrium->branch.parameter)
         table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
                    {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
+    if (c.equilibrium->branch.branches)
+        table.add({{"branch", [](const ShapeRow& r) { return static_cast<double>(r.point.branch); }}});
     table.add({{"energy", [](const ShapeRow& r) { return r.shape.values.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.terms[term]; });
@@ -226,7 +229,7 @@ StopReport find_shapes(const Problem& c, const Start& start, const Task& task, S
         write(point);
         pause_if_due();
     };
-    Branch branch = follow_branch(task.problem, shape, task.set, settings);
+    Branch branch = follow_branches(task.problem, shape, task.set, settings, follow_branch);
     warnings = std::move(branch.warnings);
     return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
             advice_for(branch.stop)};

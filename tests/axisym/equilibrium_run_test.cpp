@@ -97,6 +97,8 @@ TEST(EquilibriumCase, refusals) {
     expect("vary = \"energy.k42\"\n", "", "14:1: equilibrium.branch needs vary: the key that changes along the branch");
     expect("step = 0.05\n", "",
            "14:1: equilibrium.branch needs to and step: the end of the branch and the distance between shapes");
+    expect("step = 0.05\n", "step = 0.05\namplitude = 0.1\n",
+           "18:13: equilibrium.branch.amplitude is where a bifurcating branch begins: see mode and branches");
     expect("energy.k42", "energy.M0",
            "14:1: equilibrium.branch varies what the energy does not have: see energy.alpha");
     expect("energy.k42", "energy.k43",

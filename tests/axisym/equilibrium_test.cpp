@@ -435,6 +435,41 @@ TEST(Branch, bifurcationOfTheOblates) {
     EXPECT_LT(std::abs(spectrum[0]), 1e-4 * spectrum[1]);
 }
 
+TEST(Branch, bothHalvesOfATranscriticalBifurcationOneOfAPitchfork) {
+    // Exact: a sphere under the pressure -24 k20/R^3 (Ou-Yang and Helfrich 1987). By symmetry oblates and prolates
+    // differ, and stomatocytes that open upwards and downwards do not.
+    const double R = 1;
+    StationaryProblem pressed;
+    pressed.bending = bending(1, 0, 0, 0), pressed.constraints.area = 4 * pi * R * R, pressed.loads.pressure = -23;
+    const auto sphere = find_equilibrium(pressed, spheroid(0.99, true), accurate(1e-8));
+    ASSERT_EQ(sphere.stop, Stop::finished) << sphere.message;
+    BranchSettings settings = outputs(-23, -26, {-24, -25});
+    settings.shapes.accuracy = 1e-8, settings.branches = true;
+    const Branch all = follow_branches(pressed, sphere, setter(vary_pressure), settings, follow_branch);
+    EXPECT_EQ(all.stop, Stop::finished) << all.message;
+    std::vector<double> begins, at_25;
+    for (const auto& p : all.points) {
+        if (p.branch > 0 && p.kind == PointKind::bifurcation) begins.push_back(p.parameter);
+        if (p.branch == 0 && p.kind == PointKind::bifurcation) EXPECT_NEAR(p.parameter, -24, 1e-4);
+        if (p.parameter == -25) at_25.push_back(p.shape.observed.energy - 25 * (4 * pi / 3 - p.shape.observed.volume));
+    }
+    ASSERT_EQ(begins.size(), 2u);
+    EXPECT_LT((begins[0] + 24) * (begins[1] + 24), 0);
+    ASSERT_EQ(at_25.size(), 2u);  // the sphere and the oblate, which has less energy under this pressure
+    EXPECT_NEAR(at_25[0], 16 * pi, 1e-6);
+    EXPECT_LT(at_25[1], at_25[0] - 0.01);
+    // At the bifurcation the sphere is not found with the pressure held: that does not end the branch.
+    const auto at_24 = [](const auto& p) { return p.branch == 0 && p.parameter == -24; };
+    EXPECT_EQ(all.warnings.size(), std::any_of(all.points.begin(), all.points.end(), at_24) ? 0u : 1u);
+
+    const auto oblate = find_equilibrium(vesicle(0.55), spheroid(0.55, false), accurate(1e-8));
+    settings = outputs(0.55, 0.5, {});
+    settings.shapes.accuracy = 1e-8, settings.branches = true;
+    const Branch bent = follow_branches(vesicle(0.55), oblate, set_reduced_volume, settings, follow_branch);
+    ASSERT_EQ(bent.points.size(), 2u);
+    EXPECT_EQ(bent.points[1].branch, 1);
+}
+
 TEST(Branch, leavesOblatesTowardsStomatocytes) {
     // The pitchfork of the oblates leads to the stomatocytes, whose branch ends at the fold near 0.66: Seifert, Berndl
     // and Lipowsky 1991. Beyond the fold the shapes are those that a search from a bowl finds.

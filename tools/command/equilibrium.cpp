@@ -24,13 +24,15 @@ Text table_of(const Result& result) {
     Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
     const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
-    const bool branch = has("parameter"), modes = has("growth_0"), rates = has("rate_1");
+    const bool branch = has("parameter"), branches = has("branch"), modes = has("growth_0"), rates = has("rate_1");
     if (branch) add(out, "{:>14}  ", "parameter");
     add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "tension", "pressure", "height", "r_max", "neg");
     if (modes || rates) add(out, "  {:>10} of m", "growth");
     add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
+        if (branches && i > 0 && value("branch", i) != value("branch", i - 1))
+            add(out, "branch {:.0f}, which bifurcates from the first:\n", value("branch", i));
         const int negative = static_cast<int>(value("negative_directions", i));
         const bool known = negative >= 0;  // not of a state that is no equilibrium
         if (branch) add(out, "{:>14.9g}  ", value("parameter", i));

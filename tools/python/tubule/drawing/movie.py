@@ -119,7 +119,10 @@ class Stage:
         if "energy" not in series or len(series["energy"]) < 2:
             return
         axes = self.figure.add_axes([0.66, 0.17, 0.31, 0.68])
-        axes.plot(series[key], series["energy"], color=line_colours(1)[0])
+        # One line a branch.
+        ends = np.flatnonzero(np.diff(series.get("branch", series["energy"] * 0))) + 1
+        for x, y in zip(np.split(series[key], ends), np.split(series["energy"], ends)):
+            axes.plot(x, y, color=line_colours(1)[0])
         axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))  # few: numbers of small times are long
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         axes.set(xlabel=self.name if parameter else "time t", ylabel="energy E")

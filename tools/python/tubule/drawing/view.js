@@ -186,7 +186,8 @@ class Plot {
 
   set(name, logarithmic) {
     const x = data.series[data.along] || [], y = data.series[name] || [];
-    this.points = x.map((value, i) => [value, y[i]]).filter(([a, b]) => a !== null && b !== null);
+    const branch = data.series.branch || [];
+    this.points = x.map((value, i) => [value, y[i], branch[i]]).filter(([a, b]) => a !== null && b !== null);
     const later = this.points.map(p => p[0]).filter(a => a > 0);
     this.logarithmic = logarithmic && later.length > 1;
     if (this.logarithmic) this.first = Math.min(...later);
@@ -216,7 +217,8 @@ class Plot {
     for (const x of [x0, (x0 + x1) / 2, x1]) c.fillText(short(this.logarithmic ? 10 ** x : x), Math.min(px(x), width - 28), height - 14);
     c.fillText(data.along_words + (this.logarithmic ? " (logarithmic)" : ""), (this.left + this.right) / 2, height - 3);
     c.strokeStyle = "#1f5fa8", c.lineWidth = 1.5, c.beginPath();
-    xs.forEach((x, i) => i ? c.lineTo(px(x), py(ys[i])) : c.moveTo(px(x), py(ys[i])));
+    const joined = i => i && this.points[i][2] === this.points[i - 1][2];
+    xs.forEach((x, i) => joined(i) ? c.lineTo(px(x), py(ys[i])) : c.moveTo(px(x), py(ys[i])));
     c.stroke();
     c.strokeStyle = "#c0392b", c.lineWidth = 1, c.beginPath();
     c.moveTo(px(this.scaled(now)), top), c.lineTo(px(this.scaled(now)), bottom), c.stroke();
