@@ -222,6 +222,15 @@ class Stability(ProgramTest):
         fastest = {row["m"]: float(row["rate"]) for row in spectrum if row["number"] == "0"}
         self.assertAlmostEqual(fastest["2"] / rows["2"], 1, delta=1e-5)
         self.assertAlmostEqual(fastest["3"] / rows["3"], 1, delta=1e-5)
+        # In one list: l = 0, which is neutral (E has no size), those of l = 2 with m = 0, 1, 2, of l = 3 with m = 0 ... 3.
+        slowest = self.json(case, "--numerical", "--modes", "3", "--rates", "8")["models"][0]["slowest"]
+        self.assertEqual([sorted(mode["m"] for mode in some) for some in (slowest[:1], slowest[1:4], slowest[4:])],
+                         [[0], [0, 1, 2], [0, 1, 2, 3]])  # fmt: skip
+        self.assertAlmostEqual(slowest[0]["rate"], 0, delta=1e-4)
+        for i, mode in enumerate(slowest[1:]):
+            self.assertAlmostEqual(mode["rate"] / rows["2" if i < 3 else "3"], 1, delta=1e-5)
+        out = self.tubule("stability", case, "--numerical", "--modes", "3")[0]
+        self.assertRegex(out, r"slowest of m = 0 \.\.\. 3\n.*number.*rate.*\n +1 +0 .*\n +2 +[012] +-48(\.0+\d*)? ")
         # With a tension, G = (L/R^2)(F2 L/R^2 + f + sigma0), overdamped: Lam/(Lam + 4) of -G, Lam = 6, L = 4.
         tense = ("--tension", "-3", "--model", "overdamped")
         exact = -0.6 * 4 * (2 * 4 + 4 - 3)

@@ -73,6 +73,14 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
 double mean_square(double kT, double eigenvalue, double scale, double area, const std::string& mode);
 void refuse_motion(const std::string& why);  // of a shape that is asked about at a kT
 
+// One mode: its growth rate, and its waves around the axis; m = -1: of a shape without one.
+struct SlowMode {
+    double rate;
+    int m;
+};
+// Rows of a table of them.
+std::string words_of_modes(const std::vector<SlowMode>& modes);
+
 // Name and numbers of its model.
 std::string words_of_model(const Problem& c);
 

@@ -28,6 +28,19 @@ Held held_in(const Problem& c, const MotionLaw& law) {
     return c.equilibrium && !law.inextensible ? c.held : axisym::held_by(law);
 }
 
+// The slowest of all m, as many as of each, the fastest to grow first; those of m > 0 stand for cosine and sine.
+std::vector<SlowMode> slowest(const axisym::Spectrum& spectrum) {
+    std::vector<SlowMode> out;
+    std::size_t most = 0;
+    for (const axisym::ModeRates& mode : spectrum.modes) {
+        most = std::max(most, mode.rates.size());
+        for (const double rate : mode.rates) out.push_back({rate, mode.m});
+    }
+    std::stable_sort(out.begin(), out.end(), [](const SlowMode& a, const SlowMode& b) { return a.rate > b.rate; });
+    out.resize(std::min(most, out.size()));
+    return out;
+}
+
 // The mean square over the surface of all displacements of one m, with cosine and sine.
 double of_all(double kT, const axisym::ModeRates& mode, double area) {
     return kT / area * (mode.m == 0 ? 1 : 2) * mode.softness;
@@ -80,18 +93,14 @@ std::string words_of(const std::vector<Found>& found, double kT) {
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");
         if (problem.law.free_period) out += "    0   left out: such waves change the free period\n";
-        const axisym::ModeRates* fastest = nullptr;
         for (const axisym::ModeRates& mode : spectrum.modes) {
             out += fmt::format("{:>5}", mode.m);
             for (const double rate : mode.rates) add(out, " {:>14.7g}", rate);
             out += mode.stable() ? "\n" : "  grows\n";
-            if (!mode.rates.empty() && (!fastest || mode.rates[0] > fastest->rates[0])) fastest = &mode;
         }
-        if (fastest && !fastest->stable())
-            out += fmt::format("  fastest: m = {}, rate {:.7g}, e-fold in {:.6g}\n", fastest->m, fastest->rates[0],
-                               1 / fastest->rates[0]);
-        else if (fastest)
-            out += fmt::format("  none grows; slowest to decay: m = {}, rate {:.7g}\n", fastest->m, fastest->rates[0]);
+        if (!spectrum.modes.empty())
+            add(out, "  slowest of m = {} ... {}\n{}", spectrum.modes.front().m, spectrum.modes.back().m,
+                words_of_modes(slowest(spectrum)));
         out += std::isfinite(spectrum.estimated_error)
                    ? fmt::format("  estimated error of the rates {:.1e} (relative)", spectrum.estimated_error)
                    : std::string("  error of the rates unknown: only the finest mesh was fine enough");
@@ -140,6 +149,8 @@ std::string json_text(const std::vector<Found>& found, double kT) {
         Json modes = Json::array();
         for (const axisym::ModeRates& mode : spectrum.modes)
             modes.push_back({{"m", mode.m}, {"rates", mode.rates}, {"shape", mode.shape}});
+        Json sorted = Json::array();
+        for (const auto& [rate, m] : slowest(spectrum)) sorted.push_back({{"m", m}, {"rate", rate}});
         models.push_back({{"model", name(problem.model)},
                           {"at_rest", spectrum.at_rest()},
                           {"tension", spectrum.sigma},
@@ -147,6 +158,7 @@ std::string json_text(const std::vector<Found>& found, double kT) {
                           {"estimated_error", spectrum.estimated_error},
                           {"elements", spectrum.elements},
                           {"modes", modes},
+                          {"slowest", sorted},
                           {"fluctuations", warm ? json_of_warm(*warm, kT) : Json()}});
     }
     return line_of({{"shape", "profile"}, {"models", models}});

@@ -18,14 +18,9 @@ namespace tubule {
 
 namespace {
 
-struct SurfaceMode {
-    double rate;
-    int m;  // around the axis; -1: none
-};
-
 struct SurfaceModes {
     std::map<std::string, double> values;  // of the series, at the shape
-    std::vector<SurfaceMode> modes;        // slowest first
+    std::vector<SlowMode> modes;           // slowest first
 };
 
 // The surface that the case looks for, or that nearest to the frame, with what the case holds.
@@ -75,12 +70,7 @@ std::string words_of(const SurfaceModes& found) {
     add(out, "  at rest with energy {:.8g} +- {:.1e}, tension {:.8g}, pressure {:.8g}\n", value("energy"),
         value("energy_error"), value("tension"), value("pressure"));
     add(out, "  {:.0f} directions lower the energy under what is held\n", value("negative_directions"));
-    out += "    number    m           rate    e-fold in\n";
-    for (std::size_t i = 0; i < found.modes.size(); ++i) {
-        const auto& [rate, m] = found.modes[i];
-        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate,
-            1 / std::abs(rate), rate > 0 ? "  grows" : "");
-    }
+    out += words_of_modes(found.modes);
     add(out, "  {:.0f} triangles\n", value("elements"));
     return out;
 }
@@ -104,6 +94,16 @@ std::string json_text(const SurfaceModes& found) {
 }
 
 }  // namespace
+
+std::string words_of_modes(const std::vector<SlowMode>& modes) {
+    std::string out = "    number    m           rate    e-fold in\n";
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+        const auto& [rate, m] = modes[i];
+        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate,
+            1 / std::abs(rate), rate > 0 ? "  grows" : "");
+    }
+    return out;
+}
 
 std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject) {
     const auto refuse = [](const char* option, const char* why) {
