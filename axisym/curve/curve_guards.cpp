@@ -34,6 +34,8 @@ std::span<const CurveGuard> curve_guards() {
          [](const Snapshot& s, double time) {
              return undefined_energy(s.o.domain, time, fmt::format("s = {:.4g}", s.o.domain.place));
          }},
+        {[](const Snapshot& s, double) { return s.pressure_domain.is_small() ? -1 : 1.0; },
+         [](const Snapshot& s, double time) { return undefined_pressure(s.pressure_domain, time); }},
         {[](const Snapshot& s, double) { return s.o.g_min / s.o.g_max - stretched; },
          [](const Snapshot& s, double time) {
              return StopReport{Stop::mesh_lost, time,

@@ -180,7 +180,7 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.tension = add(law.keeps_area, 1);
     at_.supply = add(law.reservoir, 1);
     at_.stretch = add(space.free_period(), 1);
-    at_.lambda = add(law.keeps_volume, 1);
+    at_.lambda = add(law.keeps_volume || law.pressure_of_volume, 1);
     at_.area = add(law.inextensible && law.holds_area, 1);
     at_.volume = add(law.inextensible && law.keeps_volume && law.holds_volume, 1);
     const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
@@ -330,17 +330,26 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     add_gradient(force_weights(t, y), law_.inextensible ? F + at_.u_r : F);
     add_gradient(drift_weights(y), F);
     if (slides()) forms_.add_sliding(y, F);
-    const double A = stdx::reduce(area) - area0_, V = stdx::reduce(volume) - volume0_;
-    if (at_.area >= 0) F[at_.area] = A;
-    if (at_.tension >= 0) F[at_.tension] = A;
-    if (at_.volume >= 0) F[at_.volume] = V;
-    if (at_.lambda >= 0 && !law_.inextensible) F[at_.lambda] = V;
-    if (at_.lambda >= 0 && law_.inextensible) F[at_.lambda] = gradient_at({.volume = 1}, y).dot(velocity(y));
-    if (at_.mu >= 0) F[at_.mu] = y[at_.mu] - area_difference_force(forms_.bending(), forms_.M(y));
+    set_numbers(t, y, stdx::reduce(area), stdx::reduce(volume), F);
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
     F[at_.stretch] += gradient_at(force_weights(t, y), y).dot(stretched(y)) - law_.force.at(t) * space().length(y);
     return true;
+}
+
+// The equations of the multipliers of area and volume, and of mu, of a curve with this area and volume.
+void CurveMotion::set_numbers(double t, const double* y, double area, double volume, double* F) const {
+    const double A = area - area0_, V = volume - volume0_;
+    if (at_.area >= 0) F[at_.area] = A;
+    if (at_.tension >= 0) F[at_.tension] = A;
+    if (at_.volume >= 0) F[at_.volume] = V;
+    if (at_.lambda >= 0 && !law_.keeps_volume)
+        F[at_.lambda] = y[at_.lambda] + loads_at(law_, t).pressure_at(volume);
+    else if (at_.lambda >= 0 && !law_.inextensible)
+        F[at_.lambda] = V;
+    else if (at_.lambda >= 0)
+        F[at_.lambda] = gradient_at({.volume = 1}, y).dot(velocity(y));
+    if (at_.mu >= 0) F[at_.mu] = y[at_.mu] - area_difference_force(forms_.bending(), forms_.M(y));
 }
 
 // The whole velocity, as the rates of a curve.
@@ -536,6 +545,16 @@ void CurveMotion::add_numbers(const double* y, double* values) const {
     }
     if (at_.lambda < 0) return;
     const Eigen::VectorXd slope = gradient_at({.volume = 1}, y);
+    if (!law_.keeps_volume) {
+        const std::vector<int>& row = number_rows_.at(at_.lambda);
+        const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, all);
+        const int column = pattern_.outerIndexPtr()[at_.lambda] + (law_.inextensible ? at_.u_r : 0);
+        const double by_volume = loads_at(law_, 0).pressure_slope(forms_.observe(x).volume);
+        for (int i = 0; i < n; ++i) values[column + i] += slope[i];
+        for (int i = 0; i < all; ++i) values[row[i]] += by_volume * slope[i];
+        values[row[at_.lambda]] += 1;
+        return;
+    }
     if (!law_.inextensible) return add_border(at_.lambda, 0, 0, slope);
     if (at_.volume >= 0) add_border(at_.volume, 0, 0, slope);
     add_border(at_.lambda, at_.u_r, at_.u_r, slope);

@@ -35,7 +35,7 @@ struct MotionLayout {
     int tension = -1;            // of an extensible membrane: multiplier of A(X) = A0, the force tension H nu
     int supply = -1;             // of a reservoir: the number that div u is everywhere
     int stretch = -1;            // of a free period L: L_t/L, the velocity has the part (L_t/L) z e_z
-    int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0
+    int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0; or -P(V), theory.md (3.24)
     int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
     int mu = -1;                 // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
@@ -57,8 +57,9 @@ struct InitialState {
 // with c = (u - X_t).t. Half of (div u - supply) u is added to the acceleration, by which the discrete kinetic energy
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
-// pressure that is given stands for -lambda. A free period adds (L_t/L) z e_z to u, and the test
-// function z e_z. Many fields: besides the problem, the places of all its terms in the matrix, found once.
+// pressure that is given stands for -lambda; where it is a formula of the volume, lambda + P(V) = 0. A free period adds
+// (L_t/L) z e_z to u, and the test function z e_z. Many fields: besides the problem, the places of all its terms in the
+// matrix, found once.
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
@@ -110,6 +111,7 @@ private:
     Eigen::VectorXd stretched(const double* y) const;
     void add_law(double t, const double* y, const double* rate, double cj, double* values) const;
     void add_forms(double t, const double* y, double* values) const;
+    void set_numbers(double t, const double* y, double area, double volume, double* F) const;
     void add_numbers(const double* y, double* values) const;
     void add_stretch(double t, const double* y, double cj, double* values) const;
     PointNumbers point_numbers(double t, const double* y) const;

@@ -136,6 +136,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     const FormulaDomain::Margin domain = forms.observe(x).domain;
     require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
+    require_pressure(c, start.volume);
     law.swirls = law.swirls || (start.velocity && start.velocity->velocity->swirls);
     const double energy = start.free_energy(law);
     magnitude = std::max(std::abs(energy), std::max(std::abs(start.bending.energy), start.bending.magnitude) +

@@ -217,7 +217,7 @@ void CurveSimulation::add_to_trace(double t) {
     const CurveForms& forms = setup_.motion->forms();
     const Eigen::VectorXd gradient = forms.gradient({.energy = 1,
                                                      .area = loads.tension,
-                                                     .volume = -loads.pressure,
+                                                     .volume = -loads.pressure_at(now_.o.volume),
                                                      .M = area_difference_force(forms.bending(), now_.o.M)},
                                                     setup_.curve(integrator_->x())),
                           moves = setup_.curve(integrator_->v());
@@ -252,6 +252,8 @@ std::optional<StopReport> CurveSimulation::advance(double until) {
     if (at_kink_) outcome_ = TimeIntegrator::Outcome::step;
     if (outcome_ == TimeIntegrator::Outcome::failed && may_be_undefined(now_.o.domain))
         return undefined_energy(now_.o.domain, t, fmt::format("s = {:.4g}", now_.o.domain.place));
+    if (outcome_ == TimeIntegrator::Outcome::failed && may_be_undefined(now_.pressure_domain))
+        return undefined_pressure(now_.pressure_domain, t);
     if (outcome_ == TimeIntegrator::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + integrator_->failure(),
                           another_resolution};

@@ -55,6 +55,7 @@ Snapshot measure(const CurveMotion& motion, double t, const double* y, const dou
     out.o.r_max = measures(space, x).r_max;
     out.period = space.length(y);
     out.free_energy = out.o.energy + loads_at(motion.law(), t).energy(out.o.area, out.o.volume, out.period);
+    out.pressure_domain = pressure_domain(motion.law(), out.o.volume);
     return out;
 }
 

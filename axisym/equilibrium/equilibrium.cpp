@@ -148,7 +148,8 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
     Eigen::MatrixXd hessian = forms_.hessian(weights(u), x);
     const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x),
                           M = slope_of_M(x);
-    hessian += problem_.bending.alpha.value_or(0) * M * M.transpose();
+    hessian += problem_.bending.alpha.value_or(0) * M * M.transpose() -
+               problem_.loads.pressure_slope(forms_.observe(x).volume) * volume * volume.transpose();
     Eigen::MatrixXd fixed(n, 0);
     const auto fix = [&](const Eigen::VectorXd& functional) {
         fixed.conservativeResize(n, fixed.cols() + 1);
@@ -268,8 +269,7 @@ double reference_energy_of(const StationaryProblem& problem, const CurveForms& f
     const Loads& loads = problem.loads;
     const double length = forms.space().length(x.data());
     return std::max(std::abs(free_energy(problem, o, length)),
-                    forms.reference_energy(x) + std::abs(loads.tension) * o.area + std::abs(loads.pressure * o.volume) +
-                        std::abs(loads.force) * length);
+                    forms.reference_energy(x) + loads.scale(o.area, o.volume, length));
 }
 
 // The radius of the narrowest neck of a closed curve; infinite where it has none.
@@ -435,7 +435,8 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
     Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + StationarySystem::numbers), x = fit(*space, start);
     scale_to(forms, problem.constraints, x);
     u.head(space->size()) = x;
-    u[space->size()] = problem.loads.tension, u[space->size() + 1] = -problem.loads.pressure;
+    u[space->size()] = problem.loads.tension;
+    u[space->size() + 1] = -problem.loads.pressure_at(forms.observe(x).volume);
     u[space->size() + 2] = area_difference_force(problem.bending, forms.M(x.data()));
     return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }

@@ -18,6 +18,7 @@
 #include "common/case/read.hpp"
 #include "common/equilibrium/equilibrium_task.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/series/table.hpp"
 
@@ -82,6 +83,7 @@ Task task_of(const Problem& c) {
     }
     check_varying_H0(c, task.start);
     const auto [area, volume] = area_and_volume(task.start);
+    require_pressure(c, volume);
     task.problem = stationary_problem(c, area, volume);
     const Constraints& held = task.problem.constraints;
     if (e.family) {

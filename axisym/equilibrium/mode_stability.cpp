@@ -368,6 +368,8 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
     if (m == 0 && mirror(parity) >= 0) {
         const double whole = 2 * pi * space.images();
         forms.second_variation += whole * problem_.bending.alpha.value_or(0) * forms.M * forms.M.transpose();
+        const double slope = problem_.loads.pressure_slope(shape_.observed.volume);
+        forms.second_variation -= whole * slope * forms.volume * forms.volume.transpose();
         const Constraints& c = problem_.constraints;
         const bool flows = law.inextensible;
         if ((flows && !law.reservoir) || c.area) append(fixed, forms.area.normalized());

@@ -16,10 +16,10 @@ namespace tubule::axisym {
 
 struct ModeRates {
     int m = 0;
-    std::vector<double> rates;  // exp(rate t), descending; rigid motions are left out
-    std::vector<double> shape;  // w of the first, at equally spaced s, the largest being 1
+    std::vector<double> rates{};  // exp(rate t), descending; rigid motions are left out
+    std::vector<double> shape{};  // w of the first, at equally spaced s, the largest being 1
     // Displacements w cos(m theta) of each, likewise, whose mean square over the surface is 1.
-    std::vector<std::vector<double>> displacements;
+    std::vector<std::vector<double>> displacements{};
     double softness = 0;  // SUM -1/rate over all rates of the mesh, of which those above are the first
     // No wave of this m grows.
     bool stable() const { return rates.empty() || rates[0] <= 0; }

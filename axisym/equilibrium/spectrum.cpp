@@ -40,6 +40,10 @@ Eigen::VectorXd multipliers_for(const Eigen::MatrixXd& columns, const Eigen::Vec
     return out + along * least_squares(columns * along, -(force + columns * out), mesh_error)(0);
 }
 
+Loads loads_of(const SpectrumSettings& settings) {
+    return {settings.sigma.value_or(0), settings.pressure, settings.force.value_or(0), settings.pressure_of_volume};
+}
+
 // The shape on this many elements, with the multipliers that minimise the force in the norm (INT b^2 dS)^(1/2).
 Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& settings, const Curve& shape,
                      int elements, double& unbalanced) {
@@ -63,7 +67,7 @@ Equilibrium balanced(const Bending& bending, Held kept, const SpectrumSettings& 
     const Eigen::MatrixXd mass = forms.mass(e.x);
     const Eigen::LLT<Eigen::MatrixXd> factors(mass);
     const auto scaled = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(factors.matrixL().solve(v)); };
-    e.sigma = sigma.value_or(0), e.lambda = volume ? 0 : -settings.pressure;
+    e.sigma = sigma.value_or(0), e.lambda = volume ? 0 : -loads_of(settings).pressure_at(e.observed.volume);
     e.mu = area_difference_force(bending, e.observed.M);
     const auto forces = [&] { return Weights{.energy = 1, .area = e.sigma, .volume = e.lambda, .M = e.mu}; };
     const Eigen::VectorXd force = scaled(forms.gradient(forces(), e.x));
@@ -126,7 +130,7 @@ Held held_by(const MotionLaw& law) {
 void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, double time) {
     const Loads loads = loads_at(law, time);
     if (!holds_area(held) && held != Held::reduced_volume && !settings.sigma) settings.sigma = loads.tension;
-    settings.pressure = loads.pressure;
+    settings.pressure = loads.pressure, settings.pressure_of_volume = loads.of_volume;
     if (law.free_period) settings.force = loads.force;
 }
 
@@ -134,6 +138,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
                   const SpectrumSettings& settings) {
     refuse_what_has_none(law, settings);
     StationaryProblem problem{bending, {}};
+    if (!holds_volume(held) && held != Held::reduced_volume) problem.loads.of_volume = settings.pressure_of_volume;
     Spectrum out;
     for (int elements = 24; elements <= settings.max_elements; elements += elements / 2) {
         check_pause();

@@ -1,6 +1,7 @@
 // Growth rates of a given profile of any shape, by mode_stability on meshes fine enough.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -17,7 +18,8 @@ struct SpectrumSettings {
     int max_elements = 200;
     std::optional<double> sigma;  // the tension: of a free area; or where the shape leaves it open (a tube, a sphere)
     double pressure = 0;          // of a free volume
-    std::optional<double> force;  // of a free period: what balances it
+    std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the number
+    std::optional<double> force;                          // of a free period: what balances it
 };
 
 // The loads of a law at a time, where `held` leaves their partners free.

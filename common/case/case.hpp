@@ -170,7 +170,8 @@ struct Case {
 // Whether a run of tier axisym can be one of a graph r(z).
 inline bool can_be_graph(const Case& c) {
     const MotionLaw law = motion_law(c.model);
-    return is_tube(c.shape) && law.unconstrained() && !law.loads_change() && !c.energy.H0_varies() && !c.energy.alpha;
+    return is_tube(c.shape) && law.unconstrained() && !law.loads_change() && !law.pressure_of_volume &&
+           !c.energy.H0_varies() && !c.energy.alpha;
 }
 // Whether it is, unless the profile overhangs.
 inline bool begins_as_graph(const Case& c) {

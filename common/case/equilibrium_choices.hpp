@@ -63,7 +63,7 @@ constexpr bool holds_volume(Held held) {
 // Area and volume, unless the model leaves them free, or gives a tension or a pressure.
 inline Held default_held(const Model& model) {
     const bool area = model.area.value_or(AreaRule::fixed) == AreaRule::fixed && model.tension.is_zero(),
-               volume = model.keeps_volume.value_or(true) && model.pressure.is_zero();
+               volume = model.keeps_volume.value_or(true) && !model.has_pressure();
     return area && volume ? Held::area_and_volume : area ? Held::area : volume ? Held::volume : Held::nothing;
 }
 
@@ -73,7 +73,7 @@ inline std::string held_against(const Model& model, Held held) {
     const bool area = holds_area(held), volume = holds_volume(held), reduced = held == Held::reduced_volume;
     const bool wants_area = model.area == AreaRule::fixed, frees_area = model.area && !wants_area,
                loads_area = !model.tension.is_zero(), wants_volume = model.keeps_volume == true,
-               frees_volume = model.keeps_volume == false, loads_volume = !model.pressure.is_zero();
+               frees_volume = model.keeps_volume == false, loads_volume = model.has_pressure();
     if (wants_area && !area) return clash("hold the area", "model.area");
     if (wants_volume && !volume) return clash("hold the volume", "model.volume");
     if (frees_area && area) return clash("leave the area free", "model.area");
@@ -156,6 +156,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
                 return model.free_period ? "" : "varies a force at a fixed period: see model.period";
             if (*b.parameter == vary_tension || *b.parameter == vary_pressure) {
                 const bool fixed = *b.parameter == vary_tension ? area : volume;
+                if (*b.parameter == vary_pressure && model.pressure_of_volume)
+                    return "varies a formula: give a number, or vary something else";
                 return fixed || held == Held::reduced_volume
                            ? "varies a load on what is held fixed: see equilibrium.held"
                            : "";

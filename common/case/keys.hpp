@@ -3,7 +3,7 @@
 //   number, integer, flag, text, increasing (a list of growing numbers)    key, target, what is allowed
 //   ramp       a number, or a table of times and values                    key, target
 //   formula    a text that is a formula                                    key, target, its variables
-//   number_or_formula                                                      key, both targets, its variables
+//   number_or_formula, ramp_or_formula                                     key, both targets, its variables
 //   absent     a key that belongs to other shapes, and why it must not be here
 //   choice, kind (which shape)                                             names and what they stand for
 //   table, optional_table, tables (a list of tables), entries (tables under open names)    key, target, description
@@ -15,6 +15,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -115,6 +116,8 @@ void keys(Keys& k, Shape& shape) {
     std::visit([&](auto& which) { keys(k, which); }, shape);
 }
 
+inline constexpr std::array<std::string_view, 1> pressure_variables{"V"};
+
 template <class Keys>
 void keys(Keys& k, Model& model) {
     Choices<ModelKind> kinds;
@@ -132,7 +135,7 @@ void keys(Keys& k, Model& model) {
              {{"fixed", AreaRule::fixed}, {"free", AreaRule::free}, {"reservoir", AreaRule::reservoir}});
     k.choice("period", model.free_period, {{"fixed", false}, {"free", true}});
     k.ramp("tension", model.tension);
-    k.ramp("pressure", model.pressure);
+    k.ramp_or_formula("pressure", model.pressure, model.pressure_of_volume, pressure_variables);
     k.ramp("force", model.force);
 }
 

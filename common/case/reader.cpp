@@ -262,7 +262,14 @@ bool Reader::allows(double x, Range range) const {
 }
 
 void Reader::ramp(const std::string& key, Ramp& target) {
-    const std::string what = "a number, or {time = [...], value = [...]}";
+    std::shared_ptr<const Formula> none;
+    ramp_or_formula(key, target, none, {});
+}
+
+void Reader::ramp_or_formula(const std::string& key, Ramp& target, std::shared_ptr<const Formula>& formula,
+                             std::span<const std::string_view> variables) {
+    std::string what = "a number, or {time = [...], value = [...]}";
+    if (!variables.empty()) what += fmt::format(", or a formula of {}", fmt::join(variables, ", "));
     const toml::node* node = find(key, what, false);
     if (!node) return;
     collect([&] {
@@ -270,6 +277,8 @@ void Reader::ramp(const std::string& key, Ramp& target) {
             target = number_in(*node, path_of(key), {});
         else if (node->is_table())
             ramp_in(*node->as_table(), key, target);
+        else if (node->is_string() && !variables.empty())
+            formula = formula_in(*node, key, variables);
         else
             refuse_value(where(*node), path_of(key), what, *node);
     });

@@ -63,6 +63,14 @@ public:
                       : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()), toml_list(ramp.values())));
     }
 
+    void ramp_or_formula(const std::string& key, const Ramp& values, const std::shared_ptr<const Formula>& formula,
+                         std::span<const std::string_view>) {
+        if (formula)
+            line(key, toml_string(formula->text));
+        else
+            ramp(key, values);
+    }
+
     void formula(const std::string& key, const std::shared_ptr<const Formula>& formula,
                  std::span<const std::string_view>, bool = false) {
         if (formula) line(key, toml_string(formula->text));

@@ -55,8 +55,8 @@ void check_problem(const StationaryProblem& problem, double period) {
         throw std::invalid_argument("a force needs a free period, and a space with one");
     if (problem.free_period && !c.area && !c.volume)
         throw std::invalid_argument("a free period needs a given area or a given volume");
-    if ((c.area && problem.loads.tension != 0) || (c.volume && problem.loads.pressure != 0) ||
-        (c.reduced_volume && (problem.loads.tension != 0 || problem.loads.pressure != 0)))
+    const bool tension = problem.loads.tension != 0, pressure = problem.loads.pressure != 0 || problem.loads.of_volume;
+    if ((c.area && tension) || (c.volume && pressure) || (c.reduced_volume && (tension || pressure)))
         throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
     if (c.reduced_volume && (c.area || c.volume))
         throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
@@ -75,9 +75,10 @@ MultiplierEquations multiplier_equations(const StationaryProblem& problem, doubl
         return out;
     }
     out.F[0] = c.area ? area - *c.area : sigma - problem.loads.tension;
-    out.F[1] = c.volume ? volume - *c.volume : lambda + problem.loads.pressure;
+    out.F[1] = c.volume ? volume - *c.volume : lambda + problem.loads.pressure_at(volume);
     (c.area ? out.by_extent : out.by_multipliers)(0, 0) = 1;
     (c.volume ? out.by_extent : out.by_multipliers)(1, 1) = 1;
+    if (!c.volume) out.by_extent(1, 1) = problem.loads.pressure_slope(volume);
     return out;
 }
 
@@ -98,8 +99,7 @@ ReducedVolumeSlopes reduced_volume_slopes(double reduced_volume, double area) {
 
 double constraint_error(const Constraints& c, const MultiplierEquations& equations, double length) {
     const double area = c.area ? std::abs(equations.F[0]) / (length * length) : 0;
-    const double volume =
-        c.volume || c.reduced_volume ? std::abs(equations.F[1]) / (length * length * length) : 0;
+    const double volume = c.volume || c.reduced_volume ? std::abs(equations.F[1]) / (length * length * length) : 0;
     return std::max(area, volume);
 }
 
@@ -119,8 +119,8 @@ double distance(const Constraints& goal, double area, double volume) {
     const auto off = [](const std::optional<double>& wanted, double is) {
         return wanted ? std::abs(std::log(*wanted / is)) : 0;
     };
-    return std::max({off(goal.area, area), off(goal.volume, volume),
-                     off(goal.reduced_volume, reduced_volume(area, volume))});
+    return std::max(
+        {off(goal.area, area), off(goal.volume, volume), off(goal.reduced_volume, reduced_volume(area, volume))});
 }
 
 bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding) {

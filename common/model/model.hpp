@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "common/formula/formula.hpp"
 #include "common/model/ramp.hpp"
 
 namespace tubule {
@@ -29,6 +31,9 @@ struct Model {
     bool free_period = false;           // of tubes
     // Given where area, volume and period are free: theory.md (3.16).
     Ramp tension{}, pressure{}, force{};
+    std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
+
+    bool has_pressure() const { return pressure_of_volume || !pressure.is_zero(); }
 };
 
 // One model. Names and allowed keys of case files, options and messages are derived from this table.
@@ -68,11 +73,15 @@ inline std::string quoted_names(bool ModelEntry::*has) {
 // Tension, pressure (inside minus outside) and axial force at one time; or their rates of change.
 struct Loads {
     double tension = 0, pressure = 0, force = 0;
+    std::shared_ptr<const Formula> of_volume{};  // the pressure, instead of the number
 
-    // F - E of theory.md (3.16); of rates of change, the rate at which they do work, (3.20).
-    double energy(double area, double volume, double length) const {
-        return tension * area - pressure * volume - force * length;
-    }
+    double pressure_at(double volume) const;
+    double pressure_slope(double volume) const;  // dP/dV
+    // F - E of theory.md (3.16), (3.24); of rates of change, the rate at which they do work, (3.20). NaN where the
+    // formula has no value somewhere from the volume 1 to this one.
+    double energy(double area, double volume, double length) const;
+    // The same with magnitudes, a part of E_ref: theory.md (11.1).
+    double scale(double area, double volume, double length) const;
 };
 
 // The dimensionless law of motion of a membrane, theory.md (3.1), u its velocity and b the bending force:
@@ -90,18 +99,21 @@ struct MotionLaw {
     bool free_period = false;  // of tubes: the period follows the axial force
     // What falls is F = E + tension A - pressure V - force L: theory.md (3.16).
     Ramp tension{}, pressure{}, force{};
+    std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
 
     // The L2 gradient flow of F: nothing is kept.
     bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
     bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
     // Whether F is E alone at all times; whether F - E depends on time.
-    bool without_loads() const { return tension.is_zero() && pressure.is_zero() && force.is_zero(); }
+    bool without_loads() const {
+        return tension.is_zero() && pressure.is_zero() && force.is_zero() && !pressure_of_volume;
+    }
     bool supplies_kinetic_energy() const { return reservoir && inertia != 0; }
     bool loads_change() const { return !tension.is_constant() || !pressure.is_constant() || !force.is_constant(); }
 };
 
 inline Loads loads_at(const MotionLaw& law, double t) {
-    return {law.tension.at(t), law.pressure.at(t), law.force.at(t)};
+    return {law.tension.at(t), law.pressure.at(t), law.force.at(t), law.pressure_of_volume};
 }
 // Rates of change; at a kink those after it.
 inline Loads load_rates(const MotionLaw& law, double t) {
@@ -112,8 +124,12 @@ inline double next_kink(const MotionLaw& law, double t) {
 }
 // The scale of F - E over all times, a part of E_ref: theory.md (11.1).
 inline double load_scale(const MotionLaw& law, double area, double volume, double length) {
-    return law.tension.largest() * area + law.pressure.largest() * std::abs(volume) + law.force.largest() * length;
+    const Loads largest{law.tension.largest(), law.pressure.largest(), law.force.largest(), law.pressure_of_volume};
+    return largest.scale(area, volume, length);
 }
+
+// How far the formula of the pressure, if there is one, is from volumes where it is not defined.
+FormulaDomain::Margin pressure_domain(const MotionLaw& law, double volume);
 
 inline AreaRule area_rule(const Model& model) {
     return model.area.value_or(model_entry(model.kind).inextensible ? AreaRule::fixed : AreaRule::free);
@@ -137,7 +153,8 @@ inline MotionLaw motion_law(const Model& model) {
             .free_period = model.free_period,
             .tension = model.tension,
             .pressure = model.pressure,
-            .force = model.force};
+            .force = model.force,
+            .pressure_of_volume = model.pressure_of_volume};
 }
 
 }  // namespace tubule

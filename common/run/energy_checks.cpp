@@ -59,6 +59,22 @@ StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, co
             "choose a formula that is defined for all curvatures which the membrane may take"};
 }
 
+StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time) {
+    return {
+        Stop::undefined, time,
+        fmt::format("the pressure is hardly defined any more at the volume {:.6g}: {}", margin.place, words(margin)),
+        "choose a formula for model.pressure that is defined for all volumes which the membrane may enclose"};
+}
+
+void require_pressure(const Problem& c, double volume) {
+    if (std::isfinite(loads_at(c.law, 0).energy(0, volume, 0))) return;
+    throw complaint(
+        c, "model.pressure",
+        fmt::format("must be defined from V = 1, where its energy is 0, to the volume of the initial shape, "
+                    "{:.6g}",
+                    volume));
+}
+
 namespace {
 
 constexpr double no_change = 1e-9;  // of E_ref: the shape was in equilibrium

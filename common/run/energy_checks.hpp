@@ -18,6 +18,11 @@ std::string key_of_formula(const Bending& energy);
 // The stop of a run that comes too near to where the formula is not defined.
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
+// Of a pressure that is a formula of the volume: how far it is from where it is not defined, the stop of a run that
+// comes too near, and a CaseError where F, theory.md (3.24), has no value initially.
+StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time);
+void require_pressure(const Problem& c, double volume);
+
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.
 std::string key_of_ill_posed(const Problem& c);
@@ -31,8 +36,9 @@ inline bool may_be_undefined(const FormulaDomain::Margin& margin) {
 // small to be a scale, or where the formula of a case has no finite value.
 double reference_energy(const Problem& c, double energy, double by_magnitude);
 
-// The warning that the tolerance exceeds the energy or its change, or empty; energies of the surface, E_ref as above. Before a run: errors may exceed the energy. After it:
-// they may exceed the fall of the energy, kinetic energy included.
+// The warning that the tolerance exceeds the energy or its change, or empty; energies of the surface, E_ref as above.
+// Before a run: errors may exceed the energy. After it: they may exceed the fall of the energy, kinetic energy
+// included.
 std::string doubt_before(const Problem& c, double energy, double E_ref);
 std::string doubt_after(const Problem& c, Stop stop, double start, double end, double E_ref);
 

@@ -230,7 +230,8 @@ bool drifts_unknown(const MotionLaw& law, const UniformTube& tube) {
 std::optional<double> mean_rate(const Problem& c, int n, int m, double from, double to) try {
     std::optional<TubeStart> start = tube_start(c);
     const MotionLaw& law = c.law;
-    if (!start || !(to > from) || law.loads_change() || drifts_unknown(law, start->tube)) return std::nullopt;
+    if (!start || !(to > from) || law.loads_change() || law.pressure_of_volume || drifts_unknown(law, start->tube))
+        return std::nullopt;
     std::vector<Wave>& waves = start->waves;
     auto ours = std::find_if(waves.begin(), waves.end(), [&](const Wave& w) { return w.n == n && std::abs(w.m) == m; });
     if (ours == waves.end()) {

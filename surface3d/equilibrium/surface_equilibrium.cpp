@@ -150,8 +150,7 @@ double reference_energy(const StationaryProblem& problem, const SurfaceSystem& s
     const Loads& loads = problem.loads;
     const double length = system.mesh(u).period;
     return std::max(std::abs(v.energy + loads.energy(v.area, v.volume, length)),
-                    system.reference_energy(u) + std::abs(loads.tension) * v.area +
-                        std::abs(loads.pressure * v.volume) + std::abs(loads.force) * length);
+                    system.reference_energy(u) + loads.scale(v.area, v.volume, length));
 }
 
 }  // namespace tubule::surface3d

@@ -49,7 +49,7 @@ Eigen::MatrixXd motions_of(const CurvedMesh& mesh, const VectorField& normal, co
 bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
            p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
-           p.loads.pressure == 0 && p.loads.force == 0;
+           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0;
 }
 
 // Whether both have the same first and second derivatives at given multipliers.
@@ -355,7 +355,7 @@ bool SurfaceSystem::take_new_mesh(const CurvedMesh& shape, int triangles, Eigen:
 
 Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(unknowns());
-    u[sigma()] = problem_.loads.tension, u[lambda()] = -problem_.loads.pressure;
+    u[sigma()] = problem_.loads.tension, u[lambda()] = -problem_.loads.pressure_at(values(u).volume);
     set_mu(u);
     return u;
 }
@@ -399,6 +399,8 @@ ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u) const 
             append(A.low_rank, d.area), weigh(weight);
     }
     if (problem_.bending.alpha.value_or(0) != 0) append(A.low_rank, d.M), weigh(*problem_.bending.alpha);
+    if (const double slope = problem_.loads.pressure_slope(d.values.volume); slope != 0)
+        append(A.low_rank, d.volume), weigh(-slope);
     return A;
 }
 

@@ -137,7 +137,8 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     }
     m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume, s.period});
     m.tension = law.area_is_free() ? law.tension.at(s.time) : law.keeps_area ? s.tension : -sum[15] / m.bending.area;
-    m.pressure = law.keeps_volume ? -s.lambda : law.pressure.at(s.time);
+    m.pressure = law.keeps_volume ? -s.lambda : loads_at(law, s.time).pressure_at(m.bending.volume);
+    m.pressure_domain = pressure_domain(law, m.bending.volume);
     m.force = law.free_period ? law.force.at(s.time)
                               : axial_force(surface, s, m.fields, m.velocity, m.bending.M, m.tension, m.pressure);
     m.acceleration = law.inertia * sum[4] / 2;

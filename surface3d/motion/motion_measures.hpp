@@ -38,6 +38,7 @@ struct MotionMeasures {
     double symbol = 0;             // smallest principal symbol, theory.md (2.14), x between the principal curvatures
     Eigen::Vector3d least_symbol;  // where it is
     FormulaDomain::Margin domain;  // of the energy's formula, with the node as its place
+    FormulaDomain::Margin pressure_domain;                    // of the formula of the pressure
     Eigen::Vector3d least_defined = Eigen::Vector3d::Zero();  // where that node is
 };
 

@@ -13,7 +13,7 @@ namespace {
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
 constexpr int most_carried = 20;         // of that, before it is factored
-constexpr int most_multipliers = 5;      // lambda, tension, supply, stretch, mu
+constexpr int most_multipliers = 5;      // lambda or P, tension, supply, stretch, mu
 // Measured: docs/decisions/energies.md.
 constexpr double least_evenness = 0.02;
 
@@ -133,7 +133,8 @@ void StepSolver::make_symmetric(const StepBase& base) {
 
 // With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
 // also a row: rigid motions; lambda; the tension of an area that is kept as a whole; the supply of a reservoir, whose
-// row is the mean of p; the stretch of a free period; how far alpha (M - M0) at the end differs from that of X*.
+// row is the mean of p; the stretch of a free period; how far alpha (M - M0) and P(V) at the end differ from those of
+// X*.
 Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Extent& rate, StageSolution& out) {
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
@@ -141,7 +142,9 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     if (law.inextensible && control.area && !law.reservoir)
         system_.b -= rate.area / *control.area * system_.pressure_load;
     if (!law.inextensible) system_.b -= law.tension.at(time) * system_.widening;
-    system_.b += law.pressure.at(time) * system_.flux;
+    const Loads given = loads_at(law, time);
+    const double volume = given.of_volume ? extent(surface_.space(), *base.mesh).volume : 0;
+    system_.b += given.pressure_at(volume) * system_.flux;
     make_symmetric(base);
     const Eigen::MatrixXd rigid = surface_.open_rigid_motions(*base.mesh);
     const Eigen::Index most = rigid.cols() + most_multipliers;
@@ -164,18 +167,21 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     if (law.free_period) {
         const StretchTerms& s = system_.stretch;
         // What the tension of a reservoir does is in p.
-        const double loads = law.potential(time, {law.reservoir ? 0 : s.rate.area, s.rate.volume, s.rate.length});
+        const double loads =
+            law.potential_rate(time, {law.reservoir ? 0 : s.rate.area, s.rate.volume, s.rate.length}, volume);
         stretch = add(s.column, s.row, -s.energy - loads);
         border.D(stretch, stretch) = s.own;
         if (lambda >= 0) border.D(lambda, stretch) = border.D(stretch, lambda) = s.rate.volume;
         if (tension >= 0) border.D(tension, stretch) = border.D(stretch, tension) = s.rate.area;
     }
-    if (surface_.bending().alpha) {
-        const double unit = std::sqrt(*surface_.bending().alpha * base.te);  // in which all alpha are alike
-        const Eigen::Index mu = add_both(unit * system_.turning, unit * turned(base) / base.te);
-        border.D(mu, mu) = -1;
-        if (stretch >= 0) border.D(mu, stretch) = border.D(stretch, mu) = unit * system_.stretch.M;
-    }
+    const auto add_spring = [&](double stiffness, const Eigen::VectorXd& slope, double by_stretch) {
+        const double unit = std::sqrt(std::abs(stiffness) * base.te);  // in which all are alike
+        const Eigen::Index n = add_both(unit * slope, unit * lead(base, slope, by_stretch) / base.te);
+        border.D(n, n) = stiffness < 0 ? 1 : -1;
+        if (stretch >= 0) border.D(n, stretch) = border.D(stretch, n) = unit * by_stretch;
+    };
+    if (surface_.bending().alpha) add_spring(*surface_.bending().alpha, system_.turning, system_.stretch.M);
+    if (given.of_volume) add_spring(-given.pressure_slope(volume), system_.flux, system_.stretch.rate.volume);
     border.C.conservativeResize(Eigen::NoChange, n), border.R.conservativeResize(Eigen::NoChange, n);
     border.D.conservativeResize(n, n), border.d.conservativeResize(n);
     const int before = solver_.fallbacks();
@@ -218,10 +224,11 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
-// M of X* less that to which the expected motion of the nodes and none of the surface would lead.
-double StepSolver::turned(const StepBase& base) const {
-    return paired(system_.turning, base.displacement - base.te * base.mesh_velocity, base.fields) +
-           base.te * system_.turning.head(base.velocity.size()).dot(base.velocity) + base.stretch * system_.stretch.M;
+// A number of X*, given by its slope, less that to which the expected motion of the nodes and none of the surface would
+// lead.
+double StepSolver::lead(const StepBase& base, const Eigen::VectorXd& slope, double by_stretch) const {
+    return paired(slope, base.displacement - base.te * base.mesh_velocity, base.fields) +
+           base.te * slope.head(base.velocity.size()).dot(base.velocity) + base.stretch * by_stretch;
 }
 
 // A functional of velocities, such as the force, of v at the nodes; of its normal part where nothing flows.
@@ -238,10 +245,12 @@ double StepSolver::work(const MovingSurface::Correction& by, const MotionState& 
     const int n = surface_.nodes();
     const SurfaceSpace& space = surface_.space();
     const SurfaceLaw& law = surface_.law();
-    double sum = law.potential(at.time, extent_rate(space, surface_.mesh(at), by.displacement));
+    const CurvedMesh mesh = surface_.mesh(at);
+    const double volume = law.pressure_of_volume ? extent(space, mesh).volume : 0;
+    double sum = law.potential_rate(at.time, extent_rate(space, mesh, by.displacement), volume);
     if (by.stretch != 0) {
         const StretchTerms& s = system_.stretch;
-        double energy = s.energy + law.potential(at.time, s.rate);
+        double energy = s.energy + law.potential_rate(at.time, s.rate, volume);
         if (unknowns_.H >= 0) energy += s.row.segment(unknowns_.H, n).dot(fields.H);
         if (unknowns_.K >= 0) energy += s.row.segment(unknowns_.K, n).dot(fields.K);
         sum += by.stretch * energy;

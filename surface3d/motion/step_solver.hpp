@@ -53,7 +53,7 @@ private:
     Eigen::VectorXd solve(const StepBase& base, double time, const Extent& rate, StageSolution& out);
     Eigen::VectorXd mesh_flux(const StepBase& base, const Eigen::VectorXd& u);
     void make_symmetric(const StepBase& base);
-    double turned(const StepBase& base) const;
+    double lead(const StepBase& base, const Eigen::VectorXd& slope, double by_stretch) const;
     double paired(const Eigen::VectorXd& rows, const VectorField& v, const MotionFields& fields) const;
     double work(const MovingSurface::Correction& by, const MotionState& at, const MotionFields& fields) const;
 

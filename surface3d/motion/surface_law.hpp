@@ -19,10 +19,15 @@ struct SurfaceLaw : MotionLaw {
 
     // F - E of a surface at a time, theory.md (3.16), and how fast its loads change it.
     double potential(double time, const Extent& of) const {
-        return tension.at(time) * of.area - pressure.at(time) * of.volume - force.at(time) * of.length;
+        return loads_at(*this, time).energy(of.area, of.volume, of.length);
     }
     double power(double time, const Extent& of) const {
-        return tension.slope(time) * of.area - pressure.slope(time) * of.volume - force.slope(time) * of.length;
+        return load_rates(*this, time).energy(of.area, of.volume, of.length);
+    }
+    // The rate of F - E where the extent of a surface that encloses `volume` changes at a rate.
+    double potential_rate(double time, const Extent& rate, double volume) const {
+        const Loads loads = loads_at(*this, time);
+        return loads.tension * rate.area - loads.pressure_at(volume) * rate.volume - loads.force * rate.length;
     }
     // The first time after this at which a load changes its slope, infinite if there is none.
     double next_kink(double time) const {

@@ -29,6 +29,7 @@ struct Task {
 Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
+    require_pressure(c, v.volume);
     Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
     SurfaceEquilibriumSettings& s = task.settings;

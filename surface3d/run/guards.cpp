@@ -88,6 +88,7 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
                           "the energy does not resist short waves there; more elements help only if these do not "
                           "resolve the curvature"};
     if (m.domain.is_small()) return undefined_energy(m, time);
+    if (m.pressure_domain.is_small()) return undefined_pressure(m.pressure_domain, time);
     if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),

@@ -26,10 +26,7 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed, d
 
 // theory.md (11.1)
 double own_scale(const Problem& c, const Observables& o, double period) {
-    const MotionLaw law = c.law;
-    const double loads =
-        law.tension.largest() * o.area + law.pressure.largest() * std::abs(o.volume) + law.force.largest() * period;
-    return std::max(std::abs(free_energy(c, o, period)), o.magnitude + loads);
+    return std::max(std::abs(free_energy(c, o, period)), o.magnitude + load_scale(c.law, o.area, o.volume, period));
 }
 
 }  // namespace
@@ -112,6 +109,7 @@ void remember_start(const Problem& c, const StartMesh& start, const SurfaceSpace
     memory.H0 = start_H0(c, start);
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, memory.H0);
     require_defined(c, start.mesh, fields.H, fields.K, memory.H0);
+    require_pressure(c, o.volume);
     memory.scale.area = o.area, memory.scale.volume = o.volume;
     memory.balance.work = c.handover ? c.handover->work : 0;
     memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);

@@ -171,6 +171,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
     const double t = state_.time;
     const auto failed = [&](const std::string& what) {
         if (may_be_undefined(now_.domain)) return Refusal{0.25, undefined_energy(now_, t)};
+        if (may_be_undefined(now_.pressure_domain)) return Refusal{0.25, undefined_pressure(now_.pressure_domain, t)};
         return Refusal{0.25,
                        {Stop::solver_failed, t, what, "try another discretisation.elements or discretisation.order"}};
     };

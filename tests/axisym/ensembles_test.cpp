@@ -10,6 +10,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/theory/dispersion.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
 
 namespace tubule::axisym {
 namespace ensembles_test {
@@ -358,6 +359,88 @@ TEST(Ensembles, aReservoirBringsMembraneThatMovesAlong) {
         EXPECT_NEAR(o.last("kinetic_energy"), kinetic, 50 * accuracy * kinetic);
         EXPECT_NEAR(o.last("work"), s[2], 50 * accuracy * s[2]);
     }
+}
+
+std::shared_ptr<const Formula> of_volume(const std::string& text) {
+    const std::string_view variables[]{"V"};
+    return std::make_shared<const Formula>(parse_formula(text, variables));
+}
+
+// theory.md (3.24): resistance R' = P(V) - P(R), with the resistance of theory.md (3.21), (3.23), P(R) that of the
+// equilibrium; F = E + tension A - N ln V + c (V - 1) for P(V) = N/V - c.
+TEST(Ensembles, spheresFollowAPressureThatDependsOnTheirVolume) {
+    const double tension = 0.4, N = 12, c_out = 1.5, mu = 0.2, gamma = 0.3, end = 0.5;
+    Model loaded{.keeps_volume = false, .tension = tension, .pressure_of_volume = of_volume("12/V - 1.5")};
+    Model fed = loaded;
+    fed.kind = ModelKind::stokes, fed.area = AreaRule::reservoir, fed.Re = 1 / mu, fed.gamma = gamma;
+    for (const Model& model : {loaded, fed}) {
+        const bool flows = model.kind == ModelKind::stokes;
+        const auto rate = [&](double R) {
+            const double P = N / (4 * pi / 3 * R * R * R) - c_out;
+            return (P - sphere_pressure(all_terms, R, tension)) / (flows ? gamma + 4 * mu / (R * R) : 1);
+        };
+        double R = 1;
+        const int steps = 2000;
+        const double h = end / steps;
+        for (int i = 0; i < steps; ++i) {
+            const double a = rate(R), b = rate(R + h / 2 * a), c = rate(R + h / 2 * b), d = rate(R + h * c);
+            R += h / 6 * (a + 2 * b + 2 * c + d);
+        }
+        EXPECT_GT(std::abs(R - 1), 0.05);
+        const Case c = case_of(all_terms, Sphere{1, {}}, model, end);
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        const double V = 4 * pi / 3 * R * R * R, E = 4 * pi * R * R * density_at(all_terms, -2 / R, 1 / (R * R)).f;
+        EXPECT_NEAR(o.last("r_max"), R, 2e-6) << name(model);
+        EXPECT_NEAR(o.last("pressure"), N / V - c_out, 1e-5) << name(model);
+        EXPECT_NEAR(o.last("free_energy"), E + tension * 4 * pi * R * R - N * std::log(V) + c_out * (V - 1), 1e-4);
+    }
+}
+
+// A run under P(V), and one under the ramp of the pressures that it had; a vesicle with a membrane that does not
+// stretch, and a tube, whose period may be free. Resumed runs end as undisturbed ones.
+TEST(Ensembles, pressuresOfTheVolumeActAsTheRampOfTheirValues) {
+    const double end = 0.1;
+    std::vector<double> times;
+    for (int i = 0; i <= 60; ++i) times.push_back(end * i * i / 3600);
+    Model vesicle{.kind = ModelKind::stokes, .keeps_volume = false, .pressure_of_volume = of_volume("20*(5/V - 1)")};
+    Model tube{.keeps_volume = false, .pressure_of_volume = of_volume("4*(7/V - 1)")}, pulled = tube;
+    pulled.area = AreaRule::fixed, pulled.free_period = true, pulled.force = 3;
+    const Shape waved = Tube{1, 3, {{0.2, 1}}};
+    for (const auto& [model, shape] :
+         {std::pair<Model, Shape>{vesicle, Ellipsoid{1, 1, 1.4}}, {tube, waved}, {pulled, waved}}) {
+        Case c = case_of(all_terms, shape, model, end, 1e-5);
+        c.time.output = {times.begin() + 1, times.end() - 1};
+        const Outcome o = run_case(c);
+        expect_balanced(o, c);
+        EXPECT_GT(std::abs(o.last("volume") / o["volume"].front() - 1), 0.01) << name(model);
+        Case ramped = c;
+        ramped.model.pressure_of_volume.reset(), ramped.model.pressure = ramp_of(o, "pressure", times);
+        const Outcome same = run_case(ramped);
+        for (const double t : {times[20], times[40], end}) {
+            EXPECT_NEAR(same.at("energy", t), o.at("energy", t), 2e-5 * o.summary.reference_energy) << name(model) << t;
+            EXPECT_NEAR(same.at("volume", t) / o.at("volume", t), 1, 5e-5) << name(model) << t;
+        }
+        const Outcome resumed = run_case(c, &o.log.frames[30]);
+        EXPECT_NEAR(resumed.last("free_energy"), o.last("free_energy"),
+                    4 * c.accuracy.energy * o.summary.reference_energy);
+    }
+}
+
+TEST(Ensembles, pressuresThatCeaseToBeDefinedStopARun) {
+    // The sphere grows until V = 5, where P has a pole.
+    Model model{.keeps_volume = false, .pressure_of_volume = of_volume("0.1/(5 - V)")};
+    const Outcome o = run_case(case_of(bending(0.1), Sphere{1, {}}, model, 1000));
+    EXPECT_EQ(o.summary.stop.reason, Stop::undefined) << o.summary.stop.message;
+    EXPECT_NE(o.summary.stop.message.find("the pressure is hardly defined any more at the volume 4.99"), std::string::npos)
+        << o.summary.stop.message;
+    for (const double F : o["free_energy"]) EXPECT_TRUE(std::isfinite(F));
+    model.pressure_of_volume = of_volume("1/(V - 3)");  // the energy is counted from V = 1
+    EXPECT_EQ(test::message_of([&] {
+                  run_case(case_of(bending(0.1), Sphere{1, {}}, model, 1));
+              }),
+              ": model.pressure must be defined from V = 1, where its energy is 0, to the volume of the initial shape, "
+              "4.18879");
 }
 
 TEST(Ensembles, aReservoirBringsAngularMomentum) {

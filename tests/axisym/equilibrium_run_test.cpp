@@ -224,6 +224,20 @@ descend = false
     EXPECT_NEAR(kept.at("pressure", 0), P, 1e-7);
 }
 
+// theory.md (3.24). A cell whose area is held under the pressure 40 (2/V - 1), as held at the volume that it finds.
+TEST(EquilibriumCase, restsUnderAPressureOfTheVolume) {
+    const std::string single = good.substr(0, good.find("modes = 1"));
+    const Outcome o = outcome(single, {"equilibrium.held=area", "model.pressure=40*(2/V - 1)"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double V = o.at("volume", 0);
+    EXPECT_NEAR(o.at("pressure", 0), 40 * (2 / V - 1), 1e-9);
+    EXPECT_NEAR(o.at("free_energy", 0), o.at("energy", 0) - 80 * std::log(V) + 40 * (V - 1), 1e-9);
+    const Outcome held = outcome(single, {"equilibrium.volume=" + fmt::format("{:.17g}", V)});
+    EXPECT_NEAR(held.at("energy", 0), o.at("energy", 0), 1e-6);
+    EXPECT_NEAR(held.at("pressure", 0), o.at("pressure", 0), 1e-5);
+    EXPECT_NEAR(held.at("tension", 0), o.at("tension", 0), 1e-5);
+}
+
 TEST(EquilibriumCase, tubesMirrorThemselves) {
     // Exact: E = (k20/R^2 + k40/R^4) A for the tube of radius R = A/(2 pi length) that the wavy one relaxes to.
     const std::string tube = R"(tier = "axisym"

@@ -39,16 +39,21 @@ const std::vector<CurveLaw> laws{gradient_flow, gradient_flow_volume, overdamped
 
 // What is kept and what acts on the rest, of extensible and inextensible laws; free periods of tubes alone.
 std::vector<CurveLaw> ensembles(bool tube) {
+    const std::string_view V[]{"V"};
+    MotionLaw osmosis = gradient_flow, osmosis_of_flow = stokes;
+    osmosis.pressure_of_volume = osmosis_of_flow.pressure_of_volume =
+        std::make_shared<const Formula>(parse_formula("0.7*(2/V - 1)", V));
+    osmosis_of_flow.keeps_volume = false;
     MotionLaw loaded = gradient_flow, held = gradient_flow_volume, fed = stokes, swelling = fluid;
     loaded.tension = 0.3, loaded.pressure = 0.2;
     held.keeps_area = true;
     fed.reservoir = true, fed.tension = 0.3;
     swelling.reservoir = true, swelling.keeps_volume = false, swelling.tension = 0.3, swelling.pressure = 0.2;
-    std::vector<CurveLaw> out{loaded, held, fed, swelling};
+    std::vector<CurveLaw> out{loaded, held, fed, swelling, osmosis, osmosis_of_flow};
     for (const CurveLaw& law : {CurveLaw(fed), CurveLaw(swelling)})
         out.push_back(law), out.back().holds_area = false, out.back().lagrangian = true;
     if (!tube) return out;
-    for (MotionLaw pulled : {gradient_flow_volume, held, overdamped, fluid, fed}) {
+    for (MotionLaw pulled : {gradient_flow_volume, held, overdamped, fluid, fed, osmosis_of_flow}) {
         pulled.free_period = true, pulled.force = 0.7;
         out.push_back(pulled);
     }

@@ -1,6 +1,7 @@
 // Linear theory against the axisymmetric tier: its linearised operators, its spectra, growth in its runs.
 #include "axisym/equilibrium/spectrum.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -156,6 +157,27 @@ TEST(Dispersion, atATensionThatIsGiven) {
                         << keeps_volume;
                 }
             }
+}
+
+// A pressure that depends on the volume adds -dP/dV 4 pi R^2 to the stiffness of l = 0 alone: theory.md (3.24), (6.3).
+TEST(Dispersion, underAPressureOfTheVolume) {
+    const Bending energy = bending(0.5, -0.3, 0.02, 0.06);
+    const theory::UniformSphere sphere{energy, 1};
+    const double P = theory::pressure_at_rest(sphere), V = 4 * pi / 3, N = 60;
+    const std::string_view variables[]{"V"};
+    MotionLaw law{.friction = 1, .inextensible = false, .keeps_volume = false};
+    law.pressure_of_volume =
+        std::make_shared<const Formula>(parse_formula(fmt::format("{:.17g} + 60*(1/V - 1/{:.17g})", P, V), variables));
+    SpectrumSettings settings;
+    settings.last = 0, settings.accuracy = 1e-9;
+    set_loads(settings, law, Held::nothing, 0);
+    const Spectrum found = spectrum(energy, law, Held::nothing, meridian(Sphere{1, {}}), settings);
+    EXPECT_TRUE(found.at_rest());
+    EXPECT_NEAR(-found.lambda, P, 1e-9);
+    std::vector<double> expected{-theory::stiffness(sphere, 0) - N / (V * V) * 4 * pi, -theory::stiffness(sphere, 2),
+                                 -theory::stiffness(sphere, 3), -theory::stiffness(sphere, 4)};
+    std::sort(expected.rbegin(), expected.rend());
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.modes[0].rates[i], expected[i], 1e-7 * std::abs(expected[i])) << i;
 }
 
 TEST(Dispersion, wavesAroundTheAxisAlone) {

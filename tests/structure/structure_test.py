@@ -13,7 +13,7 @@ root = Path(sys.argv.pop(1))
 
 # A file may include what is in its own folder, in a row above, or in a part that its part may know.
 layers = {
-    'common': [{'geometry', 'model'}, {'formula'}, {'energy'}, {'solve', 'series'}, {'shapes'}, {'case'}, {'theory', 'result', 'equilibrium'}, {'run'}],
+    'common': [{'geometry'}, {'formula'}, {'energy', 'model'}, {'solve', 'series'}, {'shapes'}, {'case'}, {'theory', 'result', 'equilibrium'}, {'run'}],
     'axisym': [{'splines'}, {'integration'}, {'graph'}, {'curve'}, {'equilibrium'}, {''}],
     'surface3d': [{'mesh'}, {'fem'}, {'curvature'}, {'meshing', 'import', 'motion'}, {'equilibrium'}, {'run'}],
     'tools': [{'auto', 'compare'}, {'run'}, {'scan'}, {'confirm'}, {'command'}, {'python'}],

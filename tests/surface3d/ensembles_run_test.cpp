@@ -62,6 +62,26 @@ TEST(EnsembleRuns, TheFreeEnergyBalances) {
     }
 }
 
+TEST(EnsembleRuns, ThePressureDependsOnTheVolume) {
+    // theory.md (3.24): P = 20 (4.4/V - 1) at all times, and F = E - INT P dV from V = 1; no work. In steps so long
+    // that a pressure of the step before would overshoot: 4 pi R^2 dP/dV = -58 in gradient flow.
+    for (const std::string kind : {"gradient-flow", "overdamped", "fluid"}) {
+        SCOPED_TRACE(kind);
+        const Outcome o = run_case(wavy, {"model.kind=" + kind, "model.volume=free", "model.pressure=20*(4.4/V - 1)"});
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double E_ref = o.summary.reference_energy;
+        const auto F = o.series("free_energy"), E = o.series("energy"), V = o.series("volume"),
+                   P = o.series("pressure"), defect = o.series("identity_defect");
+        for (std::size_t i = 0; i < F.size(); ++i) {
+            EXPECT_NEAR(P[i], 20 * (4.4 / V[i] - 1), 1e-10);
+            EXPECT_NEAR(F[i], E[i] - 88 * std::log(V[i]) + 20 * (V[i] - 1), 1e-9 * E_ref);
+            EXPECT_LT(std::abs(defect[i]), 2e-3 * E_ref);
+        }
+        EXPECT_GT(V.back() / V.front(), kind == "fluid" ? 1.0003 : 1.002);
+        EXPECT_EQ(o.last("work"), 0);
+    }
+}
+
 TEST(EnsembleRuns, TheBalanceWithWhatAReservoirBringsConverges) {
     // theory.md (3.20): half the step leaves less than half of the defect, until that of the mesh is left; and far less
     // than the kinetic energy brought.

@@ -1,6 +1,7 @@
 // Stationary surfaces in three dimensions and their second variation, against the axisymmetric tier and closed forms.
 #include "surface3d/equilibrium/surface_equilibrium.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -94,6 +95,29 @@ TEST(SurfaceSpectrum, sphere) {
     std::sort(expected.begin(), expected.end());
     EXPECT_EQ(s.doubt, "");
     EXPECT_EQ(system.held_motions(), 3);  // turns leave a sphere as it is
+    for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+}
+
+// A pressure of the volume with the same value acts on l = 0 alone, by -dP/dV 4 pi R^2: theory.md (3.24).
+TEST(SurfaceSpectrum, sphereUnderAPressureOfTheVolume) {
+    const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
+    const theory::UniformSphere sphere{bending};
+    const double P = theory::pressure_at_rest(sphere), V = 4 * pi / 3, N = 60;
+    const std::string text = fmt::format("{:.17g} + 60*(1/V - 1/{:.17g})", P, V);
+    const std::string_view variables[]{"V"};
+    StationaryProblem problem{bending, {}};
+    problem.loads.of_volume = std::make_shared<const Formula>(parse_formula(text, variables));
+    SurfaceSystem system(spheroid(320, 1, 1), problem);
+    Eigen::VectorXd u = system.unknowns_at_base();
+    int iterations = 0;
+    ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
+    EXPECT_NEAR(system.values(u).volume, V, 1e-5);
+    const SurfaceSpectrum s = system.spectrum(u, 13);
+    std::vector<double> expected{theory::stiffness(sphere, 0) + N / (V * V) * 4 * pi};
+    for (int i = 0; i < 5; ++i) expected.push_back(theory::stiffness(sphere, 2));
+    for (int i = 0; i < 7; ++i) expected.push_back(theory::stiffness(sphere, 3));
+    std::sort(expected.begin(), expected.end());
+    EXPECT_EQ(s.doubt, "");
     for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
 }
 

@@ -122,6 +122,10 @@ public:
         add(key, "list of floats", "");
     }
     void ramp(const std::string& key, const Ramp&) { add(key, "float or table", ""); }
+    void ramp_or_formula(const std::string& key, const Ramp&, const std::shared_ptr<const Formula>&,
+                         std::span<const std::string_view>) {
+        add(key, "float, table or string", "");
+    }
     void formula(const std::string& key, const std::shared_ptr<const Formula>&, std::span<const std::string_view>,
                  bool = false) {
         add(key, "string", "");

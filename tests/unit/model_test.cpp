@@ -53,6 +53,43 @@ TEST(Model, turnsWhatIsHeldIntoTheLaw) {
     EXPECT_TRUE(pulled.free_period && pulled.force.at(0) == 2 && !pulled.without_loads());
 }
 
+std::shared_ptr<const Formula> of_volume(const std::string& text) {
+    const std::string_view variables[]{"V"};
+    return std::make_shared<const Formula>(parse_formula(text, variables));
+}
+
+// theory.md (3.24). Exact integrals from V = 1; a step of P that few points would miss; a pole in between.
+TEST(Loads, havePressuresThatAreFormulasOfTheVolume) {
+    Loads osmosis{.tension = 0.3};
+    osmosis.of_volume = of_volume("4*(0.5/V - 1)");
+    EXPECT_DOUBLE_EQ(osmosis.pressure_at(2), -3);
+    EXPECT_DOUBLE_EQ(osmosis.pressure_slope(2), -0.5);
+    for (const double V : {1e-3, 0.2, 1.0, 5.0, 4000.0})
+        EXPECT_NEAR(osmosis.energy(7, V, 0), 0.3 * 7 - 2 * std::log(V) + 4 * (V - 1), 1e-12 * (1 + V)) << V;
+    EXPECT_DOUBLE_EQ(osmosis.scale(7, 2, 0), 0.3 * 7 + 6);
+    Loads step, pole, number{.pressure = 0.4};
+    step.of_volume = of_volume("tanh((V - 3)/0.01)");
+    EXPECT_NEAR(step.energy(0, 5, 0), 0, 1e-12);
+    pole.of_volume = of_volume("1/(V - 3)");
+    EXPECT_TRUE(std::isfinite(pole.energy(0, 2.9, 0)));
+    EXPECT_TRUE(std::isnan(pole.energy(0, 5, 0)));
+    EXPECT_TRUE(std::isnan(osmosis.energy(1, -1, 0)));
+    EXPECT_EQ(number.pressure_at(5), 0.4);
+    EXPECT_EQ(number.pressure_slope(5), 0);
+    EXPECT_EQ(number.energy(0, 5, 0), -2);
+}
+
+TEST(Loads, knowHowFarTheFormulaIsFromItsLimits) {
+    MotionLaw law;
+    EXPECT_FALSE(pressure_domain(law, 2).is_small());
+    law.pressure_of_volume = of_volume("1/(V - 3)");
+    EXPECT_FALSE(pressure_domain(law, 3.1).is_small());
+    EXPECT_TRUE(pressure_domain(law, 3.0001).is_small());
+    EXPECT_EQ(pressure_domain(law, 3.0001).place, 3.0001);
+    EXPECT_FALSE(law.without_loads());
+    EXPECT_FALSE(law.loads_change());
+}
+
 TEST(Ramp, isLinearBetweenItsTimesAndConstantOutside) {
     const Ramp ramp({1, 2, 4}, {0, 3, -1});
     const double times[] = {0, 1, 1.5, 2, 3, 4, 9}, values[] = {0, 0, 1.5, 3, 1, -1, -1},

@@ -222,7 +222,9 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     std::optional<TubeSubject> tube;
     if (subject.frame ? subject.frame->mesh.has_value() : subject.c.unknowns == Unknowns::surface_equilibrium)
         return surface_report(options, subject);
-    if (!options.numerical) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
+    // Closed forms have a pressure that does not change with the volume.
+    const bool closed_form = !options.numerical && !subject.c.model.pressure_of_volume;
+    if (closed_form) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
     if (tube) {
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
         if (!options.plot.empty())
@@ -234,7 +236,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     if (!options.plot.empty() || !options.q.empty())
         throw std::invalid_argument("--plot and --q apply only to straight tubes, in closed form");
     const Sphere* sphere = std::get_if<Sphere>(&subject.c.shape);
-    if (sphere && !subject.frame && !options.numerical && !subject.c.equilibrium && sphere->modes.empty())
+    if (sphere && !subject.frame && closed_form && !subject.c.equilibrium && sphere->modes.empty())
         return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
     if (options.waves) throw std::invalid_argument("--waves applies only to tubes and spheres, in closed form");
     if (subject.c.unknowns == Unknowns::surface || subject.c.unknowns == Unknowns::moving_surface)

@@ -62,7 +62,7 @@ std::optional<theory::UniformTube> tube_at_rest(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     if (!tube || c.equilibrium) return std::nullopt;
     const MotionLaw& law = c.law;
-    if (law.loads_change()) return std::nullopt;
+    if (law.loads_change() || law.pressure_of_volume) return std::nullopt;
     const Bending energy = theory::on_tube(c.energy, tube->length);
     const auto tension = theory::tension_of(law, energy, tube->radius);
     if (!tension) return std::nullopt;
