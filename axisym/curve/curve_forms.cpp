@@ -80,7 +80,7 @@ auto by_energy(const Bending& bending, const Kernel& kernel) {
 }  // namespace
 
 CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
-    : space_(space), bending_(bending), images_(space.images()) {
+    : space_(space), bending_(bending), W_(potential_density(bending.potentials)), images_(space.images()) {
     const int w = space.splines().width(), n = space.splines().elements();
     const auto dof = [&](int e, int a) {  // -1: absent
         const SplineSpace& field = a < w ? space.r() : space.z();
@@ -236,7 +236,8 @@ bool CurveForms::add_gradient(const Weights& weights, const double* x, double* o
     const bool inside = with_H0(x, [&](const VaryingH0& H0) {
         return for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, H0, x, out); });
     });
-    return inside && ((bending_.terms.empty() && !bending_.H0_varies()) ||
+    if (W_ && weights.energy != 0) add_potential_gradient(space_, *W_, weights.energy, x, out);
+    return inside && ((bending_.terms.empty() && !bending_.H0_varies() && !W_) ||
                       std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
 
@@ -244,6 +245,7 @@ void CurveForms::add_hessian(const Weights& weights, const double* x, double* va
     with_H0(x, [&](const VaryingH0& H0) {
         for_degree(space_.splines().degree(), [&](auto P) { hessian_kernel<P()>(weights, H0, x, values); });
     });
+    if (W_ && weights.energy != 0) add_potential_hessian(space_, *W_, weights.energy, x, slots_, values);
     if (!space_.free_period()) return;
     const int rise = space_.shape_size();
     double* column = values + pattern_.outerIndexPtr()[rise];  // all rows, in order
@@ -427,6 +429,10 @@ bool CurveForms::admissible(const Eigen::VectorXd& x) const {
             const Local at(space_, e, g, x.data());
             if (!(stdx::hmin(at.r) > 0 && stdx::hmin(at.r1 * at.r1 + at.z1 * at.z1) > 0)) return false;
         }
+    if (W_) {
+        const PotentialObservation potential = observe_potential(space_, *W_, bending_.potentials, x.data());
+        if (!(std::isfinite(potential.energy) && potential.distance > 0)) return false;
+    }
     return domain(x).value > 0;
 }
 
@@ -490,6 +496,7 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     o.M = images_ * stdx::reduce(M);
     o.energy = o.energy_alpha = area_difference_energy(bending_, o.M);
     for (const Pack& term : terms) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
+    if (W_) o.potential = observe_potential(space_, *W_, bending_.potentials, x.data()), o.energy += o.potential.energy;
     o.domain = domain(x);
     if (defect) *defect = spline_defect(x, stiffness);
     return o;
@@ -538,7 +545,7 @@ double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
             for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
         }
     const CurveObservation o = observe(x);
-    return std::max(std::abs(o.energy), images_ * magnitude + o.energy_alpha);
+    return std::max(std::abs(o.energy), images_ * magnitude + o.energy_alpha + o.potential.magnitude);
 }
 
 }  // namespace tubule::axisym

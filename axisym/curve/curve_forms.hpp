@@ -7,8 +7,10 @@
 #include <array>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "axisym/curve/potential_forms.hpp"
 #include "axisym/splines/curve_space.hpp"
 #include "common/energy/bending.hpp"
 
@@ -17,6 +19,7 @@ namespace tubule::axisym {
 struct VaryingH0;  // of packs, which depend on the machine's registers: not for those who include this
 
 // The functional energy INT f dS + area A + volume V + gauge J + M M of the whole cell or period, by its weights.
+// With the energy goes that of its potentials, INT W dS.
 //   f = f(H, K)        V = INT pi r^2 z' ds        M = INT H dS
 //   J = 1/2 INT (d log g/ds)^2 ds, g = |X'|, theory.md (4.9)
 // All but J do not depend on the parametrisation; J vanishes for one in proportion to arc length, which every shape
@@ -41,7 +44,8 @@ struct CurveObservation {
     // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
     // curvatures: theory.md (2.14).
     double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
-    FormulaDomain::Margin domain;  // of the energy's formula; its place is s
+    PotentialObservation potential;  // its energy is part of `energy`
+    FormulaDomain::Margin domain;    // of the energy's formula; its place is s
 };
 
 class CurveForms {
@@ -51,7 +55,7 @@ public:
 
     const CurveSpace& space() const { return space_; }
     const Bending& bending() const { return bending_; }
-    void set_bending(const Bending& bending) { bending_ = bending; }
+    void set_bending(const Bending& bending) { bending_ = bending, W_ = potential_density(bending.potentials); }
     // Where H0 varies it is a function of the area below a point, until this fixes it to the parameters: H0 of s is
     // then what the formula gives at the point s of the curve x. Throws std::invalid_argument where that is no number.
     void fix_H0(const Eigen::VectorXd& x);
@@ -79,7 +83,7 @@ public:
     Eigen::SparseMatrix<double> mass(const Eigen::VectorXd& x) const;
     double M(const double* x) const;  // INT H dS
 
-    // r > 0, |X'| > 0 and the energy defined at all quadrature points.
+    // r > 0, |X'| > 0 and the energy defined at all quadrature points, none of them behind a wall.
     bool admissible(const Eigen::VectorXd& x) const;
     // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
     // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
@@ -104,6 +108,7 @@ private:
 
     const CurveSpace& space_;
     Bending bending_;
+    std::optional<Formula> W_;                   // of its potentials
     std::shared_ptr<const VaryingH0> fixed_H0_;  // none before fix_H0()
     Eigen::VectorXd fixed_on_;
     double images_;

@@ -11,6 +11,7 @@ namespace tubule::axisym {
 namespace {
 
 constexpr double steepest = 3;      // largest curvature times element length: beyond it the curve is not resolved
+constexpr double coarsest = 0.75;   // longest element at a wall over its range: half of it, of the finer of two runs
 constexpr double stretched = 1e-3;  // least over largest |X_s|
 
 }  // namespace
@@ -34,6 +35,14 @@ std::span<const CurveGuard> curve_guards() {
          [](const Snapshot& s, double time) {
              return undefined_energy(s.o.domain, time, fmt::format("s = {:.4g}", s.o.domain.place));
          }},
+        {[](const Snapshot& s, double) { return s.o.potential.distance; },
+         [](const Snapshot& s, double time) {
+             return StopReport{
+                 Stop::undefined, time,
+                 fmt::format("the membrane is behind the wall of a potential near s = {:.4g}",
+                             s.o.potential.s_distance),
+                 "place the initial shape in front of the wall, or choose law = \"9-3\", which nothing passes"};
+         }},
         {[](const Snapshot& s, double) { return s.pressure_domain.is_small() ? -1 : 1.0; },
          [](const Snapshot& s, double time) { return undefined_pressure(s.pressure_domain, time); }},
         {[](const Snapshot& s, double) { return s.o.g_min / s.o.g_max - stretched; },
@@ -55,6 +64,12 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
             fmt::format("the profile intersects itself or crosses the axis at r = {:.4g}, z = {:.4g}", p.r, p.z),
             "contact is not modelled: later results are invalid"};
     }
+    if (const PotentialObservation& potential = s.o.potential; potential.coarse > coarsest)
+        return StopReport{
+            Stop::resolution_lost, time,
+            fmt::format("an element near s = {:.4g} is {:.2g} times as long as the range of the wall there",
+                        potential.s_coarse, potential.coarse),
+            "ask for more accuracy, or set discretisation.elements; a longer range needs fewer"};
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
     const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);

@@ -38,6 +38,8 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
         table.add({{"energy_alpha", [](const CurveRow& r) { return r.now.o.energy_alpha; }},
                    {"M", [](const CurveRow& r) { return r.now.o.M; }}});
     const MotionLaw law = c.law;
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_energy", [](const CurveRow& r) { return r.now.o.potential.energy; }}});
     table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
     if (law.loads_change() || law.supplies_kinetic_energy())
         table.add({{"work", [](const CurveRow& r) { return r.work; }}});
@@ -59,6 +61,8 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
     table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
                {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
     if (may_have_period(c.shape)) table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_force", [](const CurveRow& r) { return r.now.o.potential.force; }}});
     if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.period; }}});
     table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
                {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},

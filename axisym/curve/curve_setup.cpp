@@ -89,7 +89,7 @@ CurveLaw law_of(const Problem& c) {
 InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
-    if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() &&
+    if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() && c.energy.potentials.empty() &&
         (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
@@ -155,6 +155,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
 Snapshot CurveSetup::with_exact_shape(Snapshot s) const {
     s.o.energy = start.bending.energy, s.o.energy_term = start.bending.energy_term;
     s.o.energy_alpha = start.bending.energy_alpha, s.o.M = start.bending.M;
+    s.o.potential.energy = start.bending.potential;
     s.o.area = start.area, s.o.volume = start.volume;
     s.free_energy = start.free_energy(motion->law());
     return s;
@@ -209,6 +210,7 @@ CurveSettings settings_for(const Problem& c, const InitialShape& start, CurveSet
     if (c.profile_resolution_given() || !start.meridian.seams.empty()) return s;
     const double allowed = most_lost * start.bending.magnitude;
     const ArcLength arc(start.meridian);
+    s.elements = std::max(s.elements, elements_for(c.energy.potentials, arc.total()));
     while (can_be_finer(s)) {
         const auto space = space_of(c, start.meridian, first_breaks(arc, s, c, least_seam));
         CurveForms forms(*space, c.energy);

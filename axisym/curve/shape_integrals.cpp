@@ -53,6 +53,7 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
     static const Eigen::MatrixXd D = differentiation(), within = partial_sums(points);
     ShapeEnergy sum;
     sum.energy_term.resize(count_terms(bending));
+    const std::optional<Formula> W = potential_density(bending.potentials);
     double below = 0;
     each_panel(m, panels, [&](double from, double width) {
         PanelValues at;
@@ -68,6 +69,10 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
             const double H0 = bending.H0_varies() ? evaluate(*bending.H0_formula, variables) : bending.H0;
             for_each_value_at(bending, H0, p.H, p.K,
                               [&](std::size_t k, double value) { sum.energy_term[k] += m.images() * value * dA[i]; });
+            if (W) {
+                const double place[]{at(i, 0), at(i, 2)}, here = m.images() * evaluate(*W, place) * dA[i];
+                sum.potential += here, sum.magnitude += std::abs(here);
+            }
             sum.M += m.images() * p.H * dA[i];
             sum.magnitude += m.images() * magnitude(bending, H0, p.H, p.K) * dA[i];
         }
@@ -75,6 +80,7 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
     });
     sum.energy = sum.energy_alpha = area_difference_energy(bending, sum.M);
     sum.magnitude += sum.energy_alpha;
+    sum.energy += sum.potential;
     for (const double term : sum.energy_term) sum.energy += term;
     return sum;
 }

@@ -15,6 +15,7 @@ std::array<double, 2> area_and_volume(const Curve& meridian);
 struct ShapeEnergy {
     double energy = 0, magnitude = 0;  // the bending energy; the size of its terms, theory.md (11.1)
     double energy_alpha = 0, M = 0;    // theory.md (2.19)
+    double potential = 0;              // part of the energy
     std::vector<double> energy_term;   // of each term, see term_names()
 };
 // To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not

@@ -54,7 +54,7 @@ void StationarySystem::set_constraints(const CurveObservation& o, const Eigen::V
     const int n = space_->size();
     F.segment<2>(n) = equations(o, u).F;
     F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
-    F[n + 3] = space_->topology() == Topology::cell ? place_.dot(u.head(n)) : u[n + 3];
+    F[n + 3] = drifts() ? place_.dot(u.head(n)) : u[n + 3];
 }
 
 Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) const {
@@ -101,7 +101,7 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
     for (int i = 0; i < 2; ++i) rows.row(i) = e.by_extent(i, 0) * area + e.by_extent(i, 1) * volume;
     corner.topLeftCorner<2, 2>() = e.by_multipliers;
     rows.row(2) = -problem_.bending.alpha.value_or(0) * M, corner(2, 2) = 1;
-    if (space_->topology() == Topology::cell)
+    if (drifts())
         rows.row(3) = place;
     else
         corner(3, 3) = 1;
@@ -162,7 +162,7 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
         fix(volume + slopes.by_area * area);
         hessian += u[lambda()] * slopes.by_area_twice * area * area.transpose();
     }
-    if (space_->topology() == Topology::cell) fix(place_);
+    if (drifts()) fix(place_);
     const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints > 0 ? fixed : Eigen::MatrixXd::Zero(n, 1));
     if (constraints > 0) {

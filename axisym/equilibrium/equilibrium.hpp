@@ -74,6 +74,8 @@ private:
     MultiplierEquations equations(const CurveObservation& o, const Eigen::VectorXd& u) const {
         return multiplier_equations(problem_, o.area, o.volume, u[sigma()], u[lambda()]);
     }
+    // Nothing but an equation holds a whole cell in its place.
+    bool drifts() const { return space_->topology() == Topology::cell && problem_.bending.potentials.empty(); }
     void set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     Weights weights(const Eigen::VectorXd& u) const;
     Eigen::VectorXd slope_of_M(const Eigen::VectorXd& x) const;

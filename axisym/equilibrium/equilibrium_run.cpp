@@ -95,6 +95,9 @@ Task task_of(const Problem& c) {
     task.settings.accuracy = c.accuracy.energy;
     task.settings.degree = c.discretisation.order;
     task.settings.descend = e.descend;
+    task.settings.elements =
+        std::max(task.settings.elements, elements_for(c.energy.potentials, ArcLength(task.start).total()));
+    task.settings.max_elements = std::max(task.settings.max_elements, 2 * task.settings.elements);
     if (const BranchChoices& b = e.branch; b.parameter) {
         task.set = setter(*b.parameter);
         BranchSettings& branch = task.branch;
@@ -172,6 +175,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     if (c.energy.alpha)
         table.add({{"energy_alpha", [](const ShapeRow& r) { return r.o.energy_alpha; }},
                    {"M", [](const ShapeRow& r) { return r.o.M; }}});
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_energy", [](const ShapeRow& r) { return r.o.potential.energy; }}});
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
                     return r.o.energy + r.problem.loads.energy(r.o.area, r.o.volume, r.point.shape.length);
@@ -183,6 +188,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
                {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }}});
     if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape))
         table.add({{"force", [](const ShapeRow& r) { return axial_force(r.problem, r.point.shape); }}});
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_force", [](const ShapeRow& r) { return r.o.potential.force; }}});
     table.add({{"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
                {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
                {"height", [](const ShapeRow& r) { return r.measures.height; }},
@@ -317,7 +324,7 @@ bool meets(const Constraints& held, const CurveObservation& o) {
 std::optional<theory::LimitShape> limit_of(const Task& task) {
     const Constraints& held = task.problem.constraints;
     const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
-    if (!closed || !held.area || !held.volume) return std::nullopt;
+    if (!closed || !held.area || !held.volume || !task.problem.bending.potentials.empty()) return std::nullopt;
     return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);
 }
 

@@ -23,7 +23,7 @@ enum Variable { W, W_s, W_ss, W_tt, W_t, W_st };
 
 // A point of the disturbed surface in the frame (e_r, e_theta, e_z), and the derivatives there.
 struct Disturbed {
-    J r, s_r, s_z, t_r, t_z, ss_r, ss_z, st_r, st_z, tt_r, tt_z;
+    J r, z, s_r, s_z, t_r, t_z, ss_r, ss_z, st_r, st_z, tt_r, tt_z;
 };
 
 // The surface (r + w n_r) e_r + (z + w n_z) e_z. Each argument: value, first and second derivative in s.
@@ -43,7 +43,7 @@ Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], c
     };
     const auto mixed = [&](const Pack(&n)[3]) { return w_st * constant(n[0]) + w_t * constant(n[1]); };
     Disturbed d;
-    d.r = constant(r[0]) + w * constant(nr[0]);
+    d.r = constant(r[0]) + w * constant(nr[0]), d.z = constant(z[0]) + w * constant(nz[0]);
     d.s_r = first(r, nr), d.s_z = first(z, nz);
     d.ss_r = second(r, nr), d.ss_z = second(z, nz);
     d.t_r = w_t * constant(nr[0]), d.t_z = w_t * constant(nz[0]);
@@ -54,7 +54,8 @@ Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], c
 
 // E + sigma A + lambda V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of
 // d_theta^2 twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
-J functional_density(const Bending& bending, double sigma, double lambda, const Disturbed& d) {
+J functional_density(const Bending& bending, const std::optional<Formula>& potential, double sigma, double lambda,
+                     const Disturbed& d) {
     // Normal d_theta X x d_s X, not of unit length.
     const J n_r = d.r * d.s_z, n_t = d.t_z * d.s_r - d.t_r * d.s_z, n_z = -(d.r * d.s_r);
     const J square = n_r * n_r + n_t * n_t + n_z * n_z;
@@ -68,6 +69,10 @@ J functional_density(const Bending& bending, double sigma, double lambda, const 
     const auto f = density(bending, H.v, K.v);
     J sum = chain(H, K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
     sum.v += sigma;
+    if (potential) {
+        const J place[]{d.r, d.z};
+        sum += evaluate(*potential, place);
+    }
     return square * inverse_area * sum + (lambda / 2) * (d.r * n_r);
 }
 
@@ -88,6 +93,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
     std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
     const Bending bending = with_M(problem.bending, shape.observed.M);
+    const std::optional<Formula> potential = potential_density(bending.potentials);
     for (int e = 0; e < splines.elements(); ++e)
         for (int group = 0; group < splines.groups(); ++group) {
             const auto& b = splines.basis(e, group);
@@ -98,7 +104,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
             }
-            const J density = functional_density(bending, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
+            const J density = functional_density(bending, potential, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
@@ -382,6 +388,7 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
                 whole * shape_.lambda * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
         }
     }
+    if (!problem_.bending.potentials.empty()) return fixed;  // these hold it in its place
     const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());

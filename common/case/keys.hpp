@@ -89,6 +89,24 @@ inline std::string repeated_term(const Bending& energy, std::size_t number) {
 }
 
 template <class Keys>
+void keys(Keys& k, Potential& p) {
+    using Kind = Potential::Kind;
+    k.choice("kind", p.kind, {{"plane", Kind::plane}, {"sphere", Kind::sphere}, {"formula", Kind::formula}},
+             k.required);
+    if (!p.is_wall()) {
+        k.formula("formula", p.formula, Potential::variables, k.required);
+        return;
+    }
+    const bool plane = p.kind == Kind::plane;
+    k.number("z", p.z);
+    if (!plane) k.number("radius", p.radius, {.above = 0}, k.required);
+    k.choice("side", p.behind, {{plane ? "above" : "outside", false}, {plane ? "below" : "inside", true}});
+    k.choice("law", p.law, {{"morse", Potential::Law::morse}, {"9-3", Potential::Law::nine_three}});
+    k.number("strength", p.strength, {.from = 0}, k.required);
+    k.number("range", p.range, {.above = 0}, k.required);
+}
+
+template <class Keys>
 void keys(Keys& k, Bending& energy, Tier tier) {
     std::string moduli;
     for_each_bending_term([&](std::size_t i, const auto& term) {
@@ -99,6 +117,7 @@ void keys(Keys& k, Bending& energy, Tier tier) {
     k.number("alpha", energy.alpha, {.from = 0});
     k.number("M0", energy.M0);
     k.tables("term", energy.terms, [](auto& k, EnergyTerm& term) { keys(k, term); });
+    k.tables("potential", energy.potentials, [](auto& k, Potential& p) { keys(k, p); });
     for (std::size_t i = 0; i < energy.terms.size(); ++i) {
         energy.terms[i].entry = i;
         k.check(fmt::format("term.{}", i), [&] { return repeated_term(energy, i); });
@@ -321,6 +340,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_pressure) return loads.pressure;
     if (parameter == vary_force) return loads.force;
     if (parameter == vary_alpha) return c.energy.alpha;
+    if (parameter <= vary_strength) return c.energy.potentials[vary_strength - parameter].strength;
     if (parameter == vary_M0) return c.energy.M0;
     return parameter == vary_H0 ? c.energy.H0 : modulus(c.energy, parameter);
 }

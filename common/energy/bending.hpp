@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/energy/potential.hpp"
 #include "common/formula/formula.hpp"
 
 namespace tubule {
@@ -114,6 +115,7 @@ struct Bending {
     // none.
     std::optional<double> alpha = {};
     double M0 = 0;
+    std::vector<Potential> potentials = {};  // of places: INT W dS beside INT f dS
     double mu = 0;  // densities are f + mu H: see with_M(); but not in kernels that are made for fewer terms
 
     bool H0_varies() const { return H0_formula != nullptr; }

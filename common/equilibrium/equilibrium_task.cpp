@@ -17,6 +17,10 @@ double volume_at(double area, double reduced_volume) {
 SetParameter setter(int parameter) {
     if (parameter >= 0)
         return [parameter](StationaryProblem& p, double value) { modulus(p.bending, parameter) = value; };
+    if (parameter <= vary_strength)
+        return [i = vary_strength - parameter](StationaryProblem& p, double value) {
+            p.bending.potentials[i].strength = value;
+        };
     switch (parameter) {
         case vary_H0:
             return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
@@ -46,6 +50,7 @@ SetParameter setter(int parameter) {
 
 double parameter_value(int parameter, const StationaryProblem& p) {
     if (parameter >= 0) return modulus(p.bending, parameter);
+    if (parameter <= vary_strength) return p.bending.potentials[vary_strength - parameter].strength;
     const Constraints& c = p.constraints;
     switch (parameter) {
         case vary_H0:

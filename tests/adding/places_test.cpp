@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/energy/potential.hpp"
 #include "common/formula/formula.hpp"
 
 namespace term_first {

@@ -523,7 +523,7 @@ TEST(Tube, RadiusIsDifferentiable) {
 TEST(CaseErrors, allAreReportedAtOnce) {
     EXPECT_EQ(refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
               "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, H0, alpha, "
-              "M0, term\n"
+              "M0, term, potential\n"
               "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, "
               "mode, noise "
               "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"

@@ -154,6 +154,11 @@ public:
         KeyList inner(found_, path_of(key));
         T one{};
         describe(inner, one);
+        if constexpr (std::is_same_v<T, Potential>)
+            for (const auto kind : {Potential::Kind::sphere, Potential::Kind::formula}) {
+                one.kind = kind;
+                describe(inner, one);
+            }
     }
     template <class T, class Describe>
     void entries(const OpenNames&, std::vector<T>&, std::string T::*, const Describe&) {}

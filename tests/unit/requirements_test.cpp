@@ -29,6 +29,7 @@ struct Refused {
     std::vector<std::string> sets;
     std::string words;
 };
+const std::string wall = "energy.potential=[{kind=\"plane\", z=-2, strength=1, range=0.1}]";
 const std::string H0_of_z = "energy.H0=sin(pi*z)", H0_of_area = "energy.H0=-1-0.1*area";
 const std::vector<Refused> refused{
     {axisym, {"auto.modes=2"}, "tier = \"auto\""},
@@ -108,6 +109,10 @@ const std::vector<Refused> refused{
      "a branch that does not vary it"},
     {equilibrium, {H0_of_z}, "variable area alone"},
     {axisym, {"energy.M0=-20"}, "energy.alpha"},
+    {surface_equilibrium, {wall}, "tier = \"axisym\""},
+    {axisym, {wall}, "a closed surface"},
+    {equilibrium, {"equilibrium.family=prolate", wall}, "a case without equilibrium.family"},
+    {equilibrium, {"model.kind=stokes", wall}, "inertia or friction"},
 };
 const std::vector<std::string> by_paper{"model.kind=overdamped", "discretisation.step=0.1"};
 const std::vector<Refused> refused_by_paper{

@@ -1,0 +1,196 @@
+// Potentials of places: derivatives, spheres around a particle, vesicles at a wall.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
+#include "common/case/read.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/solve/derivative_check.hpp"
+#include "common/theory/dispersion.hpp"
+#include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
+
+namespace tubule::axisym {
+namespace potential_test {
+
+using Kind = Potential::Kind;
+using Law = Potential::Law;
+
+Bending with_potentials(Bending energy, std::vector<Potential> potentials) {
+    energy.potentials = std::move(potentials);
+    return energy;
+}
+
+Potential particle(double radius, double strength, double range) {
+    return {.kind = Kind::sphere, .radius = radius, .strength = strength, .range = range};
+}
+
+// Of the laws: the minimum -strength at the distance `range`, on either side of a wall.
+TEST(Potential, hasItsMinimumAtTheRange) {
+    for (const Law law : {Law::morse, Law::nine_three})
+        for (const Kind kind : {Kind::plane, Kind::sphere})
+            for (const bool behind : {false, true}) {
+                const Potential p{
+                    .kind = kind, .z = -0.3, .radius = 2, .behind = behind, .law = law, .strength = 0.7, .range = 0.2};
+                const auto W = [f = *potential_density(std::span(&p, 1))](double r, double z) {
+                    const double place[]{r, z};
+                    return evaluate(f, place);
+                };
+                const double sign = behind ? -1 : 1, wall = kind == Kind::plane ? -0.3 : 1.7, z = wall + sign * 0.2;
+                EXPECT_NEAR(p.distance(0, z), 0.2, 1e-14);
+                EXPECT_NEAR(W(0, z), -0.7, 1e-14);
+                EXPECT_NEAR(W(0, z + 1e-4) - W(0, z - 1e-4), 0, 3e-8);
+                EXPECT_GT(W(0, wall + sign * 0.1), W(0, z));
+                EXPECT_LT(p.distance(0, wall - sign * 0.1), 0);
+            }
+}
+
+TEST(Potential, formsHaveTheirDerivatives) {
+    const Potential wall{.z = -1.7, .strength = 0.4, .range = 0.3},
+        formula{.kind = Kind::formula,
+                .formula = std::make_shared<const Formula>(
+                    parse_formula("0.3*z*exp(-r^2) + 0.1*sin(z)", Potential::variables))};
+    Potential round = particle(0.4, 0.5, 0.2);
+    round.z = 1.9, round.law = Law::nine_three;
+    const Bending energy = with_potentials(bending(0.2, -0.7, 0.03, 0.1), {wall, round, formula});
+    const CurveSpace space(Topology::cell, equal_breaks(8), 5, 4, 0);
+    const CurveForms forms(space, energy);
+    const Weights weights{.energy = 0.8, .area = 0.1, .volume = -0.2};
+    const auto checked = check_derivatives([&](const Eigen::VectorXd& x) { return forms.value(weights, x); },
+                                           [&](const Eigen::VectorXd& x) { return forms.gradient(weights, x); },
+                                           [&](const Eigen::VectorXd& x, const Eigen::VectorXd& w) -> Eigen::VectorXd {
+                                               return forms.hessian(weights, x) * w;
+                                           },
+                                           fit(space, meridian(Ellipsoid{1, 1, 1.3})));
+    EXPECT_TRUE(checked.pass()) << checked.text();
+}
+
+// A sphere about a particle: 16 pi k20 + 4 pi R^2 W, stationary where R W' + 2 W = 0; waves l of it cost, beside
+// bending, W'' + 4 W'/R + (2 + l (l + 1)) W/R^2 (theory.md (2.22)). At the strength 4 k20/R^2, where wrapping pays, the
+// energy of the range 0 is zero.
+TEST(Potential, spheresWrapAParticle) {
+    const double k20 = 0.5, particle_radius = 0.9, range = 0.2, w = 1.3;
+    const auto jet = [&](double R) {
+        const double e = std::exp(-(R - particle_radius - range) / range);
+        return std::array{w * (e * e - 2 * e), -2 * w / range * (e * e - e), 2 * w / (range * range) * (2 * e * e - e)};
+    };
+    double R = particle_radius + range;
+    for (int i = 0; i < 50; ++i) {
+        const auto [W, W1, W2] = jet(R);
+        R -= (R * W1 + 2 * W) / (3 * W1 + R * W2);
+    }
+    const auto [W, W1, W2] = jet(R);
+    const StationaryProblem problem{with_potentials(bending(k20), {particle(particle_radius, w, range)}), {}};
+    const Equilibrium e = find_equilibrium(problem, meridian(Sphere{1.15, {}}), {.accuracy = 1e-10, .elements = 32});
+    ASSERT_EQ(e.stop, Stop::finished) << e.message;
+    EXPECT_NEAR(e.observed.r_max, R, 1e-3);  // a point of the mesh
+    EXPECT_NEAR(std::sqrt(e.observed.area / (4 * pi)), R, 1e-8);
+    EXPECT_NEAR(e.observed.energy, 16 * pi * k20 + 4 * pi * R * R * W, 1e-8);
+    EXPECT_NEAR(e.observed.potential.force, 0, 1e-8);
+    EXPECT_EQ(e.negative_directions, 0);
+    const theory::UniformSphere sphere{bending(k20), R};
+    const MotionLaw flow{.friction = 1, .inextensible = false, .keeps_volume = false};
+    for (int m = 0; m <= 2; ++m) {
+        std::vector<double> expected;
+        for (int l = m; l < 8; ++l) {
+            const double bends = l == 1 ? 0 : theory::stiffness(sphere, l);
+            expected.push_back(-bends - W2 - 4 * W1 / R - (2 + l * (l + 1)) * W / (R * R));
+        }
+        std::sort(expected.rbegin(), expected.rend());
+        const ModeRates found = ModeStability(problem, e).rates(m, flow, 3);
+        for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.rates[i], expected[i], 1e-5 * std::abs(expected[i])) << m << i;
+    }
+    const double small = 0.01, radius = 1 + small;
+    const StationaryProblem threshold{with_potentials(bending(k20), {particle(1, 4 * k20 / (radius * radius), small)}),
+                                      {}};
+    const Equilibrium wrapped =
+        find_equilibrium(threshold, meridian(Sphere{radius, {}}), {.accuracy = 1e-8, .elements = 24});
+    ASSERT_EQ(wrapped.stop, Stop::finished) << wrapped.message;
+    EXPECT_NEAR(wrapped.observed.energy / (16 * pi * k20), 0, 1e-3);
+}
+
+const std::string at_wall = R"(tier = "axisym"
+[energy]
+k20 = 0.5
+[[energy.potential]]
+kind = "plane"
+z = -1.35
+strength = 3
+range = 0.15
+[model]
+kind = "gradient-flow"
+area = "fixed"
+volume = "fixed"
+[shape]
+kind = "ellipsoid"
+a = 1
+b = 1
+c = 1.1
+[accuracy]
+energy = 1e-5
+[time]
+end = 50
+stationary = 1e-8
+)";
+
+Outcome shapes_of(const std::string& text) {
+    const Case c = parse_case(text, {}, "case.toml");
+    Outcome out;
+    out.summary = run_equilibrium(c, out.log);
+    const auto names = equilibrium_series_names(c);
+    for (std::size_t i = 0; i < names.size(); ++i)
+        for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));
+    return out;
+}
+
+// A vesicle is drawn to a wall and spreads there. Its end is the equilibrium; the balance of the energy closes.
+TEST(Potential, vesiclesAdhere) {
+    const Case c = parse_case(at_wall, {}, "case.toml");
+    const Outcome o = run_case(c);
+    ASSERT_EQ(o.summary.stop.reason, Stop::stationary) << o.summary.stop.message;
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 2e-4 * o.summary.reference_energy);
+    EXPECT_LT(o["potential_force"].front(), -0.1);
+    EXPECT_NEAR(o.last("potential_force"), 0, 1e-2);
+    EXPECT_LT(o.last("potential_energy"), 2 * o["potential_energy"].front());
+    EXPECT_NEAR(o.last("energy"), o.last("energy_20") + o.last("potential_energy"), 1e-9);
+    std::string still = at_wall.substr(0, at_wall.find("[time]")) + "[equilibrium]\n";
+    still.replace(still.find("kind = \"gradient-flow\"\n"), 23, "");
+    const Outcome e = shapes_of(still);
+    ASSERT_EQ(e.summary.stop.reason, Stop::finished) << e.summary.stop.message;
+    EXPECT_NEAR(e.last("energy"), o.last("energy"), 2e-5 * o.summary.reference_energy);
+    EXPECT_NEAR(e.last("potential_force"), 0, 1e-6);
+    EXPECT_EQ(e.last("negative_directions"), 0);
+}
+
+// Along a branch dE/dw = INT W dS/w: E rises by the integral of that (Simpson's rule).
+TEST(Potential, branchesVaryTheStrength) {
+    const std::string branch =
+        at_wall.substr(0, at_wall.find("[model]")) +
+        at_wall.substr(at_wall.find("[shape]"), at_wall.find("[time]") - at_wall.find("[shape]")) +
+        "[equilibrium]\n[equilibrium.branch]\nvary = \"energy.potential.0.strength\"\nto = 3.4\n"
+        "step = 0.2\n";
+    const Outcome o = shapes_of(branch);
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    ASSERT_EQ(o["parameter"].size(), 3u);
+    const auto slope = [&](std::size_t i) { return o["potential_energy"][i] / o["parameter"][i]; };
+    EXPECT_NEAR(o["energy"][2] - o["energy"][0], 0.4 / 6 * (slope(0) + 4 * slope(1) + slope(2)),
+                1e-3 * std::abs(o["energy"][2] - o["energy"][0]));
+}
+
+TEST(Potential, wallsAreNotPassed) {
+    const Outcome o = run_case(parse_case(at_wall, {"energy.potential.0.z=-1"}, "case.toml"));
+    EXPECT_EQ(o.summary.stop.reason, Stop::undefined) << o.summary.stop.message;
+    EXPECT_NE(o.summary.stop.message.find("behind the wall"), std::string::npos) << o.summary.stop.message;
+    const auto refusal = [&](const std::vector<std::string>& sets) {
+        return test::message_of<CaseError>([&] { parse_case(at_wall, sets, "case.toml"); });
+    };
+    EXPECT_NE(refusal({"energy.potential.0.range=0"}).find("must be a number > 0"), std::string::npos);
+    EXPECT_NE(refusal({"tier=surface3d"}).find("only valid with tier = \"axisym\""), std::string::npos)
+        << refusal({"tier=surface3d"});
+}
+
+}  // namespace potential_test
+}  // namespace tubule::axisym
