@@ -72,7 +72,7 @@ PotentialObservation observe_potential(const CurveSpace& space, const Formula& W
 int elements_for(std::span<const Potential> potentials, double length) {
     double out = 0;
     for (const Potential& p : potentials)
-        if (p.is_wall()) out = std::max(out, std::ceil(3 * length / p.range));
+        if (p.is_wall()) out = std::max(out, std::ceil(2 * length / p.range));
     return static_cast<int>(std::min(out, 1e6));
 }
 

@@ -23,7 +23,7 @@ struct PotentialObservation {
 PotentialObservation observe_potential(const CurveSpace& space, const Formula& W, std::span<const Potential> potentials,
                                        const double* x);
 
-// Elements of a meridian of this length, of which each is a third of the shortest range of a wall at most; 0 without
+// Elements of a meridian of this length, of which each is half of the shortest range of a wall at most; 0 without
 // one.
 int elements_for(std::span<const Potential> potentials, double length);
 

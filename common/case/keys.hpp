@@ -93,14 +93,20 @@ void keys(Keys& k, Potential& p) {
     using Kind = Potential::Kind;
     k.choice("kind", p.kind, {{"plane", Kind::plane}, {"sphere", Kind::sphere}, {"formula", Kind::formula}},
              k.required);
+    const bool sphere = p.kind == Kind::sphere;
+    if (sphere)
+        k.number("radius", p.radius, {.above = 0}, k.required);
+    else
+        k.absent("radius", "must be absent: only a sphere has one");
     if (!p.is_wall()) {
         k.formula("formula", p.formula, Potential::variables, k.required);
+        for (const char* key : {"z", "side", "law", "strength", "range"})
+            k.absent(key, "must be absent: the formula says how the energy depends on r and z");
         return;
     }
-    const bool plane = p.kind == Kind::plane;
+    k.absent("formula", "must be absent: kind = \"formula\" has one");
     k.number("z", p.z);
-    if (!plane) k.number("radius", p.radius, {.above = 0}, k.required);
-    k.choice("side", p.behind, {{plane ? "above" : "outside", false}, {plane ? "below" : "inside", true}});
+    k.choice("side", p.behind, {{sphere ? "outside" : "above", false}, {sphere ? "inside" : "below", true}});
     k.choice("law", p.law, {{"morse", Potential::Law::morse}, {"9-3", Potential::Law::nine_three}});
     k.number("strength", p.strength, {.from = 0}, k.required);
     k.number("range", p.range, {.above = 0}, k.required);

@@ -163,6 +163,9 @@ TEST(Potential, vesiclesAdhere) {
     EXPECT_NEAR(e.last("energy"), o.last("energy"), 2e-5 * o.summary.reference_energy);
     EXPECT_NEAR(e.last("potential_force"), 0, 1e-6);
     EXPECT_EQ(e.last("negative_directions"), 0);
+    // Along the wall nothing holds it: that motion is no mode.
+    const Outcome modes = shapes_of(still + "modes = 1\n");
+    EXPECT_LT(modes.last("growth_1"), -1);
 }
 
 // Along a branch dE/dw = INT W dS/w: E rises by the integral of that (Simpson's rule).

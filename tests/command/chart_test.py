@@ -79,8 +79,8 @@ class RealRuns(Charts):
         self.assertRegex(out, r"for 1e-03: settings of the case: energy=0\.(1|001) ")  # the faster one
         self.assertIn("for 1e-06: none reaches it", out)
         self.assertTrue((self.folder / "case.svg").read_text().startswith("<?xml"))
-        again, err = self.tubule(*command)
-        self.assertEqual((again, err), (out, ""))
+        again = self.chart(*command[1:])
+        self.assertEqual((again.returncode, again.stdout, again.stderr), (0, out, ""))
         self.assertEqual(self.rows(), rows)
 
     def test_a_result_as_reference_in_a_chart_file(self):
@@ -98,7 +98,7 @@ class RealRuns(Charts):
             vary = { accuracy.energy = [1e-9] }
         """
         self.write("wp.toml", textwrap.dedent(chart_text))
-        out, _ = self.tubule("chart", "wp.toml", "-o", "wp.svg", "--quiet")
+        out = self.chart("wp.toml", "-o", "wp.svg", "--quiet").stdout
         rows = self.rows("wp.csv")
         self.assertEqual([row["series"] for row in rows], ["asked", "asked"])  # the study was not requested
         for row, asked in zip(rows, (1e-3, 1e-5)):

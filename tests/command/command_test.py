@@ -243,7 +243,6 @@ class Refused(ProgramTest):
             self.assertRegex(self.refused(command, "case.toml"),
                              r"case\.toml: is a case file, not a result: run it first \(tubule run \S*case\.toml; tubule scan "
                              r"for a scan\), then give its result, case\.hdf\n")  # fmt: skip
-        self.assertIn("nowhere.hdf", self.refused("plot", "nowhere.hdf"))
         self.assertIn("nowhere.hdf: no such file", self.refused("confirm", "nowhere.hdf"))
 
     def test_blank_names(self):
@@ -382,11 +381,11 @@ class Show(ProgramTest):
 
 class Check(ProgramTest):
     def test_what_a_case_comes_to_is_a_case(self):
-        out, _ = self.tubule("check", self.case, "--set", "energy.k40=0.25")
+        out, _ = self.tubule("check", "--quick", self.case, "--set", "energy.k40=0.25")
         case = tomllib.loads(out)
         self.assertEqual(case["energy"], {"k20": 0.5, "H0": -1.0, "k40": 0.25, "k42": 0.1})
         self.assertEqual(case["accuracy"]["r_min"], 1e-3)  # a default
-        again = self.tubule("check", self.write("again.toml", out))[0]
+        again = self.tubule("check", "--quick", self.write("again.toml", out))[0]
         self.assertEqual(again.split("\n", 1)[1], out.split("\n", 1)[1])
         self.assertEqual(self.files(), {"case.toml", "again.toml"})
 
@@ -400,17 +399,17 @@ class Check(ProgramTest):
             expect = {energy = {value = -0.0, abs = 1e22}, at = [{time = 0.1, r_min = {value = 1, rel = 0.1}}]}
         """
         sets = [part for line in awkward.strip().splitlines() for part in ("--set", line.strip().replace(" = ", "=", 1))]
-        self.write("again.toml", self.tubule("check", self.case, *sets)[0])
-        once = self.tubule("check", "again.toml")[0]
+        self.write("again.toml", self.tubule("check", "--quick", self.case, *sets)[0])
+        once = self.tubule("check", "--quick", "again.toml")[0]
         self.write("again.toml", once)
-        self.assertEqual(self.tubule("check", "again.toml")[0], once)
+        self.assertEqual(self.tubule("check", "--quick", "again.toml")[0], once)
         case = tomllib.loads(once)
         self.assertEqual(str(case["shape"]["mode"][0]["phase"]), "-0.0")
         self.assertEqual(case["shape"]["mode"][1]["amplitude"], 8.361757361286462e-6)
         for name in (b"two\nlines = 1", b"\xff\xfe"):
             path = os.fsencode(self.folder) + b"/" + name
             os.rename(self.write("plain.toml", QUICK), path)
-            tomllib.loads(self.tubule("check", os.fsdecode(path))[0])
+            tomllib.loads(self.tubule("check", "--quick", os.fsdecode(path))[0])
 
     def test_what_it_takes_is_told(self):
         """The number of steps within a factor 2; times are for the study."""
@@ -428,7 +427,7 @@ class Check(ProgramTest):
     def test_all_bad_cases_are_told(self):
         one = self.write("one.toml", QUICK.replace("kind", "knid"))
         two = self.write("two.toml", QUICK.replace("0.5", '"much"'))
-        out, err = self.tubule("check", one, self.case, two, status=2)
+        out, err = self.tubule("check", "--quick", one, self.case, two, status=2)
         self.assertIn("one.toml:9:1: ", err)
         self.assertIn("two.toml:5:7: ", err)
         self.assertIn("# OK", out)
@@ -480,11 +479,6 @@ class Others(ProgramTest):
         with self.start("run", root / "cases/surface_ellipsoid.toml", "--quiet", env=many) as process:
             self.assertEqual(process.communicate(), ("", ""))
         self.assertEqual(process.returncode, 0)
-
-    def test_plot(self):
-        self.tubule("run", self.case)
-        self.tubule("plot", self.result, "-o", "picture.svg")
-        self.assertIn("<svg", (self.folder / "picture.svg").read_text())
 
     def test_overrides_of_a_result_of_version_0_1(self):
         """It lacks /resolved_case: the program tells it, and applies what --set was."""

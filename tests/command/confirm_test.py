@@ -164,11 +164,11 @@ class Ranks(ProgramTest):
     def setUp(self):
         super().setUp()
         self.write("case.toml", CASE)
-        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,-0.2,0", "--set", "time.end=0.02", "-o", "scan.hdf")
+        self.tubule("scan", "case.toml", "--over", "energy.H0=-1,-0.8,0", "--set", "time.end=0.02", "-o", "scan.hdf")
 
     def command(self, ranks, folder):
         return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, "confirm", "scan.hdf",
-                "--elements", "20", "--points", "4", "--csv", "--quiet", "-o", folder]  # fmt: skip
+                "--elements", "20", "--points", "3", "--csv", "--quiet", "-o", folder]  # fmt: skip
 
     def figures(self, text):
         return [{key: value for key, value in row.items() if key != "file"} for row in csv.DictReader(io.StringIO(text))]

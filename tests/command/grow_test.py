@@ -186,7 +186,7 @@ class Pictures(GrowTest):
                   "-o", "scan.hdf")  # fmt: skip
 
     def pixels(self, *arguments):
-        self.plot("scan.hdf", "-o", "map.png", *arguments)
+        self.plot("scan.hdf", "-o", "map.png", "--dpi=100", *arguments)
         return imread(self.folder / "map.png")
 
     def test_slices(self):
@@ -202,7 +202,7 @@ class Pictures(GrowTest):
     def test_a_slice_is_as_a_scan_of_its_own(self):
         self.scan("case.toml", f"--over={AMPLITUDE}=0.3,0.5", f"--over={K42}=1e-5,1e-3,1e-2", "-o", "whole.hdf")
         of_slice = self.pixels("--slice", f"{RADIUS}=1")
-        self.plot("whole.hdf", "-o", "own.png")
+        self.plot("whole.hdf", "-o", "own.png", "--dpi=100")
         own = imread(self.folder / "own.png")
         rows = slice(own.shape[0] // 8, None)  # below the title, which names the slice
         np.testing.assert_array_equal(of_slice[rows], own[rows])

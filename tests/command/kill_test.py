@@ -141,7 +141,7 @@ class Kill(ProgramTest):
         self.assert_ends_like_the_undisturbed_run()
 
 
-# A surface that moves, a second or so, in steps as given: 100 of them and a frame at every fifth.
+# A surface that moves, half a second or so, in steps as given: 60 of them and a frame at every fifth.
 SURFACE = """tier = "surface3d"
 [energy]
 k20 = 0.2
@@ -159,9 +159,9 @@ step = 1e-3
 [accuracy]
 energy = 1e-1
 [time]
-end = 0.1
+end = 0.06
 output = %s
-""" % [i / 200 for i in range(1, 20)]
+""" % [i / 200 for i in range(1, 12)]
 
 
 class Surface(ProgramTest):
@@ -203,7 +203,7 @@ class Surface(ProgramTest):
     def test_kills_and_signals_lose_nothing(self):
         self.tubule("run", self.case, "-o", "whole.hdf")
         self.whole = series(self.folder / "whole.hdf")
-        for number, rows in ((signal.SIGKILL, 10), (signal.SIGTERM, 30), (signal.SIGKILL, 50)):
+        for number, rows in ((signal.SIGKILL, 5), (signal.SIGTERM, 15), (signal.SIGKILL, 30)):
             written = self.disturbed(number, rows)
             self.assertLess(len(written), len(self.whole["time"]))
             energy = list(self.shown(self.result)[0]).index("energy")
@@ -212,7 +212,7 @@ class Surface(ProgramTest):
         self.tubule("run", self.case, "--resume", "--quiet")
         self.assert_ends_like_the_undisturbed_run()
         with h5py.File(self.result) as file:
-            self.assertEqual(len(file["frames"]), 21)  # the start, 19 outputs, the end
+            self.assertEqual(len(file["frames"]), 13)  # the start, 11 outputs, the end
             self.assertEqual(len(file["meshes"]), 1)
 
 

@@ -156,7 +156,7 @@ class CtrlC(ProgramTest):
 
     def test_one_that_is_ignored_from_the_beginning_stays_ignored(self):
         # As a shell does for background jobs of a script.
-        with self.computing("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=2", seconds=0.1,
+        with self.computing("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=1", seconds=0.1,
                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as process:  # fmt: skip
             process.send_signal(signal.SIGINT)
             out, err = process.communicate()
@@ -214,7 +214,7 @@ class Memory(ProgramTest):
 
 class Cost(ProgramTest):
     def test_of_many_frames_is_told_by_the_first(self):
-        err = self.tubule("run", self.case, "--set", 'time.output="0:0.2:20000"', "--set", "time.limit=0.2", status=5)[1]
+        err = self.tubule("run", self.case, "--set", 'time.output="0:0.2:20000"', "--set", "time.limit=0.05", status=5)[1]
         self.assertRegex(err, r"case.toml: time.output asks for 20001 frames: a result of about \d+ MB, which takes 17 s and \d+ MB of memory\n")
 
     def test_of_many_triangles_at_rest_is_told_before(self):

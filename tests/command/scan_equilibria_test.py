@@ -103,18 +103,19 @@ class Found(EquilibriaTest):
 
     def test_pears_and_vesiculated_limits(self):
         """Energies of limits: scipy.optimize.brentq for R^2 + r^2 = 1, R^3 + r^3 = v."""
-        self.scan("vesicle.toml", f'--over={FAMILY}="prolate","pear"', f"--over={VOLUME}=0.77,0.8,0.9", f"--over={H0}=-2.8,-3.4",
-                  "--set=accuracy.energy=1e-4", "-o", "scan.hdf")  # fmt: skip
+        self.scan("vesicle.toml", f'--over={FAMILY}="prolate","pear"', f"--over={VOLUME}=0.77,0.9",
+                  f"--over={H0}=-2.8,-3.4", ROUGH, "-o", "scan.hdf")  # fmt: skip
         rows = list(csv.DictReader(io.StringIO(self.tubule("show", "scan.hdf", "--csv")[0])))
         row = {(r[FAMILY].strip('"'), float(r[VOLUME]), float(r[H0])): r for r in rows}
         self.assertEqual(row["pear", 0.77, -2.8]["outcome"], "pear")
         self.assertAlmostEqual(float(row["pear", 0.77, -2.8]["limit_energy"]), 6.305364038013985, delta=1e-9)
-        self.assertEqual(row["pear", 0.8, -3.4]["outcome"], "failed")
-        self.assertGreater(float(row["pear", 0.8, -3.4]["free_energy"]), float(row["pear", 0.8, -3.4]["limit_energy"]))
+        above = row["pear", 0.77, -3.4]
+        self.assertEqual(above["outcome"], "failed")
+        self.assertGreater(float(above["free_energy"]), float(above["limit_energy"]))
         lines = self.tubule("show", "scan.hdf")[0].splitlines()
-        self.assertEqual([line.strip() for line in lines[-2:]], ["vvl", "ppl"])  # the upper line is that of H0 = -3.4
-        self.tubule("plot", "scan.hdf", "-o", "map.svg")
-        self.assertIn("vesiculated limit is lower (2)", (self.folder / "map.svg").read_text())
+        self.assertEqual([line.strip() for line in lines[-2:]], ["vl", "pl"])  # the upper line is that of H0 = -3.4
+        self.plot("scan.hdf", "-o", "map.svg")
+        self.assertIn("vesiculated limit is lower (1)", (self.folder / "map.svg").read_text())
 
     def test_spheres_with_a_neck(self):
         """Spheres of the radii cos a and sin a have the area of one of radius 1. Seifert's limits: -H0 = 1/R1 +- 1/R2."""
@@ -122,7 +123,7 @@ class Found(EquilibriaTest):
         inside, beside = math.cos(a) ** 3 - math.sin(a) ** 3, math.cos(a) ** 3 + math.sin(a) ** 3
         neck = {inside: 1 / math.sin(a) - 1 / math.cos(a), beside: -1 / math.sin(a) - 1 / math.cos(a)}
         # theory.md (2.20): with area differences for H0 - alpha (M - M0)/(2 k20), k20 = 1, M = -8 pi (R1 +- R2).
-        alpha, M0 = 0.7, -28
+        alpha, M0 = 0.1, -28
         for name, volume, M in (("sphere_in_sphere", inside, -8 * math.pi * (math.cos(a) - math.sin(a))),
                                 ("two_spheres", beside, -8 * math.pi * (math.cos(a) + math.sin(a)))):  # fmt: skip
             for sets, shift in ((), 0), ((f"--set=energy.alpha={alpha}", f"--set=energy.M0={M0}"), alpha * (M - M0) / 2):
@@ -180,7 +181,8 @@ class Grown(EquilibriaTest):
 
 class Shown(EquilibriaTest):
     def test_pictures_and_words(self):
-        self.scan("vesicle.toml", f"--over={ALL}", f"--over={VOLUME}=0.55:0.7:4", f"--over={H0}=-0.2,-0.1,0", "-o", "scan.hdf")
+        self.scan("vesicle.toml", f"--over={ALL}", f"--over={VOLUME}=0.55:0.7:4", f"--over={H0}=-0.2,-0.1,0", ROUGH,
+                  "-o", "scan.hdf")  # fmt: skip
         out, _ = self.tubule("show", "scan.hdf")
         self.assertIn("the shapes of least energy", out)
         self.assertIn("    sool\n    soll\n    ooll\n", out)  # lines cross H0 = 0 at 0.591 and 0.651

@@ -30,7 +30,7 @@ CASE = UNDULATED_TUBE
 # A map with pinched tubes, unduloids (held open by k42) and straight tubes.
 MAP = ("--over", f"{AMPLITUDE}=0.3:0.5:3", "--over", f"{K42}=1.6e-5:1.6e-3:3:log")
 # Points that take 0.1 s each, so that there is time to kill their scan.
-SLOW = ("--over", f"{AMPLITUDE}=0.1:0.12:10", "--set", "time.end=0.05", "--set", "discretisation.elements=20",
+SLOW = ("--over", f"{AMPLITUDE}=0.1:0.12:12", "--set", "time.end=0.05", "--set", "discretisation.elements=20",
         "--set", "discretisation.time_tolerance=1e-12", "--set", "time.max_order=2", "--to-the-end")
 
 
@@ -164,11 +164,12 @@ energy = 1e-2
             few = [re.sub(r":\d+(:log)?$", r":2\1", axis) for axis in over]
             arguments = [word for axis in few for word in ("--over", axis)]
             with self.subTest(path.name):
-                self.scan(path, *arguments, "--set", "accuracy.energy=1e-2")
+                # At corners of the vesicles necks close: some points fail, some after seconds.
+                vesicles = path.name == "vesicles.toml"
+                self.scan(path, *arguments, "--set", "accuracy.energy=1e-1", *["--set=time.limit=0.2"] * vesicles)
                 sizes = [2 if axis.count(":") else axis.count(",") + 1 for axis in few]
                 self.assertEqual(list(outcomes(self.result).shape), sizes)
-                # At corners of the vesicles necks close.
-                self.assertLessEqual(np.count_nonzero(outcomes(self.result) == "failed"), 4 * (path.name == "vesicles.toml"))
+                self.assertLessEqual(np.count_nonzero(outcomes(self.result) == "failed"), 4 * vesicles)
 
 
 class Boundary(ScanTest):
@@ -177,7 +178,7 @@ class Boundary(ScanTest):
             return {tuple(sorted(edge)) for edge in file["boundary"][()].tolist()}
 
     def test_as_of_the_whole_map(self):
-        fine = ("--over", f"{AMPLITUDE}=0.2:0.5:10", "--over", f"{K42}=1e-5:1e-2:10:log")
+        fine = ("--over", f"{AMPLITUDE}=0.2:0.5:10", "--over", f"{K42}=1e-5:1e-2:10:log", "--set", "accuracy.energy=1e-2")
         self.scan("case.toml", *fine)
         whole, edges = points(self.result), self.edges()
         self.assertTrue(edges)
@@ -358,34 +359,26 @@ class Kill(ScanTest):
         after = self.shown()
         self.assertEqual({point: after[point] for point in before}, before)
 
-    def test_killed_again_and_again(self):
+    def test_disturbed_again_and_again(self):
         known = {}
-        for _ in range(3):
-            status, finished = self.disturbed(signal.SIGKILL, len(known) + 1)
-            self.assertEqual(status, -signal.SIGKILL)
+        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGKILL):
+            status, finished = self.disturbed(number, len(known) + 1)
             self.assert_kept(known)
             known = finished
-            self.assertIn("none yet", self.tubule("show", self.result)[0])
+            if number == signal.SIGKILL:
+                self.assertEqual(status, -number)
+                self.assertIn("none yet", self.tubule("show", self.result)[0])
+            else:
+                self.assertEqual((status, about(self.result)["stop"]), (130, "interrupted"))
+                self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
         out, _ = self.scan("case.toml", *SLOW, "--resume")
-        self.assertIn(f"{10 - len(known)} run now", out)
+        self.assertIn(f"{12 - len(known)} run now", out)
         self.assert_kept(known)
         self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
+        self.assertEqual(about(self.result)["stop"], "finished")
         resumed = points(self.result)
         self.scan("case.toml", *SLOW)
         self.assert_same_points(points(self.result), resumed)
-
-    def test_signals_end_it_and_it_goes_on(self):
-        known = {}
-        for number in (signal.SIGTERM, signal.SIGINT):
-            status, known = self.disturbed(number, len(known) + 1)
-            self.assertEqual(status, 130)
-            self.assertEqual(about(self.result)["stop"], "interrupted")
-            self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
-        self.disturbed(signal.SIGKILL, len(known) + 1)
-        self.assertIn("none yet", self.tubule("show", self.result)[0])
-        self.scan("case.toml", *SLOW, "--resume")
-        self.assert_kept(known)
-        self.assertEqual(about(self.result)["stop"], "finished")
 
     def test_a_boundary_goes_on(self):
         """After a kill the scan follows the same boundary as without."""
@@ -413,7 +406,6 @@ class WithoutMpi(ProgramTest):
 @unittest.skipUnless(MPIRUN, "built without MPI")
 class Ranks(Kill):
     """The same across the processes of an mpirun."""
-    test_points_of_an_earlier_version_are_refused = None  # the same reader
 
     def mpirun(self, ranks):
         # Tests may run as root in a container, with fewer processors than ranks.
@@ -423,14 +415,14 @@ class Ranks(Kill):
         command = [*self.mpirun(ranks), PROGRAM, "scan", *map(str, arguments), "-o", str(self.result)]
         return subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
 
-    def test_killed_again_and_again(self):
+    def test_disturbed_again_and_again(self):
         """A rank dies: MPI ends the others, and a resumed scan loses nothing."""
         status, known = self.disturbed(signal.SIGKILL, 2, self.mpirun(3))
         self.assertNotEqual(status, 0)
         done = self.on_ranks(2, "case.toml", *SLOW, "--resume")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assert_kept(known)
-        self.assertIn(f"{10 - len(known)} run now", done.stdout)
+        self.assertIn(f"{12 - len(known)} run now", done.stdout)
         self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
 
     def signal(self, process, signal_number):
@@ -438,9 +430,6 @@ class Ranks(Kill):
         folder = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         ranks = [int(child) for child in folder.read_text().split()]
         os.kill(ranks[-1], signal_number)
-
-    def test_signals_end_it_and_it_goes_on(self):
-        self.skipTest("mpirun has its own way with signals")
 
     def test_same_content_on_any_number(self):
         self.scan("case.toml", *MAP)
@@ -491,7 +480,7 @@ class Shown(ScanTest):
     def test_pictures(self):
         picture = self.folder / "map.svg"
         self.scan("case.toml", *MAP)
-        self.tubule("plot", self.result, "-o", picture)
+        self.plot(self.result, "-o", picture)
         text = picture.read_text()
         for words in ("amplitude A", "k\u2084\u2082", *(f"{name} (" for name in set(outcomes(self.result).flat))):
             self.assertIn(words, text)

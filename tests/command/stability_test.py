@@ -460,7 +460,7 @@ equilibrium = {modes = 2, area = 41.074}
             self.assertLess(errors[wave, 200], errors[wave, 100] / 2.2)
 
     def test_pictures(self):
-        for more in ((), ("--model", "all", "--tension", "-1"), ("--q", "0.1:3:5",)):
+        for more in ((), ("--model", "all", "--tension", "-1", "--q", "0.1:3:5")):
             self.tubule("stability", self.tube, *more, "--plot", "waves.svg")
             picture = self.folder / "waves.svg"
             text = picture.read_text()

@@ -272,7 +272,7 @@ class DisturbedTest(Starts):
             said = about(self.result)
             self.assertNotIn("estimated_error", said)
             for key in re.findall(r"\b(?:shape|discretisation|accuracy|time)\.\w+", said["advice"]):
-                value = {"shape.remesh": "500"}.get(key, "1")
+                value = {"shape.remesh": "100"}.get(key, "1")
                 answer = self.start("check", path, "--quick", "--set", f"{key}={value}").communicate()[1]
                 self.assertNotIn(f"{key} must be absent", answer)
 

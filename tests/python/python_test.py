@@ -247,7 +247,7 @@ def count(number, frame):
 def sends(*numbers):
     def send():
         for number in numbers:
-            time.sleep(0.5)
+            time.sleep(0.3)
             os.kill(os.getpid(), number)
     threading.Thread(target=send, daemon=True).start()
 
@@ -284,7 +284,7 @@ print(*(r.stop for r in tubule.run_many([{TUBE!r}] * 2)))
 """
         with subprocess.Popen(["/usr/bin/python3", "-c", script], stdout=subprocess.PIPE, text=True) as process:
             process.stdout.readline()
-            time.sleep(1)
+            time.sleep(0.5)
             process.send_signal(signal.SIGINT)
             sent = time.monotonic()
             self.assertEqual(process.stdout.readline(), "interrupted\n")

@@ -10,7 +10,10 @@ import traceback
 import h5py  # noqa: F401
 import matplotlib.backends.backend_agg  # noqa: F401
 import matplotlib.backends.backend_svg  # noqa: F401
-import matplotlib.figure  # noqa: F401
+import matplotlib.pyplot  # noqa: F401
+
+# What one fork has compiled the next ones load: the modules of the package are imported anew in each.
+compiled = tempfile.TemporaryDirectory()
 
 
 def run_script(script, *arguments):
@@ -30,6 +33,7 @@ def run_script(script, *arguments):
 def _run_here(script, arguments):
     sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)
     sys.argv = [script, *arguments]
+    sys.pycache_prefix, sys.dont_write_bytecode = compiled.name, False
     status = 0
     try:
         runpy.run_path(script, run_name="__main__")

@@ -204,7 +204,6 @@ class Pages(InFolder):
             ((file, "--kind", "surface", "--times", "1"), ["t\u2080 = 1", "normal velocity u\u2099 / max |u\u2099| of the run..."], []),
             ((file, "--kind", "surface", "--colour", "u_n", "--times", "1", "--scale", "shape"),
              ["normal velocity u\u2099 / max |u\u2099| of the shape..."], []),
-            ((file, "--kind", "cuts", "--plane", "x=-0.25"), ["cut x = \u22120.25"], []),
             ((file, "--kind", "balance"), ["what dissipation is"], ["(a)"]),
             ((*others, "--times", "1"), ["(d)"], []),
         ):  # fmt: skip
@@ -282,10 +281,9 @@ end = 0.01
         case, file = self.folder / "moving.toml", self.folder / "moving.hdf"
         case.write_text(self.CASE)
         subprocess.run([TUBULE, "run", case, "--quiet", "-o", file], check=True)
-        texts = self.drawn(file, "--kind", "cuts", "--plane", "x=-0.25", program=TUBULE)
-        self.check_words(texts, "cut x = \u22120.25")
-        texts = self.drawn(file, "--kind", "surface", "--colour", "p,H", "--times", "0.01", program=TUBULE)
-        self.check_words(texts, "mean curvature H = \u03ba\u2081 + \u03ba\u2082", "pressure p, white: its mean...")
+        texts = self.drawn(file, "--plane", "x=-0.25", "--colour", "p,H", "--times", "0.01", program=TUBULE)
+        self.check_words(texts, "cut x = \u22120.25", "mean curvature H = \u03ba\u2081 + \u03ba\u2082",
+                         "pressure p, white: its mean...")  # fmt: skip
         self.refused("is not x, y or z = number", file, "--plane=w=0", program=TUBULE)
         self.refused("--colour", file, "--colour=H,T", program=TUBULE)
 

@@ -145,10 +145,11 @@ class Pages(Folder):
             self.assertIn(words, done.stderr)
         result, _ = made(self.folder, TUBE)
         before = result.read_bytes()
-        done = subprocess.run([TUBULE, "view", result, "-o", result], capture_output=True, text=True)
+        drawing = ROOT / "tools/python/tubule/drawing"
+        done = scripts.run_script(drawing, "view", result, "-o", result)
         self.assertEqual((done.returncode, result.read_bytes()), (2, before), done)
         self.assertIn("must end in .html", done.stderr)
-        done = subprocess.run([TUBULE, "view", result, "-o", "/nowhere/page.html"], capture_output=True, text=True)
+        done = scripts.run_script(drawing, "view", result, "-o", "/nowhere/page.html")
         self.assertEqual(done.returncode, 2, done)
         self.assertIn("/nowhere/page.html: cannot be written", done.stderr)
 
