@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
@@ -75,7 +76,9 @@ private:
         return multiplier_equations(problem_, o.area, o.volume, u[sigma()], u[lambda()]);
     }
     // Nothing but an equation holds a whole cell in its place.
-    bool drifts() const { return space_->topology() == Topology::cell && problem_.bending.potentials.empty(); }
+    bool drifts() const {
+        return space_->topology() == Topology::cell && std::ranges::none_of(problem_.bending.potentials, &Potential::acts);
+    }
     void set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     Weights weights(const Eigen::VectorXd& u) const;
     Eigen::VectorXd slope_of_M(const Eigen::VectorXd& x) const;

@@ -27,6 +27,7 @@ struct Potential {
     std::shared_ptr<const Formula> formula = {};
 
     bool is_wall() const { return kind != Kind::formula; }
+    bool acts() const { return !is_wall() || strength != 0; }
     // From the wall to a point, negative behind it.
     double distance(double r, double z) const;
 };

@@ -74,7 +74,7 @@ TEST(Ensembles, tubesComeToRestUnderTensionAndPressure) {
               .tension = tension,
               .pressure = pressure};
     Model moving = fed;
-    moving.kind = ModelKind::fluid, moving.gamma = 1;
+    moving.kind = ModelKind::fluid, moving.gamma = 1, moving.Re = 0.2;
     for (const bool curve : {false, true})
         for (const Model& model : {loaded, fed, moving}) {
             if (!curve && model.kind != ModelKind::gradient_flow) continue;

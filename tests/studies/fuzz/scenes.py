@@ -6,11 +6,12 @@ asked for a thirtieth of the accuracy; where they differ by more than the run st
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
 
-    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles]
+    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places]
 
 prints how true and stated errors compare over many scenes, for a program and for one of before: a run that finishes
 rightly with that one and now stops or does not know its error is a *false alarm*. With --ensembles, every scene has
-random rules and loads; otherwise every other one.
+random rules and loads; otherwise every other one. With --places, all are closed surfaces at a wall, a particle or in a field; where
+their volume is free, most are under osmosis.
 
     scenes.py TUBULE --print N                       the case of scene N
 
@@ -114,9 +115,40 @@ def draw_ensemble(draw, model, tube, size, modulus, end):
         model["force"] = draw_load(draw, 6 * modulus * size, end)
 
 
-def scene(draw, ensembles=0.5):
+def draw_place(draw, shape, size, modulus):
+    """A potential in front of which the shape stands, if its extent along the axis is known."""
+    extent = {"ellipsoid": shape.get("c"), "torus": shape.get("tube_radius"), "capsule": shape.get("length", 0) / 2 + size,
+              "sphere": size + sum(abs(mode["amplitude"]) for mode in shape.get("mode", []))}.get(shape["kind"], 1.2)  # fmt: skip
+    kind = draw.choice(("plane", "plane", "sphere", "formula"))
+    if kind == "formula":
+        a, b, c = (number(modulus * size**-i * draw.uniform(-0.5, 1)) for i in (1, 2, 2))
+        return {"kind": kind, "formula": f"{a}*z + {b}*r^2 + {c}*z^2"}
+    reach = size * math.exp(draw.uniform(math.log(0.05), math.log(0.3)))
+    away = extent + reach * draw.uniform(1, 3)
+    strength = modulus * draw.uniform(0.3, 6)
+    wall = {"kind": kind, "law": draw.choice(("morse", "9-3")), "strength": number(strength), "range": number(reach)}
+    if kind == "plane":
+        return wall | draw.choice(({"z": number(-away)}, {"z": number(away), "side": "below"}))
+    radius = size * draw.uniform(0.3, 3)
+    return wall | {"radius": number(radius), "z": number(-away - radius)}
+
+
+def place(draw, case, size, modulus):
+    """Puts a closed surface at a place, and under osmosis."""
+    shape, model = case["shape"], case["model"]
+    case["energy"]["potential"] = [draw_place(draw, shape, size, modulus)]
+    if model["kind"] == "stokes":
+        model["gamma"] = 0.5
+    if model.get("volume", "free" if model["kind"] == "gradient-flow" else "fixed") == "free" and draw.random() < 0.7:
+        pressure = modulus / size * draw.uniform(0.3, 5)
+        model["pressure"] = f"{number(pressure)}*({number(4.2 * size**3 * draw.uniform(0.3, 1.5))}/V - 1)"
+
+
+def scene(draw, ensembles=0.5, places=False):
     """The case of a scene; `ensembles` is the probability of random rules and loads."""
     shape, size = draw_shape(draw)
+    while places and shape["kind"] == "tube":
+        shape, size = draw_shape(draw)
     energy, modulus = draw_energy(draw, size)
     kind = draw.choice(MODELS)
     model = {"kind": kind}
@@ -129,7 +161,7 @@ def scene(draw, ensembles=0.5):
     asked = math.exp(draw.uniform(math.log(5e-5), math.log(2e-2)))
     if draw.random() < ensembles:
         draw_ensemble(draw, model, shape["kind"] == "tube", size, modulus, end)
-    return {
+    case = {
         "tier": "axisym",
         "energy": energy,
         "model": model,
@@ -137,6 +169,9 @@ def scene(draw, ensembles=0.5):
         "accuracy": {"energy": number(asked)},
         "time": {"end": number(end), "output": [number(end * 10 ** (-i / 2)) for i in range(12, 0, -1)]},
     }
+    if places:
+        place(draw, case, size, modulus)
+    return case
 
 
 class Run:
@@ -238,7 +273,7 @@ def wild(rng, case):
 
 
 def one(rng, box):
-    case = scene(rng)
+    case = scene(rng, places=rng.random() < 0.25)
     tame = rng.random() < 0.5
     if not tame:
         wild(rng, case)
@@ -258,8 +293,8 @@ def one(rng, box):
 # ------------------------------------------------------------------------------------------------ many scenes
 
 
-def scene_number(n, ensembles):
-    return scene(random.Random(f"scene {n}"), ensembles)
+def scene_number(n, ensembles, places):
+    return scene(random.Random(f"scene {n}"), ensembles, places)
 
 
 def judge(n, case, programs, top):
@@ -307,16 +342,17 @@ def main():
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--save", type=Path, help="a line of JSON for each scene")
     parser.add_argument("--ensembles", action="store_const", const=1, default=0.5, help="in every scene")
+    parser.add_argument("--places", action="store_true", help="closed surfaces at walls, particles and in fields")
     parser.add_argument("--print", type=int)
     a = parser.parse_args()
     if a.print is not None:
-        print(toml.dump(scene_number(a.print, a.ensembles)), end="")
+        print(toml.dump(scene_number(a.print, a.ensembles, a.places)), end="")
         return 0
     programs = {"now": a.program} | ({"before": a.before} if a.before else {})
     lines = []
     for n in range(a.first, a.first + a.count):
         with tempfile.TemporaryDirectory() as top:
-            lines.append(judge(n, scene_number(n, a.ensembles), programs, top))
+            lines.append(judge(n, scene_number(n, a.ensembles, a.places), programs, top))
         if a.save:
             a.save.write_text("".join(json.dumps(x) + "\n" for x in lines))
     report(lines)
