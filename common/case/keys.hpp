@@ -89,7 +89,7 @@ inline std::string repeated_term(const Bending& energy, std::size_t number) {
 }
 
 template <class Keys>
-void keys(Keys& k, Potential& p) {
+void keys(Keys& k, Potential& p, Tier tier) {
     using Kind = Potential::Kind;
     k.choice("kind", p.kind, {{"plane", Kind::plane}, {"sphere", Kind::sphere}, {"formula", Kind::formula}},
              k.required);
@@ -99,9 +99,12 @@ void keys(Keys& k, Potential& p) {
     else
         k.absent("radius", "must be absent: only a sphere has one");
     if (!p.is_wall()) {
-        k.formula("formula", p.formula, Potential::variables, k.required);
+        if (tier == Tier::surface3d)
+            k.formula("formula", p.formula, Potential::in_space, k.required);
+        else
+            k.formula("formula", p.formula, Potential::variables, k.required);
         for (const char* key : {"z", "side", "law", "strength", "range"})
-            k.absent(key, "must be absent: the formula says how the energy depends on r and z");
+            k.absent(key, "must be absent: the formula says how the energy depends on the place");
         return;
     }
     k.absent("formula", "must be absent: kind = \"formula\" has one");
@@ -123,7 +126,7 @@ void keys(Keys& k, Bending& energy, Tier tier) {
     k.number("alpha", energy.alpha, {.from = 0});
     k.number("M0", energy.M0);
     k.tables("term", energy.terms, [](auto& k, EnergyTerm& term) { keys(k, term); });
-    k.tables("potential", energy.potentials, [](auto& k, Potential& p) { keys(k, p); });
+    k.tables("potential", energy.potentials, [&](auto& k, Potential& p) { keys(k, p, tier); });
     for (std::size_t i = 0; i < energy.terms.size(); ++i) {
         energy.terms[i].entry = i;
         k.check(fmt::format("term.{}", i), [&] { return repeated_term(energy, i); });

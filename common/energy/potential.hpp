@@ -15,7 +15,8 @@ namespace tubule {
 struct Potential {
     enum class Kind { plane, sphere, formula };
     enum class Law { morse, nine_three };
-    static constexpr std::array<std::string_view, 2> variables{"r", "z"};
+    static constexpr std::array<std::string_view, 2> variables{"r", "z"};      // in tier axisym
+    static constexpr std::array<std::string_view, 3> in_space{"x", "y", "z"};  // in tier surface3d
 
     Kind kind = Kind::plane;
     double z = 0;         // of the plane, or of the sphere's centre
@@ -32,7 +33,8 @@ struct Potential {
     double distance(double r, double z) const;
 };
 
-// The sum of all W, in r and z; none of no potentials.
+// The sum of all W, in r and z, or in x, y and z; none of no potentials.
 std::optional<Formula> potential_density(std::span<const Potential> potentials);
+std::optional<Formula> potential_density_in_space(std::span<const Potential> potentials);
 
 }  // namespace tubule

@@ -313,8 +313,32 @@ void DiscreteEnergy::set_penalty(const CurvedMesh& mesh, const Bending& bending)
     }
 }
 
-void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, double sigma,
-                                double lambda, const Eigen::VectorXd& H0, int cell, Block& out) const {
+namespace {
+
+// W at a point of a frame, which is a tension that varies, and its derivatives by the place.
+struct PointPotential {
+    double value = 0;
+    Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+
+    PointPotential(const std::optional<Formula>& W, const Eigen::Vector3d& x) {
+        if (!W) return;
+        using J = Jet<double, 3, 2>;
+        const J place[]{J::variable(x[0], 0), J::variable(x[1], 1), J::variable(x[2], 2)}, w = evaluate(*W, place);
+        value = w.v;
+        for (int i = 0; i < 3; ++i) {
+            slope[i] = w.d[i];
+            for (int j = 0; j < 3; ++j) second(i, j) = w.dd[packed<3>(i, j)];
+        }
+    }
+};
+
+}  // namespace
+
+// Long: the integrands of all functionals, in the order in which their derivatives need each other.
+void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
+                                const std::optional<Formula>& potential, double sigma, double lambda,
+                                const Eigen::VectorXd& H0, int cell, Block& out) const {
     const bool derive = d.normal.cols() > 0;
     const CellColumns<3> X = cell_nodes(mesh, cell), stretch = stretch_of(X);
     const CellColumns<3> D = derive ? space_.gather<3>(d.normal, cell) : CellColumns<3>();
@@ -326,7 +350,10 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
         const double weight = table.weight[q], H_0 = at_point(space_, H0, bending, cell, table, q);
         const CurvatureJet<double> F = density_at(bending, H_0, at.H.v, at.K.v);
         const Form energy = chain(at.H, at.K, F.f, F.H, F.K, F.HH, F.HK, F.KK) * at.area, M = at.H * at.area;
-        out.values.energy += weight * energy.v, out.values.area += weight * f.area, out.values.M += weight * M.v;
+        const PointPotential W(potential, f.x);
+        out.values.potential += weight * W.value * f.area, out.values.potential_force -= weight * W.slope[2] * f.area;
+        out.values.energy += weight * (energy.v + W.value * f.area), out.values.area += weight * f.area,
+            out.values.M += weight * M.v;
         const double third = mesh.period > 0 ? 0.5 : 1.0 / 3;  // of a tube: without the ends of its period
         Eigen::Vector3d from = f.x;
         if (mesh.period > 0) from.z() = 0;
@@ -342,10 +369,15 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
         if (d.stretch) moved.col(n - 1) = stretch * table.value.col(q);
         out.volume.leftCols(space_.width()).noalias() +=
             weight * f.area * f.normal.transpose() * moved.leftCols(space_.width());
+        const Row widens = weight * f.area_slope.transpose() * change.tangents, climbs = W.slope.transpose() * moved;
+        if (potential) out.energy += W.value * widens + weight * f.area * climbs;
         if (d.stretch) out.volume[n - 1] += weight * 0.5 * (from.dot(f.cross * change.tangents.col(n - 1)));
         if (out.second.size() == 0) continue;
-        change.add_second(f, weight * (slope + sigma * gradient(at.area)),
-                          weight * (hessian(energy) + sigma * hessian(at.area)), out.second);
+        change.add_second(f, weight * (slope + (sigma + W.value) * gradient(at.area)),
+                          weight * (hessian(energy) + (sigma + W.value) * hessian(at.area)), out.second);
+        if (potential)
+            out.second += weight * f.area * moved.transpose() * W.second * moved + widens.transpose() * climbs +
+                          climbs.transpose() * widens;
         const Columns3 turned = f.cross * change.tangents;  // change of t x c
         Square part = weight * lambda * 0.5 * moved.transpose() * turned;
         if (d.stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
@@ -442,27 +474,25 @@ void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, do
 }
 
 EnergyValues DiscreteEnergy::values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0) const {
+    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     std::vector<EnergyValues> parts(space_.cells() + edges_.size());
     parallel_for(parts.size(), [&](std::size_t i) {
         Block block;
         const int cells = space_.cells(), cell = static_cast<int>(i);
         if (cell < cells)
-            cell_block(mesh, {}, bending, 0, 0, H0, cell, block);
+            cell_block(mesh, {}, bending, W, 0, 0, H0, cell, block);
         else
             edge_block(mesh, {}, bending, H0, edges_[i - cells], block);
         parts[i] = block.values;
     });
     EnergyValues out;
-    for (const EnergyValues& v : parts)
-        out.energy += v.energy, out.area += v.area, out.volume += v.volume, out.M += v.M, out.kinks += v.kinks;
+    for (const EnergyValues& v : parts) out += v;
     return out;
 }
 
 void DiscreteEnergy::add(const Block& block, const std::vector<int>& nodes, const int* slots,
                          EnergyDerivatives& out) const {
-    EnergyValues& v = out.values;
-    const EnergyValues& b = block.values;
-    v.energy += b.energy, v.area += b.area, v.volume += b.volume, v.M += b.M, v.kinks += b.kinks;
+    out.values += block.values;
     const int n = static_cast<int>(nodes.size()), N = space_.size();
     for (int i = 0; i < n; ++i) {
         out.energy[nodes[i]] += block.energy[i], out.area[nodes[i]] += block.area[i];
@@ -482,6 +512,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
                                               const Bending& bending, double sigma, double lambda,
                                               const Eigen::VectorXd& H0, bool second) const {
     EnergyDerivatives out;
+    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     const int N = space_.size() + directions.stretch, n = space_.width(), cells = space_.cells();
     for (Eigen::VectorXd* v : {&out.energy, &out.area, &out.volume, &out.M}) v->setZero(N);
     if (second) out.hessian = pattern_;
@@ -498,7 +529,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
             const int i = begin + static_cast<int>(j);
             block.reset((i < cells ? n : 2 * n) + directions.stretch, second);
             if (i < cells)
-                cell_block(mesh, directions, bending, sigma, lambda, H0, i, block);
+                cell_block(mesh, directions, bending, W, sigma, lambda, H0, i, block);
             else
                 edge_block(mesh, directions, bending, H0, edges_[i - cells], block);
         });

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <optional>
 #include <vector>
 
 #include "common/energy/bending.hpp"
@@ -19,9 +20,16 @@ struct Directions {
 };
 
 struct EnergyValues {
-    double energy = 0;  // INT f, of densities alone
+    double energy = 0;                          // INT f + W, of densities and potentials of places alone
+    double potential = 0, potential_force = 0;  // INT W, -INT W_z
     double area = 0, volume = 0, M = 0;
     double kinks = 0;  // INT angle^2 over all edges, times the penalty: of the order of the energy's error
+
+    EnergyValues& operator+=(const EnergyValues& v) {
+        energy += v.energy, potential += v.potential, potential_force += v.potential_force;
+        area += v.area, volume += v.volume, M += v.M, kinks += v.kinks;
+        return *this;
+    }
 };
 
 // Derivatives of the same sums with respect to the unknowns.
@@ -70,8 +78,9 @@ private:
     void find_edges();
     void set_pattern();
     void add(const Block& block, const std::vector<int>& nodes, const int* slots, EnergyDerivatives& out) const;
-    void cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, double sigma, double lambda,
-                    const Eigen::VectorXd& H0, int cell, Block& out) const;
+    void cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
+                    const std::optional<Formula>& potential, double sigma, double lambda, const Eigen::VectorXd& H0,
+                    int cell, Block& out) const;
     void edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, const Eigen::VectorXd& H0,
                     const Edge& edge, Block& out) const;
     void add_derivatives(const EdgeSides& at, const EdgePoint& p, double penalty, int q, Block& out) const;

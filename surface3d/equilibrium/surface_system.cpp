@@ -46,10 +46,35 @@ Eigen::MatrixXd motions_of(const CurvedMesh& mesh, const VectorField& normal, co
     return out;
 }
 
+// Combinations of these motions, a column each, along which no potential of places changes.
+Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, const Middle& middle) {
+    constexpr int all = SurfaceSystem::most_motions, rigid = 6;
+    constexpr double nothing = 1e-10;  // of the mean square of the slope
+    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
+    if (!W) return Eigen::MatrixXd::Identity(all, all);
+    Eigen::MatrixXd changes(mesh.size(), rigid);
+    double slopes = 0;
+    for (int i = 0; i < mesh.size(); ++i) {
+        using J = Jet<double, 3, 1>;
+        const Eigen::Vector3d& x = mesh.nodes[i];
+        const J place[]{J::variable(x[0], 0), J::variable(x[1], 1), J::variable(x[2], 2)}, w = evaluate(*W, place);
+        const Eigen::Vector3d slope(w.d[0], w.d[1], w.d[2]), from = (x - middle.centre) / middle.size;
+        changes.row(i) << slope.transpose(), from.cross(slope).transpose();
+        slopes += slope.squaredNorm();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(changes.transpose() * changes);
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, 0);
+    for (int j = 0; j < rigid && gram.eigenvalues()[j] <= nothing * slopes; ++j) {
+        out.conservativeResize(Eigen::NoChange, j + 1);
+        out.col(j) << gram.eigenvectors().col(j), Eigen::VectorXd::Zero(all - rigid);
+    }
+    return out;
+}
+
 bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
            p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
-           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0;
+           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty();
 }
 
 // Whether both have the same first and second derivatives at given multipliers.
@@ -57,7 +82,7 @@ bool same_energy(const Bending& a, const Bending& b) {
     if (a.H0 != b.H0 || count_terms(a) != count_terms(b) || a.alpha.has_value() != b.alpha.has_value()) return false;
     for (std::size_t i = 0; i < count_terms(a); ++i)
         if (modulus(a, i) != modulus(b, i)) return false;
-    return true;
+    return std::ranges::equal(a.potentials, b.potentials, {}, &Potential::strength, &Potential::strength);
 }
 
 }  // namespace
@@ -116,10 +141,12 @@ void SurfaceSystem::set_motions() {
     const bool free_size = !c.area && !c.volume, any_shape = free_size && !c.reduced_volume && base_.period == 0;
     const bool scales = scale_free(problem_) && free_size && base_.period == 0;
     const Middle middle(base_);
-    const Eigen::MatrixXd fields = motions_of(base_, directions_.normal, middle, scales, scales && any_shape);
+    const Eigen::MatrixXd all = motions_of(base_, directions_.normal, middle, scales, scales && any_shape),
+                          fields = all * free_motions(base_, problem_.bending, middle);
     const Eigen::MatrixXd image = mass_ * fields;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * image);
-    const double least = no_motion * no_motion * gram.eigenvalues().maxCoeff();
+    // Of the largest motion of all: where a potential leaves turns alone, these may have no normal part.
+    const double least = no_motion * no_motion * (all.transpose() * (mass_ * all)).eigenvalues().real().maxCoeff();
     motions_.resize(shape_size(), 0);
     for (Eigen::Index j = 0; j < fields.cols(); ++j) {
         const double norm2 = gram.eigenvalues()[j];
@@ -128,7 +155,7 @@ void SurfaceSystem::set_motions() {
         motions_.col(motions_.cols() - 1).setZero();
         motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.eigenvectors().col(j) / std::sqrt(norm2);
     }
-    set_turn(fields.leftCols<6>(), middle.centre, middle.size, least);
+    set_turn(all.leftCols<6>(), middle.centre, middle.size, least);
 }
 
 // The combinations of rigid motions without a normal part: of a closed surface of revolution there is one.
@@ -298,11 +325,13 @@ double SurfaceSystem::size(const Eigen::VectorXd& u) const {
 double SurfaceSystem::reference_energy(const Eigen::VectorXd& u) const {
     const CurvedMesh at = mesh(u);
     const Tabulation& table = space().tabulation();
+    const std::optional<Formula> W = potential_density_in_space(problem_.bending.potentials);
     double sum = 0;
     for (int cell = 0; cell < space().cells(); ++cell) {
         const CellColumns<3> X = cell_nodes(at, cell);
         for (int q = 0; q < table.points(); ++q) {
             const SurfacePoint<double> p = curved_point(X, table, q);
+            if (W) sum += table.weight[q] * p.area * std::abs(evaluate(*W, p.x.data()));
             const double H0 = H0_.size() > 0 ? space().gather(H0_, cell).dot(table.value.col(q)) : problem_.bending.H0;
             sum += table.weight[q] * p.area * magnitude(problem_.bending, H0, p.H, p.K);
         }
@@ -315,7 +344,11 @@ bool SurfaceSystem::admissible(const Eigen::VectorXd& u) const {
     if (!u.allFinite()) return false;
     const CurvedMesh at = mesh(u);
     if ((base_.period > 0 && !(at.period > 0)) || !(mesh_quality(at).worst > least_admissible)) return false;
-    return energy_->values(at, problem_.bending, H0_).kinks < most_kinks * scale_;
+    for (const Potential& wall : problem_.bending.potentials)
+        for (const Eigen::Vector3d& x : at.nodes)
+            if (wall.is_wall() && !(wall.distance(std::hypot(x[0], x[1]), x[2]) > 0)) return false;
+    const EnergyValues v = energy_->values(at, problem_.bending, H0_);
+    return std::isfinite(v.energy) && v.kinks < most_kinks * scale_;
 }
 
 bool SurfaceSystem::rebase(Eigen::VectorXd& u, Eigen::VectorXd* along, int triangles) {

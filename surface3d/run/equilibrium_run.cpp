@@ -26,6 +26,14 @@ struct Task {
     BranchSettings branch;
 };
 
+// With edges of twice the shortest range of a wall at most: of order 4 their nodes are half of it apart.
+int triangles_for(const std::vector<Potential>& potentials, double area) {
+    double out = 0;
+    for (const Potential& p : potentials)
+        if (p.is_wall()) out = std::max(out, area / (std::sqrt(3.0) * p.range * p.range));
+    return static_cast<int>(std::min(out, 1e6));
+}
+
 Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
@@ -35,6 +43,7 @@ Task task_of(const Problem& c, const Start& start) {
     SurfaceEquilibriumSettings& s = task.settings;
     s.accuracy = c.accuracy.energy;
     s.descend = c.equilibrium->descend;
+    s.first_triangles = std::max(s.first_triangles, triangles_for(c.energy.potentials, v.area));
     s.near = std::holds_alternative<ResultFrame>(c.shape);
     s.modes = c.equilibrium->rates.value_or(1);
     if (!start.resizable())
@@ -89,6 +98,9 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
         table.add({{"energy_alpha",
                     [](const ShapeRow& r) { return area_difference_energy(r.problem.bending, r.shape.values.M); }},
                    {"M", [](const ShapeRow& r) { return r.shape.values.M; }}});
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_energy", [](const ShapeRow& r) { return r.shape.values.potential; }},
+                   {"potential_force", [](const ShapeRow& r) { return r.shape.values.potential_force; }}});
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
                     const EnergyValues& v = r.shape.values;
@@ -126,7 +138,7 @@ std::vector<double> energy_terms(const Bending& energy, const CurvedMesh& mesh) 
     std::vector<double> out;
     for (std::size_t i = 0; i < count_terms(energy); ++i) {
         Bending one = energy;
-        one.alpha.reset();
+        one.alpha.reset(), one.potentials.clear();
         for (std::size_t j = 0; j < count_terms(energy); ++j)
             if (j != i) modulus(one, j) = 0;
         out.push_back(modulus(one, i) == 0 ? 0 : DiscreteEnergy(mesh, one).values(mesh, one).energy);

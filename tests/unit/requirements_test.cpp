@@ -109,7 +109,7 @@ const std::vector<Refused> refused{
      "a branch that does not vary it"},
     {equilibrium, {H0_of_z}, "variable area alone"},
     {axisym, {"energy.M0=-20"}, "energy.alpha"},
-    {surface_equilibrium, {wall}, "tier = \"axisym\""},
+    {moving, {wall}, "tier = \"axisym\", or with [equilibrium]"},
     {axisym, {wall}, "a closed surface"},
     {equilibrium, {"equilibrium.family=prolate", wall}, "a case without equilibrium.family"},
     {equilibrium, {"model.kind=stokes", wall}, "inertia or friction"},
