@@ -122,7 +122,7 @@ class Adding(unittest.TestCase):
     def result(self, text):
         path = self.folder / "case.toml"
         path.write_text(text)
-        self.tubule("run", path, "-o", self.folder / "result.hdf", "--quiet")
+        self.tubule("run", path, "-o", self.folder / "result.hdf", "--quiet", "--overwrite")
         return self.folder / "result.hdf"
 
     def refusal(self, text):
