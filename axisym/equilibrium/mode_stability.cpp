@@ -389,12 +389,13 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
         }
     }
     const std::vector<Potential>& potentials = problem_.bending.potentials;  // hold it in its place, but along planes
+    const bool free = std::ranges::none_of(potentials, &Potential::acts);
     const bool planes =
         std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
     const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
-        if (!exists || mirror(parity) == (across ? -1 : 1) || !(potentials.empty() || (across && planes))) continue;
+        if (!exists || mirror(parity) == (across ? -1 : 1) || !(free || (across && planes))) continue;
         const Vector motion = projection.solve(forms.rigid[k]);
         if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
         // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.

@@ -18,8 +18,8 @@ std::string key_of_formula(const Bending& energy);
 // The stop of a run that comes too near to where the formula is not defined.
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
-// Of a pressure that is a formula of the volume: how far it is from where it is not defined, the stop of a run that
-// comes too near, and a CaseError where F, theory.md (3.24), has no value initially.
+// Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and a
+// CaseError where F, theory.md (3.24), has no value initially.
 StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time);
 void require_pressure(const Problem& c, double volume);
 

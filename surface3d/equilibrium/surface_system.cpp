@@ -143,11 +143,14 @@ void SurfaceSystem::set_motions() {
     const Middle middle(base_);
     const Eigen::MatrixXd all = motions_of(base_, directions_.normal, middle, scales, scales && any_shape),
                           fields = all * free_motions(base_, problem_.bending, middle);
+    // Compared with the largest motion of all: where a potential leaves turns alone, these may have no normal part.
+    const Eigen::MatrixXd products = all.transpose() * (mass_ * all);
+    const double least = no_motion * no_motion * products.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
+    set_turn(all.leftCols<6>(), middle.centre, middle.size, least);
+    motions_.resize(shape_size(), 0);
+    if (fields.cols() == 0) return;
     const Eigen::MatrixXd image = mass_ * fields;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * image);
-    // Of the largest motion of all: where a potential leaves turns alone, these may have no normal part.
-    const double least = no_motion * no_motion * (all.transpose() * (mass_ * all)).eigenvalues().real().maxCoeff();
-    motions_.resize(shape_size(), 0);
     for (Eigen::Index j = 0; j < fields.cols(); ++j) {
         const double norm2 = gram.eigenvalues()[j];
         if (!(norm2 > least)) continue;
@@ -155,7 +158,6 @@ void SurfaceSystem::set_motions() {
         motions_.col(motions_.cols() - 1).setZero();
         motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.eigenvectors().col(j) / std::sqrt(norm2);
     }
-    set_turn(all.leftCols<6>(), middle.centre, middle.size, least);
 }
 
 // The combinations of rigid motions without a normal part: of a closed surface of revolution there is one.

@@ -28,7 +28,7 @@ Potential particle(double radius, double strength, double range) {
     return {.kind = Kind::sphere, .radius = radius, .strength = strength, .range = range};
 }
 
-// Of the laws: the minimum -strength at the distance `range`, on either side of a wall.
+// Each law has its minimum, -strength, at the distance `range`, on either side of a wall.
 TEST(Potential, hasItsMinimumAtTheRange) {
     for (const Law law : {Law::morse, Law::nine_three})
         for (const Kind kind : {Kind::plane, Kind::sphere})

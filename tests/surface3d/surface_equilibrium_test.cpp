@@ -164,6 +164,10 @@ TEST(SurfaceSpectrum, sphereAboutAParticle) {
     EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 0);
     both.potentials.erase(both.potentials.begin());  // along the plane it moves freely
     EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 2);
+    both.potentials = {{.kind = Potential::Kind::formula,
+                        .formula = std::make_shared<const Formula>(
+                            parse_formula("x^2 + 0.3*y^2 + 0.1*x*z + exp(z)", Potential::in_space))}};
+    EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 0);
 }
 
 // A vesicle on a wall: cases/vesicle_adheres.toml, E of tier axisym to 1e-9.
