@@ -438,8 +438,9 @@ bool CurveForms::admissible(const Eigen::VectorXd& x) const {
 
 FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
     const SplineSpace& splines = space_.splines();
+    const FormulaDomain::Margin of_place = potential_domain(space_, bending_.potentials, x.data());
     DensityDomain domain(bending_);
-    if (!domain.restricted()) return {};
+    if (!domain.restricted()) return of_place;
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
@@ -448,7 +449,8 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
             const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
             for (int i = 0; i < lanes; ++i) domain.look(at_H0[i], p.H[i], p.K[i], splines.basis(e, g).z[i]);
         }
-    return domain.margin();
+    const FormulaDomain::Margin of_density = domain.margin();
+    return of_place.value < of_density.value ? of_place : of_density;
 }
 
 CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {

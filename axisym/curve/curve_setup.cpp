@@ -86,6 +86,20 @@ CurveLaw law_of(const Problem& c) {
     return law;
 }
 
+void require_place(const Problem& c, const Curve& shape) {
+    constexpr int points = 400;
+    const std::vector<Potential>& potentials = c.energy.potentials;
+    if (potentials.empty()) return;
+    double distance = HUGE_VAL;  // to a wall
+    for (int i = 0; i <= points; ++i) {
+        const auto at = shape.at(static_cast<double>(i) / points);  // r, r', z, z'
+        for (const Potential& p : potentials)
+            if (p.is_wall()) distance = std::min(distance, p.distance(at[0], at[2]));
+    }
+    const bool tube = shape.topology == Topology::tube || shape.topology == Topology::half_tube;
+    require_place(c, !tube, bending_energy(shape, c.energy).potential, distance);
+}
+
 InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
@@ -96,6 +110,7 @@ InitialShape initial_shape(const Problem& c) {
         } catch (const std::invalid_argument&) {  // not mirror-symmetric
         }
     }
+    require_place(c, whole);
     const auto [area, volume] = area_and_volume(whole);
     const auto* file = std::get_if<ProfileFile>(&c.shape);
     ShapeEnergy energy = bending_energy(whole, c.energy);

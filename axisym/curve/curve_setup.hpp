@@ -28,6 +28,8 @@ struct InitialShape {
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
 };
 InitialShape initial_shape(const Problem& c);
+// CaseError where the potentials of places of a case do not suit this shape.
+void require_place(const Problem& c, const Curve& shape);
 
 // Taylor slopes of alpha/2 (M - M0)^2 at the initial shape of a tube, with what its Hessian has of rank one.
 DerivativeCheck check_area_differences(const Problem& c);

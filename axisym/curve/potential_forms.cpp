@@ -69,6 +69,24 @@ PotentialObservation observe_potential(const CurveSpace& space, const Formula& W
     return out;
 }
 
+FormulaDomain::Margin potential_domain(const CurveSpace& space, std::span<const Potential> potentials,
+                                       const double* x) {
+    FormulaDomain::Margin out;
+    for (const Potential& p : potentials) {
+        if (p.is_wall()) continue;
+        FormulaDomain domain(*p.formula);
+        if (!domain.restricted()) continue;
+        each_group(space, x, [&](int, const auto& basis, const Local& at) {
+            for (int q = 0; q < lanes; ++q) {
+                const double place[]{at.v[0][0][q], at.v[1][0][q]};
+                domain.look(place, basis.z[q]);
+            }
+        });
+        if (const auto margin = domain.margin(); !(margin.value >= out.value)) out = margin;
+    }
+    return out;
+}
+
 int elements_for(std::span<const Potential> potentials, double length) {
     double out = 0;
     for (const Potential& p : potentials)

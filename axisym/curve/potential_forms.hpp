@@ -23,6 +23,9 @@ struct PotentialObservation {
 PotentialObservation observe_potential(const CurveSpace& space, const Formula& W, std::span<const Potential> potentials,
                                        const double* x);
 
+// How far formulas of the place are from where they are not defined; its place is s.
+FormulaDomain::Margin potential_domain(const CurveSpace& space, std::span<const Potential> potentials, const double* x);
+
 // Elements of a meridian of this length, of which each is half of the shortest range of a wall at most; 0 without
 // one.
 int elements_for(std::span<const Potential> potentials, double length);

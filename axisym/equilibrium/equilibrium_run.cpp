@@ -11,6 +11,7 @@
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/curve/curve_samples.hpp"
+#include "axisym/curve/curve_setup.hpp"
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/equilibrium.hpp"
@@ -84,6 +85,7 @@ Task task_of(const Problem& c) {
     check_varying_H0(c, task.start);
     const auto [area, volume] = area_and_volume(task.start);
     require_pressure(c, volume);
+    require_place(c, task.start);
     task.problem = stationary_problem(c, area, volume);
     const Constraints& held = task.problem.constraints;
     if (e.family) {

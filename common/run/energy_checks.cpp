@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/case/read.hpp"
@@ -27,7 +28,8 @@ std::string as_written(const Problem& c, const std::string& key) {
 std::string key_of_formula(const Bending& energy) {
     for (const EnergyTerm& term : energy.terms)
         if (term.formula) return fmt::format("energy.term.{}.formula", term.entry);
-    return "energy";
+    const bool by_place = std::ranges::any_of(energy.potentials, [](const Potential& p) { return !p.is_wall(); });
+    return by_place ? "energy.potential" : "energy";
 }
 
 CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
@@ -56,7 +58,7 @@ std::string key_of_ill_posed(const Problem& c) {
 
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where) {
     return {Stop::undefined, time, fmt::format("the energy is hardly defined any more at {}: {}", where, words(margin)),
-            "choose a formula that is defined for all curvatures which the membrane may take"};
+            "choose a formula that is defined for all curvatures and places which the membrane may take"};
 }
 
 StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time) {
@@ -73,6 +75,16 @@ void require_pressure(const Problem& c, double volume) {
         fmt::format("must be defined from V = 1, where its energy is 0, to the volume of the initial shape, "
                     "{:.6g}",
                     volume));
+}
+
+void require_place(const Problem& c, bool closed, double energy, double distance) {
+    if (c.energy.potentials.empty()) return;
+    const auto refuse = [&](const std::string& what) { throw complaint(c, "energy.potential", what); };
+    if (!closed) refuse("needs a closed surface, and the initial shape is a tube");
+    if (!(distance > 0))
+        refuse(fmt::format("must have the initial shape in front of each wall, but a point of it is {:.4g} behind one",
+                           -distance));
+    if (!std::isfinite(energy)) refuse("must be finite on the initial shape");
 }
 
 namespace {

@@ -18,10 +18,14 @@ std::string key_of_formula(const Bending& energy);
 // The stop of a run that comes too near to where the formula is not defined.
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
-// Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and a
-// CaseError where F, theory.md (3.24), has no value initially.
+// Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and
+// a CaseError where F, theory.md (3.24), has no value initially.
 StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time);
 void require_pressure(const Problem& c, double volume);
+
+// CaseError where potentials of places do not suit the initial shape: a tube, an energy INT W dS that is not finite, a
+// point behind a wall (`distance` is the least one to a wall).
+void require_place(const Problem& c, bool closed, double energy, double distance);
 
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.

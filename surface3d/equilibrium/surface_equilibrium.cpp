@@ -121,8 +121,9 @@ private:
 
     std::string why_none(const SurfaceSystem& system, const Eigen::VectorXd& u) const {
         if (out_.stop == Stop::mesh_lost)
-            return fmt::format("the mesh of the initial shape has bad triangles (quality {:.2g}) or kinks",
-                               mesh_quality(out_.mesh).worst);
+            return fmt::format(
+                "the mesh of the initial shape has bad triangles (quality {:.2g}) or kinks, or is behind a wall",
+                mesh_quality(out_.mesh).worst);
         const auto [area, volume] = system.area_and_volume(u);
         const std::string missed = missed_constraint(problem_.constraints, first_[0], first_[1], area, volume);
         return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", out_.iterations)

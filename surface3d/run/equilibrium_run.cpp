@@ -7,6 +7,7 @@
 
 #include "common/case/read.hpp"
 #include "common/equilibrium/equilibrium_task.hpp"
+#include "common/run/energy_checks.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/series/table.hpp"
 #include "surface3d/equilibrium/surface_branch.hpp"
@@ -38,6 +39,11 @@ Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
     require_pressure(c, v.volume);
+    double distance = HUGE_VAL;  // to a wall
+    for (const Potential& p : c.energy.potentials)
+        for (const Eigen::Vector3d& x : mesh.nodes)
+            if (p.is_wall()) distance = std::min(distance, p.distance(std::hypot(x[0], x[1]), x[2]));
+    require_place(c, mesh.period == 0, v.potential, distance);
     Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
     SurfaceEquilibriumSettings& s = task.settings;

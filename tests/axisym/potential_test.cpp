@@ -136,8 +136,8 @@ end = 50
 stationary = 1e-8
 )";
 
-Outcome shapes_of(const std::string& text) {
-    const Case c = parse_case(text, {}, "case.toml");
+Outcome shapes_of(const std::string& text, const std::vector<std::string>& sets = {}) {
+    const Case c = parse_case(text, sets, "case.toml");
     Outcome out;
     out.summary = run_equilibrium(c, out.log);
     const auto names = equilibrium_series_names(c);
@@ -184,9 +184,37 @@ TEST(Potential, branchesVaryTheStrength) {
 }
 
 TEST(Potential, wallsAreNotPassed) {
-    const Outcome o = run_case(parse_case(at_wall, {"energy.potential.0.z=-1"}, "case.toml"));
-    EXPECT_EQ(o.summary.stop.reason, Stop::undefined) << o.summary.stop.message;
-    EXPECT_NE(o.summary.stop.message.find("behind the wall"), std::string::npos) << o.summary.stop.message;
+    // A sphere that a pressure inflates into a weak wall; one where a formula of the place ceases to be defined.
+    const std::string inflated =
+        "tier = \"axisym\"\n[energy]\nk20 = 0.1\n[[energy.potential]]\nPOTENTIAL\n[model]\nvolume = \"free\"\n"
+        "pressure = 5\n[shape]\nkind = \"sphere\"\nradius = 1\n[accuracy]\nenergy = 1e-3\n[time]\nend = 10\n";
+    const auto stopped = [&](const std::string& potential) {
+        std::string text = inflated;
+        text.replace(text.find("POTENTIAL"), 9, potential);
+        const Outcome o = run_case(parse_case(text, {}, "case.toml"));
+        EXPECT_EQ(o.summary.stop.reason, Stop::undefined) << o.summary.stop.message;
+        for (const double E : o["energy"]) EXPECT_TRUE(std::isfinite(E));
+        return o.summary.stop.message;
+    };
+    EXPECT_NE(stopped("kind = \"plane\"\nz = -1.2\nstrength = 0.1\nrange = 0.1").find("behind the wall"),
+              std::string::npos);
+    EXPECT_NE(stopped("kind = \"formula\"\nformula = \"0.1*sqrt(z + 1.3)\"").find("hardly defined"), std::string::npos);
+    const auto begins = [&](const std::vector<std::string>& sets, bool still) {
+        std::string text = at_wall;
+        if (still) text = text.substr(0, text.find("[model]")) + text.substr(text.find("[shape]"));
+        if (still) text = text.substr(0, text.find("[time]")) + "[equilibrium]\n";
+        return test::message_of<CaseError>([&] {
+            const Case c = parse_case(text, sets, "case.toml");
+            still ? shapes_of(text, sets) : run_case(c);
+        });
+    };
+    for (const bool still : {false, true}) {
+        EXPECT_NE(begins({"energy.potential.0.z=-1"}, still).find("a point of it is 0.1 behind one"),
+                  std::string::npos);
+        const std::string formula = "energy.potential=[{kind=\"formula\", formula=\"log(z)\"}]";
+        EXPECT_NE(begins({formula}, still).find("energy.potential must be finite on the initial shape"),
+                  std::string::npos);
+    }
     const auto refusal = [&](const std::vector<std::string>& sets) {
         return test::message_of<CaseError>([&] { parse_case(at_wall, sets, "case.toml"); });
     };
