@@ -73,6 +73,8 @@ public:
     // matrix is full.
     void add_hessian(const Weights& weights, const double* x, double* values) const;
     const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    // Places in its values of the local matrix of each element, column by column.
+    const std::vector<int>& slots() const { return slots_; }
     // INT f_H0 dH0/ds (dX.t)/g dS, the power of the force along the curve that a fixed H0 exerts, theory.md (4.15):
     // added to a gradient it leaves the force along the normal. And its derivatives, which are not symmetric.
     void add_sliding(const double* x, double* out) const;

@@ -10,8 +10,9 @@
 namespace tubule::axisym {
 namespace {
 
-constexpr double steepest = 3;      // largest curvature times element length: beyond it the curve is not resolved
-constexpr double coarsest = 0.75;   // longest element at a wall over its range: half of it, of the finer of two runs
+constexpr double steepest = 3;  // largest curvature times element length: beyond it the curve is not resolved
+// Longest element at a wall over its range, or at a bead over its width: half of it, of the finer of two runs.
+constexpr double coarsest = 0.75;
 constexpr double stretched = 1e-3;  // least over largest |X_s|
 
 }  // namespace
@@ -70,6 +71,11 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
             fmt::format("an element near s = {:.4g} is {:.2g} times as long as the range of the wall there",
                         potential.s_coarse, potential.coarse),
             "ask for more accuracy, or set discretisation.elements; a longer range needs fewer"};
+    if (s.coarse_bead > coarsest)
+        return StopReport{
+            Stop::resolution_lost, time,
+            fmt::format("an element near a bead is {:.2g} times as long as model.bead_width", s.coarse_bead),
+            "ask for more accuracy, or set discretisation.elements; wider beads need fewer"};
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
     const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);

@@ -186,11 +186,14 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
     at_.drift = add(law.inextensible && !held, 1);
     at_.mu = add(bending.alpha.has_value(), 1);
+    at_.bead = add(law.beads.has_value(), 4);
+    if (law.beads) beads_.emplace(space, law.beads->width);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
     for (const int number : {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume,
                              at_.drift, at_.mu, at_.shift})
         if (number >= 0) numbers_.push_back(number);
+    for (int i = 0; i < 4 && at_.bead >= 0; ++i) numbers_.push_back(at_.bead + i);
     parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},     {&space.r(), at_.u_r},
               {&space.z(), at_.u_z}, {&space.r(), at_.swirl}, {&pressure_, at_.p}};
     set_pattern();
@@ -267,8 +270,24 @@ Weights CurveMotion::force_weights(double t, const double* y) const {
             .M = at_.mu < 0 ? 0 : y[at_.mu]};
 }
 
-void CurveMotion::set_mu(Eigen::VectorXd& y) const {
+void CurveMotion::set_followers(Eigen::VectorXd& y) const {
     if (at_.mu >= 0) y[at_.mu] = area_difference_force(forms_.bending(), forms_.M(y.data()));
+    if (at_.bead >= 0) y.segment<4>(at_.bead) = beads_->numbers(y.data(), bead_load(0).force);
+}
+
+BeadLoad CurveMotion::bead_load(double t) const {
+    if (!law_.beads->extension) return {.force = law_.force.at(t)};
+    return {.distance = bead_distance0_ + law_.beads->extension->at(t)};
+}
+
+double CurveMotion::length(const double* y) const {
+    return at_.bead < 0 ? space().length(y) : BeadForms::distance(bead_numbers(y));
+}
+
+double CurveMotion::lengthening(const double* y, const double* rate) const {
+    if (at_.bead >= 0)
+        return beads_->distance_slope(y, bead_numbers(y)).dot(Eigen::Map<const Eigen::VectorXd>(rate, space().size()));
+    return law_.free_period ? space().images() * rate[at_.rise] : 0;
 }
 
 // Weights of the velocity that moves the curve in addition to the flow.
@@ -331,6 +350,10 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     add_gradient(drift_weights(y), F);
     if (slides()) forms_.add_sliding(y, F);
     set_numbers(t, y, stdx::reduce(area), stdx::reduce(volume), F);
+    if (at_.bead >= 0) {
+        beads_->add_force(y, bead_numbers(y), law_.inextensible ? F + at_.u_r : F);
+        Eigen::Map<BeadNumbers>(F + at_.bead) = beads_->residual(bead_load(t), y, bead_numbers(y));
+    }
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
     F[at_.stretch] += gradient_at(force_weights(t, y), y).dot(stretched(y)) - law_.force.at(t) * space().length(y);
@@ -375,6 +398,7 @@ void CurveMotion::jacobian(double t, const double* y, const double* rate, double
     add_law(t, y, rate, cj, values);
     add_forms(t, y, values);
     add_numbers(y, values);
+    if (at_.bead >= 0) add_beads(t, y, values);
     if (at_.stretch >= 0) add_stretch(t, y, cj, values);
 }
 
@@ -568,6 +592,23 @@ void CurveMotion::add_numbers(const double* y, double* values) const {
     for (int i = 0; i < all; ++i) values[number_rows_.at(at_.lambda)[i]] += by_curve[i];
 }
 
+// Contributions of beads.
+void CurveMotion::add_beads(double t, const double* y, double* values) const {
+    const int n = space().size(), rows = law_.inextensible ? at_.u_r : 0;
+    std::vector<double> entries(forms_.pattern().nonZeros());
+    beads_->add_hessian(y, bead_numbers(y), forms_.slots(), entries.data());
+    const std::vector<int>& slots = law_.inextensible ? momentum_slots_ : curve_slots_;
+    for (std::size_t i = 0; i < entries.size(); ++i) values[slots[i]] += entries[i];
+    const BeadForms::Slopes s = beads_->slopes(bead_load(t), y, bead_numbers(y));
+    for (int k = 0; k < 4; ++k) {
+        double* column = values + pattern_.outerIndexPtr()[at_.bead + k];
+        const std::vector<int>& row = number_rows_.at(at_.bead + k);
+        for (int i = 0; i < n; ++i) column[rows + i] += s.force_by_numbers(i, k);
+        for (int i = 0; i < n; ++i) values[row[i]] += s.equations_by_curve(k, i);
+        for (int j = 0; j < 4; ++j) values[row[at_.bead + j]] += s.equations_by_numbers(k, j);
+    }
+}
+
 // Contributions of a free period.
 void CurveMotion::add_stretch(double t, const double* y, double cj, double* values) const {
     const int all = space().size(), after_r = all - space().r().size();
@@ -643,6 +684,7 @@ Loads CurveMotion::loads_of(double t, const double* y, double tension, double pu
     Loads out = loads_at(law_, t);
     if (!law_.area_is_free()) out.tension = law_.inextensible ? tension : weights.area;
     out.pressure = -weights.volume;
+    if (at_.bead >= 0) out.force = beads_->force(y, bead_numbers(y));
     const double length = space().length(y);
     if (at_.stretch < 0 && length > 0) {
         const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space().size());
@@ -691,10 +733,11 @@ InitialState CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const 
     for (int step = 0; step < 2; ++step, before = s.y) {
         s.rate.setZero();
         double last = std::numeric_limits<double>::infinity();
+        const double t = (step + 1) * h;
         for (int iteration = 0;; ++iteration) {
-            if (!residual(0, s.y.data(), s.rate.data(), F.data()))
+            if (!residual(t, s.y.data(), s.rate.data(), F.data()))
                 throw SolveError("the profile leaves the half plane r > 0 at the start of the motion");
-            jacobian(0, s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
+            jacobian(t, s.y.data(), s.rate.data(), 1 / h, J.valuePtr());
             const Equilibrated scale(J);
             lu.factor(J);
             const Eigen::VectorXd change =

@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "axisym/curve/bead_forms.hpp"
 #include "axisym/curve/curve_forms.hpp"
 #include "common/model/model.hpp"
 
@@ -39,6 +40,7 @@ struct MotionLayout {
     int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
     int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
     int mu = -1;                 // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
+    int bead = -1;               // first of BeadNumbers
     int shift = -1;              // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
     int size = 0;
 };
@@ -58,8 +60,8 @@ struct InitialState {
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
 // pressure that is given stands for -lambda; where it is a formula of the volume, lambda + P(V) = 0. A free period adds
-// (L_t/L) z e_z to u, and the test function z e_z. Many fields: besides the problem, the places of all its terms in the
-// matrix, found once.
+// (L_t/L) z e_z to u, and the test function z e_z. Beads add SUM q dG[v] (BeadForms). Many fields: besides the problem,
+// the places of all its terms in the matrix, found once.
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
@@ -74,10 +76,17 @@ public:
     const MotionLayout& layout() const { return at_; }
     // Before anything else where H0 varies: see CurveForms. The parametrisation must be material.
     void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
+    // Likewise where the distance of beads is held: that of the curve x and their extension.
+    void hold_beads(const Eigen::VectorXd& x) { bead_distance0_ = beads_->distance(x.data()); }
     const SplineSpace& pressures() const { return pressure_; }
+    // What the axial force works along, theory.md (3.16): the period of a tube, or the distance of beads.
+    double length(const double* y) const;
+    double bead_coarseness(const double* y) const { return beads_ ? beads_->coarseness(y) : 0; }
+    // Its rate of change where the curve has these rates.
+    double lengthening(const double* y, const double* rate) const;
 
-    // Sets the unknown mu of the curve of y, if there is one.
-    void set_mu(Eigen::VectorXd& y) const;
+    // Sets the unknowns that follow from the curve of y alone: mu, and where beads are.
+    void set_followers(Eigen::VectorXd& y) const;
     // The residual F of the system. False where r <= 0 at a quadrature point: try a smaller step.
     bool residual(double t, const double* y, const double* rate, double* F) const;
     // dF/dy + cj dF/drate, into the values of a matrix with pattern().
@@ -94,7 +103,7 @@ public:
         double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
         double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
         double divergence = 0;    // sqrt(INT (div u - supply)^2 dS), of which only the part in the pressures is zero
-        Loads loads;              // given or measured; no force where there is no period
+        Loads loads;              // given or measured; no force where there is neither a period nor beads
     };
     Balance balance(double t, const double* y, const double* rate) const;
 
@@ -113,6 +122,9 @@ private:
     void add_forms(double t, const double* y, double* values) const;
     void set_numbers(double t, const double* y, double area, double volume, double* F) const;
     void add_numbers(const double* y, double* values) const;
+    BeadLoad bead_load(double t) const;
+    BeadNumbers bead_numbers(const double* y) const { return Eigen::Map<const BeadNumbers>(y + at_.bead); }
+    void add_beads(double t, const double* y, double* values) const;
     void add_stretch(double t, const double* y, double cj, double* values) const;
     PointNumbers point_numbers(double t, const double* y) const;
     Eigen::VectorXd velocity(const double* y) const;
@@ -137,7 +149,8 @@ private:
 
     CurveForms forms_;
     CurveLaw law_;
-    double gauge_, area0_, volume0_;
+    std::optional<BeadForms> beads_;
+    double gauge_, area0_, volume0_, bead_distance0_ = 0;
     SplineSpace pressure_;
     MotionLayout at_;
     std::vector<Part> parts_;  // in the order of the pointwise fields; absent ones have offset -1

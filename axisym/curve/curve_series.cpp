@@ -60,10 +60,12 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
                    {"lambda", lambda}});
     table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
                {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
-    if (may_have_period(c.shape)) table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
+    if (may_have_period(c.shape) || law.beads)
+        table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
     if (!c.energy.potentials.empty())
         table.add({{"potential_force", [](const CurveRow& r) { return r.now.o.potential.force; }}});
-    if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.period; }}});
+    if (law.beads) table.add({{"bead_distance", [](const CurveRow& r) { return r.now.length; }}});
+    if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.length; }}});
     table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
                {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},
                {"wall_seconds", [](const CurveRow& r) { return r.wall_seconds; }}});

@@ -21,6 +21,8 @@ namespace {
 // are not smaller than `least_seam`, or rounding there prevents the integrator from starting; its first step smooths
 // the seam over far more than that.
 constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 3e-4;
+// In runs of more elements those at beads are shorter in proportion.
+constexpr double bead_elements = 8;
 constexpr double most_risen = 0.1;     // of E_ref: the energy of a first step that cannot be believed
 constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
@@ -55,8 +57,13 @@ std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& sett
     const double shrunk = std::pow(first_curve_elements * size, 2),
                  largest = seam_size * (inertia ? size : shrunk / first_curve_elements);
     const double at_seam = std::max(std::min(largest, seam_per_accuracy * c.accuracy.energy * shrunk), least);
-    if (!seams.empty()) return graded_breaks(seams, size, at_seam);
-    return settings.density.empty() ? equal_breaks(settings.elements) : breaks_of(settings.density, settings.elements);
+    const std::vector<double> breaks = !seams.empty()             ? graded_breaks(seams, size, at_seam)
+                                       : settings.density.empty() ? equal_breaks(settings.elements)
+                                                                  : breaks_of(settings.density, settings.elements);
+    if (!c.law.beads) return breaks;
+    const Beads& beads = *c.law.beads;
+    const double lengthens = beads.extension ? beads.extension->largest() : 0;
+    return refined_at_beads(breaks, beads.width * std::min(1.0, bead_elements * size), arc.total() + lengthens);
 }
 
 std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, const std::vector<double>& breaks) {
@@ -100,11 +107,27 @@ void require_place(const Problem& c, const Curve& shape) {
     require_place(c, !tube, bending_energy(shape, c.energy).potential, distance);
 }
 
+double bead_distance(const Problem& c, const Curve& shape) {
+    constexpr int elements = 100;  // the distance to rounding
+    if (shape.topology != Topology::cell)
+        throw complaint(c, "model.bead_width", "needs a closed shape with two poles: its beads pull at them");
+    const ArcLength arc(shape);
+    const CurveSpace space(Topology::cell,
+                           refined_at_beads(equal_breaks(elements), c.law.beads->width / 2, arc.total()), 5, 4);
+    const double distance = BeadForms(space, c.law.beads->width).distance(fit(space, arc).data());
+    if (!(distance > 2 * c.law.beads->width))
+        throw complaint(c, "model.bead_width",
+                        fmt::format("is too large for this shape: beads of {:.4g} need a distance that is larger than "
+                                    "2 widths",
+                                    c.law.beads->width));
+    return distance;
+}
+
 InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
     if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() && c.energy.potentials.empty() &&
-        (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
+        !c.law.beads && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
         } catch (const std::invalid_argument&) {  // not mirror-symmetric
@@ -112,11 +135,13 @@ InitialShape initial_shape(const Problem& c) {
     }
     require_place(c, whole);
     const auto [area, volume] = area_and_volume(whole);
+    const double length = c.law.beads ? bead_distance(c, whole) : whole.length;
     const auto* file = std::get_if<ProfileFile>(&c.shape);
     ShapeEnergy energy = bending_energy(whole, c.energy);
     return {std::move(whole),
             area,
             volume,
+            length,
             std::move(energy),
             std::move(velocity),
             file ? start_profile(c, *file).note() : ""};
@@ -138,7 +163,7 @@ DerivativeCheck check_area_differences(const Problem& c) {
 }
 
 double InitialShape::free_energy(const MotionLaw& law) const {
-    return bending.energy + loads_at(law, 0).energy(area, volume, meridian.length);
+    return bending.energy + loads_at(law, 0).energy(area, volume, length);
 }
 
 CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveSettings& with)
@@ -155,7 +180,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     law.swirls = law.swirls || (start.velocity && start.velocity->velocity->swirls);
     const double energy = start.free_energy(law);
     magnitude = std::max(std::abs(energy), std::max(std::abs(start.bending.energy), start.bending.magnitude) +
-                                               load_scale(law, start.area, start.volume, start.meridian.length));
+                                               load_scale(law, start.area, start.volume, start.length));
     reference_energy = tubule::reference_energy(c, energy, magnitude);
     const double variation = variation_of_H(*space, x);
     law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
@@ -165,6 +190,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
     if (c.energy.H0_varies()) motion->fix_H0(x);
+    if (law.beads) motion->hold_beads(x);
 }
 
 Snapshot CurveSetup::with_exact_shape(Snapshot s) const {
@@ -215,7 +241,7 @@ InitialState state_without_velocity(const CurveSetup& setup) {
     InitialState out;
     out.y = out.rate = Eigen::VectorXd::Zero(setup.motion->layout().size);
     out.y.head(setup.space->size()) = fit(*setup.space, ArcLength(setup.start.meridian));
-    setup.motion->set_mu(out.y);
+    setup.motion->set_followers(out.y);
     out.shown = out.y;
     return out;
 }
@@ -260,7 +286,7 @@ InitialState initial_state(const CurveSetup& setup) {
     const MotionLayout& at = setup.motion->layout();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(at.size);
     y.head(space.size()) = fit(space, ArcLength(setup.start.meridian));
-    setup.motion->set_mu(y);
+    setup.motion->set_followers(y);
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that

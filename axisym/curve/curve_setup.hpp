@@ -20,7 +20,7 @@ CurveLaw law_of(const Problem& c);
 // The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct InitialShape {
     Curve meridian;
-    double area = 0, volume = 0;
+    double area = 0, volume = 0, length = 0;  // L of theory.md (3.16)
     ShapeEnergy bending;
     std::optional<PerturbedCurve> velocity = {};  // the curve of a frame with its velocity
     std::string note = {};                        // for the user
@@ -28,6 +28,8 @@ struct InitialShape {
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
 };
 InitialShape initial_shape(const Problem& c);
+// The distance of the beads of a case on this shape. CaseError where they do not suit it.
+double bead_distance(const Problem& c, const Curve& shape);
 // CaseError where the potentials of places of a case do not suit this shape.
 void require_place(const Problem& c, const Curve& shape);
 

@@ -118,9 +118,9 @@ void CurveSimulation::begin() {
     // In the time of the steps that lead from the curve to the first unknowns, changing loads and a reservoir do work
     // at this shape; the rest of the difference dissipates.
     const auto at_loads = [&](double t) {
-        return loads_at(setup_.motion->law(), t).energy(now_.o.area, now_.o.volume, now_.period);
+        return loads_at(setup_.motion->law(), t).energy(now_.o.area, now_.o.volume, now_.length);
     };
-    past_.work = at_loads(at.time) - at_loads(0) + at.time * now_.balance.supplied;
+    past_.work = at_loads(at.time) - at_loads(0) + at.time * power_supplied(now_);
     past_.dissipated = past_.total_start + past_.work - now_.total();
     look_at_mesh();
 }
@@ -179,10 +179,12 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     system.dissipation = [this](double t, const double* at, const double* v) {
         return observe(t, at, v).balance.dissipation;
     };
-    past_.rates = load_rates(setup_.motion->law(), time);
+    const MotionLaw& law = setup_.motion->law();
+    past_.rates = load_rates(law, time);
+    past_.extends = law.beads ? law.beads->rate(time) : 0;
     system.work = [this](double t, const double* at, const double* v) {
         const Snapshot& s = observe(t, at, v);
-        return past_.rates.energy(s.o.area, s.o.volume, s.period) + s.balance.supplied;
+        return past_.rates.energy(s.o.area, s.o.volume, s.length) + power_supplied(s);
     };
     system.guards = [this](double t, const double* at, const double* v) {
         const Snapshot& s = observe(t, at, v);
@@ -195,6 +197,11 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     integrator_ = std::make_unique<IdaIntegrator>(std::move(system), y, rate, time, setup_.control(first_step));
     observe(time, integrator_->x(), integrator_->v());
     keep_good();
+}
+
+// By a reservoir, and by what holds the distance of beads.
+double CurveSimulation::power_supplied(const Snapshot& s) const {
+    return s.balance.supplied + s.balance.loads.force * past_.extends;
 }
 
 // From the last good state, with its loads.
@@ -221,10 +228,10 @@ void CurveSimulation::add_to_trace(double t) {
                                                      .M = area_difference_force(forms.bending(), now_.o.M)},
                                                     setup_.curve(integrator_->x())),
                           moves = setup_.curve(integrator_->v());
-    const double lengthens = law.free_period ? setup_.space->images() * moves[setup_.motion->layout().rise] : 0;
+    const double lengthens = setup_.motion->lengthening(integrator_->x(), integrator_->v());
     trace.add(
         t, now_.free_energy,
-        gradient.dot(moves) - loads.force * lengthens + past_.rates.energy(now_.o.area, now_.o.volume, now_.period));
+        gradient.dot(moves) - loads.force * lengthens + past_.rates.energy(now_.o.area, now_.o.volume, now_.length));
 }
 
 void CurveSimulation::look_at_mesh() {

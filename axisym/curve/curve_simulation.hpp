@@ -56,6 +56,7 @@ private:
         double least = 0;                                  // over all steps, of what never rises: total less work
         IntegratorCounters counters;
         Loads rates;              // of change, of the loads of this flow
+        double extends = 0;       // rate of the distance of beads that is held
         Eigen::VectorXd y, rate;  // of the last good step
         double time = 0;
     };
@@ -70,6 +71,7 @@ private:
     void compare(double t, const Snapshot& s);
     double share(double t) const;
     double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }
+    double power_supplied(const Snapshot& s) const;
     void keep_good();
     void add_to_trace(double t);
 

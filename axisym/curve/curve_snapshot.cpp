@@ -53,8 +53,9 @@ Snapshot measure(const CurveMotion& motion, double t, const double* y, const dou
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space.size());
     Snapshot out{motion.forms().observe(x), motion.balance(t, y, rate), narrowest(space, y)};
     out.o.r_max = measures(space, x).r_max;
-    out.period = space.length(y);
-    out.free_energy = out.o.energy + loads_at(motion.law(), t).energy(out.o.area, out.o.volume, out.period);
+    out.length = motion.length(y);
+    out.coarse_bead = motion.bead_coarseness(y);
+    out.free_energy = out.o.energy + loads_at(motion.law(), t).energy(out.o.area, out.o.volume, out.length);
     out.pressure_domain = pressure_domain(motion.law(), out.o.volume);
     return out;
 }

@@ -11,9 +11,10 @@ namespace tubule::axisym {
 struct Snapshot {
     CurveObservation o;
     CurveMotion::Balance balance;
-    Neck neck;                              // the narrowest; of infinite radius where there is none
-    double free_energy = 0;                 // F, theory.md (3.16)
-    double period = 0;                      // of a tube
+    Neck neck;                                // the narrowest; of infinite radius where there is none
+    double free_energy = 0;                   // F, theory.md (3.16)
+    double length = 0;                        // L of that: the period of a tube, or the distance of beads
+    double coarse_bead = 0;                   // longest element near a bead over the width of its weight
     FormulaDomain::Margin pressure_domain{};  // of the formula of the pressure
 
     double total() const { return free_energy + balance.kinetic; }

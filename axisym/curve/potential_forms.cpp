@@ -31,10 +31,10 @@ struct Local {
 
 // W dS/ds of a whole turn in (r, r', z, z').
 template <int Order>
-Jet<Pack, 4, Order> density(const Formula& W, const Local& at) {
+Jet<Pack, 4, Order> density(const Formula& W, const Local& at, double p) {
     using J = Jet<Pack, 4, Order>;
     const J r = J::variable(at.v[0][0], 0), r1 = J::variable(at.v[0][1], 1), z = J::variable(at.v[1][0], 2),
-            z1 = J::variable(at.v[1][1], 3), place[]{r, z}, square = r1 * r1 + z1 * z1;
+            z1 = J::variable(at.v[1][1], 3), place[]{r, z, J(p)}, square = r1 * r1 + z1 * z1;
     return (2 * pi) * (evaluate(W, place) * r * square * inverse_sqrt(square));
 }
 
@@ -47,7 +47,7 @@ void each_group(const CurveSpace& space, const double* x, const Visit& visit) {
 }  // namespace
 
 PotentialObservation observe_potential(const CurveSpace& space, const Formula& W, std::span<const Potential> potentials,
-                                       const double* x) {
+                                       const double* x, double p_at) {
     constexpr double near = 4;  // ranges: farther away a wall hardly acts
     PotentialObservation out;
     const std::vector<double>& breaks = space.splines().breaks();
@@ -55,7 +55,7 @@ PotentialObservation observe_potential(const CurveSpace& space, const Formula& W
         for (int q = 0; q < lanes; ++q) {
             using J = Jet<double, 2, 1>;
             const double r = at.v[0][0][q], z = at.v[1][0][q], speed = std::hypot(at.v[0][1][q], at.v[1][1][q]);
-            const J place[]{J::variable(r, 0), J::variable(z, 1)}, value = evaluate(W, place);
+            const J place[]{J::variable(r, 0), J::variable(z, 1), J(p_at)}, value = evaluate(W, place);
             const double dS = space.images() * basis.weight[q] * 2 * pi * r * speed;
             out.energy += value.v * dS, out.magnitude += std::abs(value.v) * dS, out.force -= value.d[1] * dS;
             for (const Potential& p : potentials) {
@@ -94,9 +94,10 @@ int elements_for(std::span<const Potential> potentials, double length) {
     return static_cast<int>(std::min(out, 1e6));
 }
 
-void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out) {
+void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out,
+                            double p) {
     each_group(space, x, [&](int e, const auto& basis, const Local& at) {
-        const Jet<Pack, 4, 1> f = density<1>(W, at);
+        const Jet<Pack, 4, 1> f = density<1>(W, at, p);
         const Pack factor = weight * space.images() * load(basis.weight);
         for (int field = 0; field < 2; ++field) {
             const SplineSpace& of = field == 0 ? space.r() : space.z();
@@ -110,10 +111,10 @@ void add_potential_gradient(const CurveSpace& space, const Formula& W, double we
 }
 
 void add_potential_hessian(const CurveSpace& space, const Formula& W, double weight, const double* x,
-                           const std::vector<int>& slots, double* values) {
+                           const std::vector<int>& slots, double* values, double p) {
     const int w = space.splines().width();
     each_group(space, x, [&](int e, const auto& basis, const Local& at) {
-        const Jet<Pack, 4, 2> f = density<2>(W, at);
+        const Jet<Pack, 4, 2> f = density<2>(W, at, p);
         const Pack factor = weight * space.images() * load(basis.weight);
         const int* slot = &slots[static_cast<std::size_t>(e) * 4 * w * w];
         const auto of = [&](int i) -> const SplineSpace& { return i < w ? space.r() : space.z(); };

@@ -1,5 +1,5 @@
 // Potentials of places on a profile curve: INT W(r, z) dS and its derivatives in the coefficients of the curve, to be
-// added to those of CurveForms. Not for periods that are free.
+// added to those of CurveForms. W may have a third variable, a number p. Not for periods that are free.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@ struct PotentialObservation {
     double coarse = 0, s_coarse = 0;
 };
 PotentialObservation observe_potential(const CurveSpace& space, const Formula& W, std::span<const Potential> potentials,
-                                       const double* x);
+                                       const double* x, double p = 0);
 
 // How far formulas of the place are from where they are not defined; its place is s.
 FormulaDomain::Margin potential_domain(const CurveSpace& space, std::span<const Potential> potentials, const double* x);
@@ -31,10 +31,11 @@ FormulaDomain::Margin potential_domain(const CurveSpace& space, std::span<const 
 int elements_for(std::span<const Potential> potentials, double length);
 
 // The gradient, added to space.size() numbers.
-void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out);
+void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out,
+                            double p = 0);
 // The Hessian, added to the values of a matrix; `slots` are the places of each element's local matrix, as in
 // CurveForms.
 void add_potential_hessian(const CurveSpace& space, const Formula& W, double weight, const double* x,
-                           const std::vector<int>& slots, double* values);
+                           const std::vector<int>& slots, double* values, double p = 0);
 
 }  // namespace tubule::axisym

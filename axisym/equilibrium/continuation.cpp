@@ -51,9 +51,10 @@ public:
         Equilibrium e;
         e.space = system_->space_handle(), e.x = curve(place.w), e.gauge = system_->gauge();
         e.sigma = place.w[n], e.lambda = place.w[n + 1], e.mu = place.w[system_->mu()];
+        if (problem.beads) e.beads = place.w.segment<4>(system_->beads());
         std::vector<double> defect;
         e.observed = system_->forms().observe(e.x, &defect);
-        e.length = e.space->length(e.x.data());
+        e.length = system_->length(place.u());
         e.reference_energy = system_->forms().reference_energy(e.x);
         e.estimated_error = lost(defect) / e.reference_energy;
         e.stop = Stop::finished;
@@ -81,7 +82,7 @@ public:
         const int n = system_->space().size(), m = finer->size();
         const Eigen::VectorXd y = finer->prolong(system_->space(), x);
         const Eigen::VectorXd ahead = finer->prolong(system_->space(), x + place.tangent.head(n));
-        constexpr int others = StationarySystem::numbers + 1;
+        const int others = system_->numbers() + 1;
         Place moved{Eigen::VectorXd(m + others), Eigen::VectorXd(m + others)};
         moved.w << y, place.w.tail(others);
         moved.tangent << ahead - y, place.tangent.tail(others);
@@ -122,7 +123,7 @@ Branch follow_branch(const StationaryProblem& problem, const Equilibrium& start,
                      const BranchSettings& settings) {
     check_branch(start.stop, settings.from, settings.to);
     CurveTier tier(problem, start, settings.shapes);
-    return Follower(tier, problem, unknowns(start), set, settings).run();
+    return Follower(tier, problem, unknowns(problem, start), set, settings).run();
 }
 
 }  // namespace tubule::axisym

@@ -29,6 +29,7 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
                                    double gauge)
     : space_(std::move(space)), forms_(*space_, problem.bending), gauge_(gauge) {
     set_problem(problem);
+    if (problem.beads) bead_forms_.emplace(*space_, problem.beads->width);
     place_ = Eigen::VectorXd::Zero(space_->size());
     if (space_->topology() == Topology::cell) place_.tail(space_->z().size()) = space_->z().mean();
 }
@@ -39,6 +40,23 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
     check_problem(problem, space_->closed() ? 0 : space_->length());
     problem_ = problem;
     forms_.set_bending(problem.bending);
+}
+
+void StationarySystem::set_followers(Eigen::VectorXd& u) const {
+    u[mu()] = area_difference_force(problem_.bending, forms_.M(u.data()));
+    if (!bead_forms_) return;
+    const double force =
+        problem_.held_distance() ? bead_forms_->force(u.data(), bead_numbers(u)) : problem_.loads.force;
+    u.segment<4>(beads()) = bead_forms_->numbers(u.data(), force);
+}
+
+void StationarySystem::follow(const Eigen::VectorXd& change, Eigen::VectorXd& out) const {
+    out[mu()] = change[mu()];
+    if (bead_forms_) out.segment<4>(beads()) = change.segment<4>(beads());
+}
+
+double StationarySystem::length(const Eigen::VectorXd& u) const {
+    return bead_forms_ ? BeadForms::distance(bead_numbers(u)) : space_->length(u.data());
 }
 
 Weights StationarySystem::weights(const Eigen::VectorXd& u) const {
@@ -55,6 +73,7 @@ void StationarySystem::set_constraints(const CurveObservation& o, const Eigen::V
     F.segment<2>(n) = equations(o, u).F;
     F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
     F[n + 3] = drifts() ? place_.dot(u.head(n)) : u[n + 3];
+    if (bead_forms_) F.segment<4>(beads()) = bead_forms_->residual(bead_load(), u.data(), bead_numbers(u));
 }
 
 Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) const {
@@ -65,12 +84,14 @@ Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) 
 
 double StationarySystem::constraint_error(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
-    return tubule::constraint_error(problem_.constraints, equations(o, u), std::sqrt(o.area));
+    const double size = std::sqrt(o.area), held = tubule::constraint_error(problem_.constraints, equations(o, u), size);
+    const std::optional<double> distance = problem_.held_distance();
+    return distance ? std::max(held, std::abs(length(u) - *distance) / size) : held;
 }
 
-std::array<double, 2> StationarySystem::area_and_volume(const Eigen::VectorXd& u) const {
+Extents StationarySystem::extents(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
-    return {o.area, o.volume};
+    return {o.area, o.volume, length(u)};
 }
 
 double StationarySystem::size(const Eigen::VectorXd& u) const {
@@ -83,42 +104,57 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
     Eigen::VectorXd F = Eigen::VectorXd::Zero(unknowns());
     F.head(n) = u[n + 3] * place_;
     forms_.add_gradient(weights(u), x.data(), F.data());
+    if (bead_forms_) bead_forms_->add_force(x.data(), bead_numbers(u), F.data());
     if (problem_.free_period) F[n - 1] -= problem_.loads.force * space_->images();
     set_constraints(forms_.observe(x), u, F);
     return F;
 }
 
-Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u, double damping) const {
-    const int n = space_->size();
+Eigen::SparseMatrix<double> StationarySystem::hessian(const Eigen::VectorXd& u) const {
     const Eigen::VectorXd x = curve(u);
-    Eigen::SparseMatrix<double> hessian = forms_.hessian(weights(u), x);
+    Eigen::SparseMatrix<double> out = forms_.hessian(weights(u), x);
+    if (!bead_forms_) return out;
+    Eigen::SparseMatrix<double> of_beads = forms_.pattern();
+    bead_forms_->add_hessian(x.data(), bead_numbers(u), forms_.slots(), of_beads.valuePtr());
+    return out + of_beads;
+}
+
+Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u, double damping) const {
+    const int n = space_->size(), more = numbers();
+    const Eigen::VectorXd x = curve(u);
+    Eigen::SparseMatrix<double> hessian = this->hessian(u);
     if (damping != 0) hessian += damping * forms_.mass(x);
-    const Eigen::VectorXd columns[]{forms_.gradient({.area = 1}, x), forms_.gradient({.volume = 1}, x), slope_of_M(x),
-                                    place_};
-    const auto& [area, volume, M, place] = columns;
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(numbers, n), corner = Eigen::MatrixXd::Zero(numbers, numbers);
+    Eigen::MatrixXd columns(n, more), rows = Eigen::MatrixXd::Zero(more, n), corner = Eigen::MatrixXd::Zero(more, more);
+    const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x),
+                          M = slope_of_M(x);
+    columns.leftCols<4>() << area, volume, M, place_;
     const MultiplierEquations e = equations(forms_.observe(x), u);
     for (int i = 0; i < 2; ++i) rows.row(i) = e.by_extent(i, 0) * area + e.by_extent(i, 1) * volume;
     corner.topLeftCorner<2, 2>() = e.by_multipliers;
     rows.row(2) = -problem_.bending.alpha.value_or(0) * M, corner(2, 2) = 1;
     if (drifts())
-        rows.row(3) = place;
+        rows.row(3) = place_;
     else
         corner(3, 3) = 1;
+    if (bead_forms_) {
+        const BeadForms::Slopes s = bead_forms_->slopes(bead_load(), x.data(), bead_numbers(u));
+        columns.rightCols<4>() = s.force_by_numbers, rows.bottomRows<4>() = s.equations_by_curve;
+        corner.bottomRightCorner<4, 4>() = s.equations_by_numbers;
+    }
 
     // Columns in order, each with the rows of the Hessian and then all others, zeros included.
     Eigen::SparseMatrix<double> J(unknowns(), unknowns());
-    J.reserve(hessian.nonZeros() + 2 * numbers * n + numbers * numbers);
+    J.reserve(hessian.nonZeros() + 2 * more * n + more * more);
     for (int j = 0; j < n; ++j) {
         J.startVec(j);
         for (Eigen::SparseMatrix<double>::InnerIterator it(hessian, j); it; ++it)
             J.insertBack(it.row(), j) = it.value();
-        for (int i = 0; i < numbers; ++i) J.insertBack(n + i, j) = rows(i, j);
+        for (int i = 0; i < more; ++i) J.insertBack(n + i, j) = rows(i, j);
     }
-    for (int j = 0; j < numbers; ++j) {
+    for (int j = 0; j < more; ++j) {
         J.startVec(n + j);
-        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = columns[j][i];
-        for (int i = 0; i < numbers; ++i) J.insertBack(n + i, n + j) = corner(i, j);
+        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = columns(i, j);
+        for (int i = 0; i < more; ++i) J.insertBack(n + i, n + j) = corner(i, j);
     }
     J.finalize();
     return J;
@@ -131,7 +167,14 @@ Eigen::VectorXd StationarySystem::slope_of_M(const Eigen::VectorXd& x) const {
 
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
-    return lagrangian(problem_, o.energy, o.area, o.volume, length(u), u[sigma()], u[lambda()]) + gauge_ * o.gauge;
+    double value =
+        lagrangian(problem_, o.energy, o.area, o.volume, length(u), u[sigma()], u[lambda()]) + gauge_ * o.gauge;
+    if (!bead_forms_) return value;
+    const BeadNumbers at = bead_numbers(u), F = bead_forms_->residual({}, u.data(), at);
+    value += at[1] * F[0] + at[3] * F[2];
+    if (const auto held = problem_.held_distance())
+        value -= bead_forms_->force(u.data(), at) * (BeadForms::distance(at) - *held);
+    return value;
 }
 
 Eigen::VectorXd StationarySystem::way_down(const Eigen::VectorXd& u) const {
@@ -145,7 +188,7 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
     const int n = space_->size();
     const Constraints& c = problem_.constraints;
     const Eigen::VectorXd x = u.head(n);
-    Eigen::MatrixXd hessian = forms_.hessian(weights(u), x);
+    Eigen::MatrixXd hessian = this->hessian(u);
     const Eigen::VectorXd area = forms_.gradient({.area = 1}, x), volume = forms_.gradient({.volume = 1}, x),
                           M = slope_of_M(x);
     hessian += problem_.bending.alpha.value_or(0) * M * M.transpose() -
@@ -163,6 +206,8 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
         hessian += u[lambda()] * slopes.by_area_twice * area * area.transpose();
     }
     if (drifts()) fix(place_);
+    if (bead_forms_) hessian += bead_forms_->following_hessian(x.data(), bead_numbers(u));
+    if (problem_.held_distance()) fix(bead_forms_->distance_slope(x.data(), bead_numbers(u)));
     const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints > 0 ? fixed : Eigen::MatrixXd::Zero(n, 1));
     if (constraints > 0) {
@@ -186,6 +231,11 @@ constexpr int coarsest = 8;  // elements of a whole cell or period
 std::shared_ptr<const CurveSpace> space_like(const CurveSpace& other, std::vector<double> breaks, int degree) {
     return std::make_shared<CurveSpace>(other.topology(), std::move(breaks), degree, degree - 1, other.length(),
                                         other.free_period());
+}
+
+// These breaks, or more where beads need them, of a curve of this length.
+std::vector<double> breaks_for(const StationaryProblem& problem, std::vector<double> breaks, double length) {
+    return problem.beads ? refined_at_beads(breaks, problem.beads->width, length) : breaks;
 }
 
 // Scales a closed curve to the required area (or volume, if that alone is held).
@@ -264,10 +314,10 @@ double free_energy(const StationaryProblem& problem, const CurveObservation& o, 
 }
 
 // E_ref, theory.md (11.1).
-double reference_energy_of(const StationaryProblem& problem, const CurveForms& forms, const Eigen::VectorXd& x) {
+double reference_energy_of(const StationaryProblem& problem, const CurveForms& forms, const Eigen::VectorXd& x,
+                           double length) {
     const CurveObservation o = forms.observe(x);
     const Loads& loads = problem.loads;
-    const double length = forms.space().length(x.data());
     return std::max(std::abs(free_energy(problem, o, length)),
                     forms.reference_energy(x) + loads.scale(o.area, o.volume, length));
 }
@@ -365,7 +415,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
         if (round == 0) first = last = out.observed = system.forms().observe(out.x);
-        out.reference_energy = reference_energy_of(problem, system.forms(), out.x);
+        out.length = system.length(u);
+        out.reference_energy = reference_energy_of(problem, system.forms(), out.x, out.length);
         if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first.area, first.volume, 1e-6)) {
             out.estimated_error = 1;
             return end(
@@ -380,7 +431,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         std::vector<double> defect;
         out.x = x, out.sigma = u[system.sigma()], out.lambda = u[system.lambda()], out.mu = u[system.mu()];
         out.observed = system.forms().observe(x, &defect);
-        out.length = space->length(x.data());
+        out.length = system.length(u);
+        if (problem.beads) out.beads = u.segment<4>(system.beads());
         if (!found) compare.restart();
         const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, settings.degree)
                                    : std::numeric_limits<double>::infinity();
@@ -389,11 +441,14 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
         if (auto ended = verdict(problem, system, u, found, settings, out))
             return end(ended->first, std::move(ended->second));
-        const auto finer = space_like(
-            *space, next_breaks(*space, defect, settings.accuracy * out.reference_energy, settings.max_elements, found),
-            settings.degree);
-        Eigen::VectorXd next(finer->size() + system.numbers);
-        next << finer->prolong(*space, x), u.tail(system.numbers);
+        const auto finer = space_like(*space,
+                                      breaks_for(problem,
+                                                 next_breaks(*space, defect, settings.accuracy * out.reference_energy,
+                                                             settings.max_elements, found),
+                                                 out.observed.length),
+                                      settings.degree);
+        Eigen::VectorXd next(finer->size() + system.numbers());
+        next << finer->prolong(*space, x), u.tail(system.numbers());
         space = finer, u = next;
     }
     return end(Stop::solver_failed, why_none(problem.constraints, first, last, out.iterations));
@@ -401,14 +456,17 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
 
 }  // namespace
 
-Eigen::VectorXd unknowns(const Equilibrium& shape) {
-    Eigen::VectorXd u(shape.x.size() + StationarySystem::numbers);
-    u << shape.x, shape.sigma, shape.lambda, shape.mu, 0;
+Eigen::VectorXd unknowns(const StationaryProblem& problem, const Equilibrium& shape) {
+    Eigen::VectorXd u(shape.x.size() + StationarySystem::numbers(problem));
+    u.head(shape.x.size()) = shape.x;
+    u.segment<4>(shape.x.size()) << shape.sigma, shape.lambda, shape.mu, 0;
+    if (problem.beads) u.tail<4>() = shape.beads;
     return u;
 }
 
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
     if (problem.free_period || shape.length == 0) return problem.loads.force;
+    if (problem.beads) return BeadForms(*shape.space, problem.beads->width).force(shape.x.data(), shape.beads);
     const CurveForms forms(*shape.space, problem.bending);
     return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda, .M = shape.mu}, shape.x) /
            shape.length;
@@ -427,17 +485,19 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
     if (start.topology == Topology::tube)
         throw std::invalid_argument(
             "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
-    const int images = start.topology == Topology::cell ? 1 : 2;
+    const int images = start.topology == Topology::cell ? 1 : 2, elements = std::max(settings.elements, coarsest);
+    const ArcLength arc(start);
     const auto space =
-        std::make_shared<CurveSpace>(start.topology, equal_breaks(std::max(settings.elements, coarsest) / images),
+        std::make_shared<CurveSpace>(start.topology, breaks_for(problem, equal_breaks(elements / images), arc.total()),
                                      settings.degree, settings.degree - 1, start.length, problem.free_period);
     const CurveForms forms(*space, problem.bending);
-    Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + StationarySystem::numbers), x = fit(*space, start);
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + StationarySystem::numbers(problem)), x = fit(*space, arc);
     scale_to(forms, problem.constraints, x);
     u.head(space->size()) = x;
     u[space->size()] = problem.loads.tension;
     u[space->size() + 1] = -problem.loads.pressure_at(forms.observe(x).volume);
     u[space->size() + 2] = area_difference_force(problem.bending, forms.M(x.data()));
+    if (problem.beads) u.tail<4>() = BeadForms(*space, problem.beads->width).numbers(x.data(), problem.loads.force);
     return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }
 
@@ -446,12 +506,15 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     // Fewer elements first, as the mesh that confirms the first one has more: a chain of shapes keeps its size.
     const CurveSpace& old = *nearby.space;
     const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
-    const auto coarser = space_like(old, regraded(old.splines().breaks(), elements), settings.degree);
-    Eigen::VectorXd u(coarser->size() + StationarySystem::numbers);
-    u << coarser->prolong(old, nearby.x), unknowns(nearby).tail(StationarySystem::numbers);
+    const auto coarser = space_like(
+        old, breaks_for(problem, regraded(old.splines().breaks(), elements), nearby.observed.length), settings.degree);
+    const Eigen::VectorXd before = unknowns(problem, nearby);
+    const int numbers = StationarySystem::numbers(problem);
+    Eigen::VectorXd u(coarser->size() + numbers);
+    u << coarser->prolong(old, nearby.x), before.tail(numbers);
     const Equilibrium found = solve(problem, coarser, u, nearby.gauge, settings);
     if (found.stop != Stop::solver_failed) return found;
-    return solve(problem, nearby.space, unknowns(nearby), nearby.gauge, settings);
+    return solve(problem, nearby.space, before, nearby.gauge, settings);
 }
 
 }  // namespace tubule::axisym

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "axisym/curve/bead_forms.hpp"
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "common/equilibrium/stationary_problem.hpp"
@@ -26,11 +27,13 @@ struct Variation {
 
 // The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve (the last of them the
 // rise of a free period), then sigma, lambda, mu = alpha (M - M0) and the force that holds a whole cell in place along
-// the axis (zero in the end). `gauge` is the weight of the gauge energy (CurveForms): the shape does not depend on it,
-// up to the error of the mesh.
+// the axis (zero in the end), and the numbers of beads, if there are any. `gauge` is the weight of the gauge energy
+// (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
-    static constexpr int numbers = 4;  // beside the curve
+    // Of unknowns beside the curve.
+    static int numbers(const StationaryProblem& problem) { return problem.beads ? 8 : 4; }
+    int numbers() const { return numbers(problem_); }
     // Throws as set_problem().
     StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
 
@@ -41,13 +44,16 @@ public:
     // Throws as check_problem(), and where the period of the space is not free as the problem says.
     void set_problem(const StationaryProblem& problem);
     double gauge() const { return gauge_; }
-    int unknowns() const { return space_->size() + numbers; }
+    int unknowns() const { return space_->size() + numbers(); }
     int shape_size() const { return space_->size(); }
     int sigma() const { return space_->size(); }  // places in u
     int lambda() const { return space_->size() + 1; }
     int mu() const { return space_->size() + 2; }
-    // Makes mu that of the curve.
-    void set_mu(Eigen::VectorXd& u) const { u[mu()] = area_difference_force(problem_.bending, forms_.M(u.data())); }
+    int beads() const { return space_->size() + 4; }
+    // Makes mu and the positions of beads those of the curve; where their force is given, their multipliers, too.
+    void set_followers(Eigen::VectorXd& u) const;
+    // Those numbers of a change of u, zeros for the others.
+    void follow(const Eigen::VectorXd& change, Eigen::VectorXd& out) const;
 
     // F(u), of unknowns() numbers.
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
@@ -62,8 +68,9 @@ public:
     // What Newton's method asks for (common/equilibrium/newton.hpp).
     Eigen::VectorXd constraint_residual(const Eigen::VectorXd& u) const;
     double constraint_error(const Eigen::VectorXd& u) const;
-    std::array<double, 2> area_and_volume(const Eigen::VectorXd& u) const;
+    Extents extents(const Eigen::VectorXd& u) const;
     double size(const Eigen::VectorXd& u) const;
+    double length(const Eigen::VectorXd& u) const;  // L of theory.md (3.16)
     double reference_energy(const Eigen::VectorXd& u) const { return forms_.reference_energy(curve(u)); }
     bool admissible(const Eigen::VectorXd& u) const { return forms_.admissible(curve(u)); }
     bool rebase(const Eigen::VectorXd&) const { return false; }
@@ -77,16 +84,20 @@ private:
     }
     // Nothing but an equation holds a whole cell in its place.
     bool drifts() const {
-        return space_->topology() == Topology::cell && std::ranges::none_of(problem_.bending.potentials, &Potential::acts);
+        return space_->topology() == Topology::cell &&
+               std::ranges::none_of(problem_.bending.potentials, &Potential::acts);
     }
     void set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     Weights weights(const Eigen::VectorXd& u) const;
+    Eigen::SparseMatrix<double> hessian(const Eigen::VectorXd& u) const;
     Eigen::VectorXd slope_of_M(const Eigen::VectorXd& x) const;
-    double length(const Eigen::VectorXd& x) const { return space_->length(x.data()); }
+    BeadLoad bead_load() const { return {problem_.loads.force, problem_.held_distance()}; }
+    BeadNumbers bead_numbers(const Eigen::VectorXd& u) const { return u.segment<4>(beads()); }
 
     std::shared_ptr<const CurveSpace> space_;
     StationaryProblem problem_;
     CurveForms forms_;
+    std::optional<BeadForms> bead_forms_;
     double gauge_;
     Eigen::VectorXd place_;  // functional of the mean height
 };
@@ -104,9 +115,10 @@ struct Equilibrium {
     std::shared_ptr<const CurveSpace> space;
     Eigen::VectorXd x;
     double sigma = 0, lambda = 0, mu = 0;
+    BeadNumbers beads = BeadNumbers::Zero();
     double gauge = 0;
     CurveObservation observed;
-    double length = 0;                                 // of the period, 0 of a cell
+    double length = 0;                                 // L of theory.md (3.16): of the period, or of beads; else 0
     double reference_energy = 0, estimated_error = 0;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
     // Axisymmetric displacements, under what is held, that lower the energy: 0 at a minimum. Of a shape that was found.
@@ -125,9 +137,9 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
                              const EquilibriumSettings& settings = {});
 
 // u of a StationarySystem on its mesh.
-Eigen::VectorXd unknowns(const Equilibrium& shape);
+Eigen::VectorXd unknowns(const StationaryProblem& problem, const Equilibrium& shape);
 
-// The axial force of a tube at rest, theory.md (3.19): given, or what holds its period.
+// The axial force of an equilibrium, theory.md (3.19): given, or what holds a period or the distance of beads.
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 
 // Of half a curve: directions that lower the energy and do not mirror themselves, of at most 10; else 0.

@@ -100,6 +100,7 @@ Task task_of(const Problem& c) {
     task.settings.elements =
         std::max(task.settings.elements, elements_for(c.energy.potentials, ArcLength(task.start).total()));
     task.settings.max_elements = std::max(task.settings.max_elements, 2 * task.settings.elements);
+    if (c.law.beads) task.problem.bead_distance = bead_distance(c, task.start);
     if (const BranchChoices& b = e.branch; b.parameter) {
         task.set = setter(*b.parameter);
         BranchSettings& branch = task.branch;
@@ -188,8 +189,9 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
                {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
                {"tension", [](const ShapeRow& r) { return r.point.shape.sigma; }},
                {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }}});
-    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape))
+    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads)
         table.add({{"force", [](const ShapeRow& r) { return axial_force(r.problem, r.point.shape); }}});
+    if (c.law.beads) table.add({{"bead_distance", [](const ShapeRow& r) { return r.point.shape.length; }}});
     if (!c.energy.potentials.empty())
         table.add({{"potential_force", [](const ShapeRow& r) { return r.o.potential.force; }}});
     table.add({{"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
@@ -258,8 +260,10 @@ private:
             *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
-        out.numbers = {
-            {"energy", e.observed.energy}, {"length", e.length}, {"tension", e.sigma}, {"pressure", -e.lambda}};
+        out.numbers = {{"energy", e.observed.energy},
+                       {"length", e.space->length(e.x.data())},
+                       {"tension", e.sigma},
+                       {"pressure", -e.lambda}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
         const auto add = [&](const char* name, double Sample::*member) {
             Array a{name, {samples.size()}, {}};
@@ -326,7 +330,8 @@ bool meets(const Constraints& held, const CurveObservation& o) {
 std::optional<theory::LimitShape> limit_of(const Task& task) {
     const Constraints& held = task.problem.constraints;
     const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
-    if (!closed || !held.area || !held.volume || !task.problem.bending.potentials.empty()) return std::nullopt;
+    const bool at_places = !task.problem.bending.potentials.empty() || task.problem.beads;
+    if (!closed || !held.area || !held.volume || at_places) return std::nullopt;
     return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);
 }
 

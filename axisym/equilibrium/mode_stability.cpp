@@ -54,8 +54,8 @@ Disturbed disturb(const Pack (&r)[3], const Pack (&z)[3], const Pack (&nr)[3], c
 
 // E + sigma A + lambda V per ds and dtheta. The e_theta components are: of d_theta r, of d_s d_theta d_s r, of
 // d_theta^2 twice d_theta r, of the others none. V = 1/2 INT (x, y, 0) . nu dS, which holds for a period too.
-J functional_density(const Bending& bending, const std::optional<Formula>& potential, double sigma, double lambda,
-                     const Disturbed& d) {
+J functional_density(const Bending& bending, const std::optional<Formula>& potential,
+                     const std::optional<BeadForms>& beads, const Equilibrium& shape, const Disturbed& d) {
     // Normal d_theta X x d_s X, not of unit length.
     const J n_r = d.r * d.s_z, n_t = d.t_z * d.s_r - d.t_r * d.s_z, n_z = -(d.r * d.s_r);
     const J square = n_r * n_r + n_t * n_t + n_z * n_z;
@@ -68,15 +68,26 @@ J functional_density(const Bending& bending, const std::optional<Formula>& poten
     const J K = (L * N - M * M) * (inverse_square * inverse_square);
     const auto f = density(bending, H.v, K.v);
     J sum = chain(H, K, f.f, f.H, f.K, f.HH, f.HK, f.KK);
-    sum.v += sigma;
+    sum.v += shape.sigma;
     if (potential) {
         const J place[]{d.r, d.z};
         sum += evaluate(*potential, place);
     }
-    return square * inverse_area * sum + (lambda / 2) * (d.r * n_r);
+    for (int bead = 0; beads && bead < 2; ++bead) {
+        const J place[]{d.r, d.z, J(shape.beads[2 * bead])};
+        sum += shape.beads[2 * bead + 1] * evaluate(beads->density(bead), place);
+    }
+    return square * inverse_area * sum + (shape.lambda / 2) * (d.r * n_r);
 }
 
 }  // namespace
+
+// dW/dnu - H W: the derivative of INT W dS along the normal displacement w is the integral of this times w.
+double ModeStability::slope_along_normal(const Formula& W, double P, const Point& p) {
+    using Slope = Jet<double, 2, 1>;
+    const Slope place[]{Slope::variable(p.r, 0), Slope::variable(p.z, 1), Slope(P)}, value = evaluate(W, place);
+    return value.d[0] * p.normal_r + value.d[1] * p.normal_z - p.H * value.v;
+}
 
 ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium& shape)
     : problem_(problem), shape_(shape) {
@@ -94,6 +105,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
     const Bending bending = with_M(problem.bending, shape.observed.M);
     const std::optional<Formula> potential = potential_density(bending.potentials);
+    if (problem.beads) beads_.emplace(space, problem.beads->width);
     for (int e = 0; e < splines.elements(); ++e)
         for (int group = 0; group < splines.groups(); ++group) {
             const auto& b = splines.basis(e, group);
@@ -104,7 +116,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
             }
-            const J density = functional_density(bending, potential, shape.sigma, shape.lambda, disturb(r, z, nr, nz));
+            const J density = functional_density(bending, potential, beads_, shape, disturb(r, z, nr, nz));
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
@@ -115,6 +127,11 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 p.normal_r = z[1][q] / p.g, p.normal_z = -r[1][q] / p.g;
                 p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
                 for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
+                for (int bead = 0; beads_ && bead < 2; ++bead) {
+                    const double P = shape.beads[2 * bead];
+                    p.bead[2 * bead] = slope_along_normal(beads_->density(bead), P, p);
+                    p.bead[2 * bead + 1] = slope_along_normal(beads_->density_by_P(bead), P, p);
+                }
                 points_.push_back(p);
                 first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q]});
             }
@@ -232,6 +249,7 @@ int ModeStability::mirror(Parity parity) const {
 struct ModeStability::Forms {
     Matrix second_variation, mass, gradients, source;  // INT |grad f|^2, INT H f w
     Vector area, volume, M, mean;
+    Vector bead[4];   // slopes of G and dG/dP, of both
     Vector rigid[2];  // translation along or across the axis, tilt
 
     explicit Forms(int n)
@@ -243,6 +261,7 @@ struct ModeStability::Forms {
           volume(area),
           M(area),
           mean(area),
+          bead{area, area, area, area},
           rigid{area, area} {}
 };
 
@@ -276,6 +295,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
             forms.volume[i] += dS * p.along * v[0];
             forms.M[i] -= 2 * dS * p.kappa_s * p.kappa_theta * p.along * v[0];
             forms.mean[i] += dS * v[0];
+            for (int l = 0; beads_ && l < 4; ++l) forms.bead[l][i] += dS * p.bead[l] * p.along * v[0];
             for (int l = 0; l < 2; ++l) forms.rigid[l][i] += dS * p.along * motion[l] * v[0];
             for (int c = 0; c < width; ++c) {
                 const int j = field.dofs(e)[c];
@@ -364,6 +384,21 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
     return M - cross.transpose() * least_squares(own, cross);
 }
 
+// The positions of beads follow from the displacement, for m = 0; where their distance is held, it is fixed.
+void ModeStability::add_beads(Forms& forms, Matrix& fixed) const {
+    const double whole = 2 * pi;
+    Vector lengthens = Vector::Zero(forms.mean.size());
+    for (int k = 0; k < 2; ++k) {
+        const double q = shape_.beads[2 * k + 1];
+        const auto [by_P, by_PP] = beads_->slopes_in_P(k, shape_.beads[2 * k], shape_.x.data());
+        const Vector follows = -whole * forms.bead[2 * k] / by_P, with = q * forms.bead[2 * k + 1];
+        forms.second_variation +=
+            with * follows.transpose() + follows * with.transpose() + q * by_PP / whole * follows * follows.transpose();
+        lengthens += follows;
+    }
+    if (problem_.held_distance()) append(fixed, lengthens.normalized());
+}
+
 // What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
 // rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a tilt are odd, a
 // translation across it is even.
@@ -388,14 +423,15 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
                 whole * shape_.lambda * slope / (2 * shape_.observed.area) * forms.area * forms.area.transpose();
         }
     }
+    if (m == 0 && beads_) add_beads(forms, fixed);
     const std::vector<Potential>& potentials = problem_.bending.potentials;  // hold it in its place, but along planes
-    const bool free = std::ranges::none_of(potentials, &Potential::acts);
+    const bool free = std::ranges::none_of(potentials, &Potential::acts) && (m == 0 || !beads_);  // those on the axis
     const bool planes =
         std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
     const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
-        if (!exists || mirror(parity) == (across ? -1 : 1) || !(free || (across && planes))) continue;
+        if (!exists || mirror(parity) == (across ? -1 : 1) || !(free || (across && planes && !beads_))) continue;
         const Vector motion = projection.solve(forms.rigid[k]);
         if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
         // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.

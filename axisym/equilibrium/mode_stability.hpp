@@ -46,10 +46,12 @@ private:
     struct Point {
         double weight, r, g, kappa_s, kappa_theta, H, slope, stretching;  // slope dr/ds of arc length, d log g / d s
         double normal_r, normal_z, z;
-        double along;              // n . nu, of the displacement w n
-        std::array<double, 21> Q;  // packed, per ds and dtheta
-        double force;              // b and the multipliers: what drives the shape, 0 if it is stationary
+        double along;                // n . nu, of the displacement w n
+        std::array<double, 21> Q;    // packed, per ds and dtheta
+        std::array<double, 4> bead;  // of each, slope_along_normal() of G and dG/dP
+        double force;                // b and the multipliers: what drives the shape, 0 if it is stationary
     };
+    static double slope_along_normal(const Formula& W, double P, const Point& p);
     // Quadratic and linear forms of one m, per dtheta and over the curve alone, not its mirror image.
     struct Forms;
 
@@ -62,10 +64,12 @@ private:
                                      const Forms& forms) const;
     Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
                                       const Eigen::MatrixXd& M) const;
+    void add_beads(Forms& forms, Eigen::MatrixXd& fixed) const;
     void add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const;
 
     StationaryProblem problem_;
     Equilibrium shape_;
+    std::optional<BeadForms> beads_;
     std::vector<Point> points_;  // element by element
 };
 

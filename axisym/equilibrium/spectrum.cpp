@@ -113,6 +113,8 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
 }
 
 void refuse_what_has_none(const MotionLaw& law, const SpectrumSettings& settings) {
+    if (law.beads)
+        throw std::invalid_argument("beads pull at an equilibrium: its rates are those of equilibrium.modes");
     if (law.inertia != 0)
         throw std::invalid_argument(
             "spectra neglect inertia: use model stokes instead of fluid; its growing modes are the same");

@@ -23,8 +23,8 @@ enum class Family { prolate, oblate, stomatocyte, pear };
 
 // What a branch is followed in: the moduli by the number of their term, or these.
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
-                     vary_pressure = -6, vary_force = -7, vary_alpha = -8, vary_M0 = -9,
-                     vary_strength = -10;  // of potential 0; of potential i, i less
+                     vary_pressure = -6, vary_force = -7, vary_alpha = -8, vary_M0 = -9, vary_extension = -10,
+                     vary_strength = -11;  // of potential 0; of potential i, i less
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -134,7 +134,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
                                              {"equilibrium.reduced_volume", vary_reduced_volume},
                                              {"model.tension", vary_tension},
                                              {"model.pressure", vary_pressure},
-                                             {"model.force", vary_force}});
+                                             {"model.force", vary_force},
+                                             {"model.extension", vary_extension}});
         for (std::size_t i = 0; i < energy.potentials.size(); ++i)
             if (energy.potentials[i].is_wall())
                 parameters.emplace_back(fmt::format("energy.potential.{}.strength", i),
@@ -157,6 +158,10 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
             if (!b.to || !b.step) return "needs to and step: the end of the branch and the distance between shapes";
             if (*b.parameter == vary_alpha || *b.parameter == vary_M0)
                 return energy.alpha ? "" : "varies what the energy does not have: see energy.alpha";
+            if (*b.parameter == vary_extension)
+                return model.extension ? "" : "varies a distance that is not held: see model.extension";
+            if (*b.parameter == vary_force && model.bead_width)
+                return model.extension ? "varies a force at a given distance: see model.extension" : "";
             if (*b.parameter == vary_force)
                 return model.free_period ? "" : "varies a force at a fixed period: see model.period";
             if (*b.parameter == vary_tension || *b.parameter == vary_pressure) {

@@ -165,6 +165,13 @@ void keys(Keys& k, Model& model) {
     k.ramp("tension", model.tension);
     k.ramp_or_formula("pressure", model.pressure, model.pressure_of_volume, pressure_variables);
     k.ramp("force", model.force);
+    k.number("bead_width", model.bead_width, {.above = 0});
+    k.ramp("extension", model.extension);
+    k.check("extension", [&] {
+        return model.extension && !model.force.is_zero()
+                   ? "holds the distance that model.force pulls at: give one of them"
+                   : "";
+    });
 }
 
 template <class Keys>
@@ -348,6 +355,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_tension) return loads.tension;
     if (parameter == vary_pressure) return loads.pressure;
     if (parameter == vary_force) return loads.force;
+    if (parameter == vary_extension) return c.model.extension ? std::optional(c.model.extension->at(0)) : std::nullopt;
     if (parameter == vary_alpha) return c.energy.alpha;
     if (parameter <= vary_strength) return c.energy.potentials[vary_strength - parameter].strength;
     if (parameter == vary_M0) return c.energy.M0;

@@ -266,12 +266,18 @@ void Reader::ramp(const std::string& key, Ramp& target) {
     ramp_or_formula(key, target, none, {});
 }
 
-void Reader::ramp_or_formula(const std::string& key, Ramp& target, std::shared_ptr<const Formula>& formula,
+void Reader::ramp(const std::string& key, std::optional<Ramp>& target) {
+    Ramp value;
+    std::shared_ptr<const Formula> none;
+    if (ramp_or_formula(key, value, none, {})) target = value;
+}
+
+bool Reader::ramp_or_formula(const std::string& key, Ramp& target, std::shared_ptr<const Formula>& formula,
                              std::span<const std::string_view> variables) {
     std::string what = "a number, or {time = [...], value = [...]}";
     if (!variables.empty()) what += fmt::format(", or a formula of {}", fmt::join(variables, ", "));
     const toml::node* node = find(key, what, false);
-    if (!node) return;
+    if (!node) return false;
     collect([&] {
         if (node->is_number())
             target = number_in(*node, path_of(key), {});
@@ -282,6 +288,7 @@ void Reader::ramp_or_formula(const std::string& key, Ramp& target, std::shared_p
         else
             refuse_value(where(*node), path_of(key), what, *node);
     });
+    return true;
 }
 
 void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& target) {

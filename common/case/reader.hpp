@@ -70,8 +70,9 @@ public:
 
     // A number, or {time = [...], value = [...]}.
     void ramp(const std::string& key, Ramp& target);
-    // The same, or a formula as text.
-    void ramp_or_formula(const std::string& key, Ramp& target, std::shared_ptr<const Formula>& formula,
+    void ramp(const std::string& key, std::optional<Ramp>& target);
+    // The same, or a formula as text. Whether the key is there.
+    bool ramp_or_formula(const std::string& key, Ramp& target, std::shared_ptr<const Formula>& formula,
                          std::span<const std::string_view> variables);
 
     void formula(const std::string& key, std::shared_ptr<const Formula>& target,

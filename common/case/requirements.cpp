@@ -33,6 +33,7 @@ const Property axisym{"tier = \"axisym\"", [](P p) { return p.tier == Tier::axis
 const Property inertia = kind_with(&ModelEntry::inertia), viscous = kind_with(&ModelEntry::viscous),
                inextensible = kind_with(&ModelEntry::inextensible),
                extensible{"model.kind = \"gradient-flow\"", [](P p) { return !p.law.inextensible; }},
+               named_model{"a model that is named", [](P p) { return p.model.kind != ModelKind::automatic; }},
                automatic{"model.kind = \"auto\"", [](P p) { return p.model.kind == ModelKind::automatic; }};
 const Property chosen_inertia{"model.chosen = \"fluid\"",
                               [](P p) { return model_entry(p.model.chosen.value_or(p.model.kind)).inertia; }},
@@ -43,6 +44,8 @@ const Property free_area{"model.area = \"free\" or \"reservoir\"", [](P p) { ret
     free_volume{"model.volume = \"free\"", [](P p) { return !p.law.keeps_volume; }},
     free_period{"model.period = \"free\"", [](P p) { return p.law.free_period; }},
     fixed_period{"model.period = \"fixed\"", [](P p) { return !p.law.free_period; }},
+    beads{"model.bead_width", [](P p) { return p.law.beads.has_value(); }},
+    pulled{"model.period = \"free\" or model.bead_width", [](P p) { return p.law.free_period || p.law.beads; }},
     kept{"a fixed area or volume", [](P p) { return p.law.keeps_volume || !p.law.area_is_free(); }},
     as_begun{"fixed area and period, without loads",
              [](P p) { return !p.law.reservoir && !p.law.free_period && p.law.without_loads(); }};
@@ -136,10 +139,18 @@ const std::vector<Requirement> rows{
           "E + tension A - pressure V - force L of a straight tube is linear in L and has no equilibrium"),
     key("model.tension", {free_area}, "what a fixed area needs is the series tension"),
     key("model.pressure", {free_volume}, "what a fixed volume needs is the series pressure"),
-    key("model.force", {free_period}, "what a fixed period needs is the series force"),
+    key("model.force", {pulled}, "what a fixed period needs is the series force"),
+    key("model.bead_width", {axisym, closed, named_model}, "beads pull at the poles"),
+    key("model.extension", {beads}, "it is that of the distance of two beads"),
+    value(
+        "model.extension", [](P p) { return p.law.beads && p.law.beads->extension; }, {no_inertia},
+        "the velocity would jump with its rate: give model.force"),
     number("model.tension", varies(&MotionLaw::tension), {motion}, "equilibria are those of constant loads"),
     number("model.pressure", varies(&MotionLaw::pressure), {motion}, "equilibria are those of constant loads"),
     number("model.force", varies(&MotionLaw::force), {motion}, "equilibria are those of constant loads"),
+    number(
+        "model.extension", [](P p) { return p.law.beads && p.law.beads->change(); }, {motion},
+        "equilibria have a constant distance"),
     key("velocity", {time, motion}, "nothing moves without it"),
     key("velocity.initial", {inertia}),
     value("velocity.initial", begins(InitialVelocity::rotation), {chosen_inertia}),

@@ -63,6 +63,10 @@ public:
                       : fmt::format("{{time = {}, value = {}}}", toml_list(ramp.times()), toml_list(ramp.values())));
     }
 
+    void ramp(const std::string& key, const std::optional<Ramp>& values) {
+        if (values) ramp(key, *values);
+    }
+
     void ramp_or_formula(const std::string& key, const Ramp& values, const std::shared_ptr<const Formula>& formula,
                          std::span<const std::string_view>) {
         if (formula)

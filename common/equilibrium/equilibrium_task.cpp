@@ -38,6 +38,8 @@ SetParameter setter(int parameter) {
             return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
         case vary_force:
             return [](StationaryProblem& p, double value) { p.loads.force = value; };
+        case vary_extension:
+            return [](StationaryProblem& p, double value) { p.beads->extension = Ramp(value); };
         default:
             return [](StationaryProblem& p, double value) {
                 if (p.constraints.area)
@@ -69,6 +71,8 @@ double parameter_value(int parameter, const StationaryProblem& p) {
             return p.loads.pressure;
         case vary_force:
             return p.loads.force;
+        case vary_extension:
+            return p.beads->extension->at(0);
         default:
             return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
     }
@@ -77,7 +81,7 @@ double parameter_value(int parameter, const StationaryProblem& p) {
 StationaryProblem stationary_problem(const Problem& c, double area, double volume) {
     const EquilibriumChoices& e = *c.equilibrium;
     StationaryProblem out{.bending = c.energy, .constraints = {}, .loads = loads_at(c.law, 0)};
-    out.free_period = c.model.free_period;
+    out.free_period = c.model.free_period, out.beads = c.law.beads;
     Constraints& held = out.constraints;
     if (holds_area(c.held)) held.area = e.area.value_or(area);
     if (holds_volume(c.held)) held.volume = e.volume.value_or(volume);

@@ -16,9 +16,10 @@ namespace tubule {
 //   residual(u), jacobian(u, damping)   F; dF/du with damping times the mass matrix added to the shape's Hessian
 //   constraint_residual(u)              F with zeros for the shape
 //   merit(u), constraint_error(u)       the Lagrangian; how far area and volume are from what is held, relative
-//   area_and_volume(u), size(u)         of the shape; the length that steps are compared with
+//   extents(u), size(u)                 area, volume and L of the shape; the length that steps are compared with
 //   reference_energy(u), admissible(u)  the scale of the merit; whether u is a shape at all
-//   mu(), set_mu(u)                     place of the number alpha (M - M0) in u, and makes it that of the shape
+//   set_followers(u)                    makes numbers that follow from the shape those of it, as mu = alpha (M - M0)
+//   follow(change, out)                 sets them in `out` to those of a change of u
 //   rebase(u)                           may choose other coefficients for the same shape; whether u has another size
 //   way_down(u)                         a change of u along which a stationary shape loses energy; empty if none does
 //   factors()                           a solver for its Jacobian
@@ -110,7 +111,7 @@ private:
         constexpr double farthest = 0.05;  // for the sake of area and volume
         const int n = system_.shape_size();
         Attempt out;
-        system_.set_mu(u_);
+        system_.set_followers(u_);
         try {
             const Eigen::SparseMatrix<double> J = system_.jacobian(u_, damping_);
             lu_.factor(J);
@@ -121,14 +122,14 @@ private:
             const double off_before = system_.constraint_error(u_), part = std::min(1.0, farthest / relative(back));
             const Eigen::VectorXd step = down + part * back, dx = step.head(n);
             Eigen::VectorXd within = Eigen::VectorXd::Zero(u_.size());
-            within.head(n) = dx, within[system_.mu()] = step[system_.mu()];
+            within.head(n) = dx, system_.follow(step, within);
             const double curvature = dx.dot((J * within).head(n));
             if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
             out.predicted = curvature / 2;
             out.to = u_ + step;
             for (int k = 0; k < 2; ++k) {
                 if (!system_.admissible(out.to)) return out;
-                system_.set_mu(out.to);
+                system_.set_followers(out.to);
                 const Eigen::VectorXd still = system_.constraint_residual(out.to) - (1 - part) * off;
                 out.to.head(n) -= lu_.solve(still).head(n);
             }
@@ -149,15 +150,15 @@ private:
     decltype(std::declval<const System&>().factors()) lu_;
 };
 
-// Descends on one mesh; area and volume change from the initial to the required ones in steps.
+// Descends on one mesh; area, volume and the distance of beads change from the initial to the required ones in steps.
 template <class System>
 bool descend(System& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
     const StationaryProblem goal = system.problem();
-    const auto [area, volume] = system.area_and_volume(u);
-    if (!(area > 0 && volume > 0)) return false;  // turned inside out by an earlier attempt
-    const int stages = 1 + static_cast<int>(distance(goal.constraints, area, volume) / 0.03);
+    const Extents from = system.extents(u);
+    if (!(from.area > 0 && from.volume > 0)) return false;  // turned inside out by an earlier attempt
+    const int stages = 1 + static_cast<int>(distance(goal, from) / 0.03);
     for (int k = 1; k < stages; ++k) {
-        system.set_problem(between(goal, area, volume, static_cast<double>(k) / stages));
+        system.set_problem(between(goal, from, static_cast<double>(k) / stages));
         Newton(system, u, iterations).descend(std::max(0.03, tolerance), 30);
     }
     system.set_problem(goal);

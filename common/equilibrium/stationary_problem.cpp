@@ -51,7 +51,7 @@ double reduced_volume(double area, double volume) {
 
 void check_problem(const StationaryProblem& problem, double period) {
     const Constraints& c = problem.constraints;
-    if (!problem.free_period && problem.loads.force != 0)
+    if (!problem.free_period && !problem.beads && problem.loads.force != 0)
         throw std::invalid_argument("a force needs a free period, and a space with one");
     if (problem.free_period && !c.area && !c.volume)
         throw std::invalid_argument("a free period needs a given area or a given volume");
@@ -103,24 +103,28 @@ double constraint_error(const Constraints& c, const MultiplierEquations& equatio
     return std::max(area, volume);
 }
 
-StationaryProblem between(const StationaryProblem& goal, double area, double volume, double part) {
+StationaryProblem between(const StationaryProblem& goal, const Extents& from, double part) {
     const auto on_the_way = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
         if (!wanted) return wanted;
         return is * std::pow(*wanted / is, part);
     };
     const Constraints& c = goal.constraints;
     StationaryProblem out = goal;
-    out.constraints = {on_the_way(c.area, area), on_the_way(c.volume, volume),
-                       on_the_way(c.reduced_volume, reduced_volume(area, volume))};
+    out.constraints = {on_the_way(c.area, from.area), on_the_way(c.volume, from.volume),
+                       on_the_way(c.reduced_volume, reduced_volume(from.area, from.volume))};
+    if (const auto held = on_the_way(goal.held_distance(), from.length))
+        out.beads->extension = Ramp(*held - goal.bead_distance);
     return out;
 }
 
-double distance(const Constraints& goal, double area, double volume) {
+double distance(const StationaryProblem& goal, const Extents& from) {
+    const Constraints& c = goal.constraints;
     const auto off = [](const std::optional<double>& wanted, double is) {
         return wanted ? std::abs(std::log(*wanted / is)) : 0;
     };
-    return std::max(
-        {off(goal.area, area), off(goal.volume, volume), off(goal.reduced_volume, reduced_volume(area, volume))});
+    return std::max({off(c.area, from.area), off(c.volume, from.volume),
+                     off(c.reduced_volume, reduced_volume(from.area, from.volume)),
+                     off(goal.held_distance(), from.length)});
 }
 
 bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding) {

@@ -24,6 +24,14 @@ struct StationaryProblem {
     Constraints constraints;
     Loads loads{};             // tension of a free area, pressure of a free volume, force of a free period
     bool free_period = false;  // of a tube; of half a tube in tier 1
+    std::optional<Beads> beads{};
+    double bead_distance = 0;  // of the initial shape
+
+    // That is held; none where the force between them is given.
+    std::optional<double> held_distance() const {
+        if (!beads || !beads->extension) return std::nullopt;
+        return bead_distance + beads->extension->at(0);
+    }
 };
 
 // Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
@@ -53,10 +61,14 @@ ReducedVolumeSlopes reduced_volume_slopes(double reduced_volume, double area);
 // Deviation of area and volume from what is held, 0 for what is free, in units of a length.
 double constraint_error(const Constraints& c, const MultiplierEquations& equations, double length);
 
-// The problem part of the way from a shape of this area and volume to its own constraints, 0 <= part <= 1.
-StationaryProblem between(const StationaryProblem& goal, double area, double volume, double part);
+// Of a shape: what may be held, with L of theory.md (3.16).
+struct Extents {
+    double area, volume, length;
+};
+// The problem part of the way from a shape of these extents to its own constraints, 0 <= part <= 1.
+StationaryProblem between(const StationaryProblem& goal, const Extents& from, double part);
 // How far that is: the largest |log| of a ratio.
-double distance(const Constraints& goal, double area, double volume);
+double distance(const StationaryProblem& goal, const Extents& from);
 
 // Whether the search is to lead from a closed shape, a sphere, to a smaller reduced volume: there area and volume have
 // one gradient. `rounding`: of the reduced volume of a sphere on the mesh.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "common/formula/formula.hpp"
 #include "common/model/ramp.hpp"
@@ -19,6 +20,18 @@ enum class ModelKind { gradient_flow, overdamped, stokes, fluid, automatic };
 // What holds the area: nothing; the area itself, by one number in gradient flow and locally in inextensible models; or
 // a reservoir, which feeds an inextensible membrane uniformly.
 enum class AreaRule { free, fixed, reservoir };
+
+// Two beads at the poles of a closed surface, drawn apart along the axis: theory.md (2.23). The force of the loads
+// draws them, or their distance is that of the initial shape and an extension.
+struct Beads {
+    double width = 0;  // of the weight that places a bead
+    std::optional<Ramp> extension{};
+
+    // Of the distance that is held, none where the force is given.
+    double rate(double t) const { return extension ? extension->slope(t) : 0; }
+    double next_kink(double t) const { return extension ? extension->next_kink(t) : HUGE_VAL; }
+    bool change() const { return extension && !extension->is_constant(); }
+};
 
 // What a case says about its law of motion.
 struct Model {
@@ -32,6 +45,8 @@ struct Model {
     // Given where area, volume and period are free: theory.md (3.16).
     Ramp tension{}, pressure{}, force{};
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
+    std::optional<double> bead_width{};                   // none: no beads
+    std::optional<Ramp> extension{};                      // of their distance, where that is held
 
     bool has_pressure() const { return pressure_of_volume || !pressure.is_zero(); }
 };
@@ -70,7 +85,8 @@ inline std::string quoted_names(bool ModelEntry::*has) {
     return text;
 }
 
-// Tension, pressure (inside minus outside) and axial force at one time; or their rates of change.
+// Tension, pressure (inside minus outside) and axial force at one time; or their rates of change. The force works along
+// the length: the period of a tube, or the distance of beads.
 struct Loads {
     double tension = 0, pressure = 0, force = 0;
     std::shared_ptr<const Formula> of_volume{};  // the pressure, instead of the number
@@ -100,16 +116,19 @@ struct MotionLaw {
     // What falls is F = E + tension A - pressure V - force L: theory.md (3.16).
     Ramp tension{}, pressure{}, force{};
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
+    std::optional<Beads> beads{};
 
     // The L2 gradient flow of F: nothing is kept.
     bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
     bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
-    // Whether F is E alone at all times; whether F - E depends on time.
+    // Whether F is E alone at all times, and nothing acts on places; whether work is done on the membrane in time.
     bool without_loads() const {
-        return tension.is_zero() && pressure.is_zero() && force.is_zero() && !pressure_of_volume;
+        return tension.is_zero() && pressure.is_zero() && force.is_zero() && !pressure_of_volume && !beads;
     }
     bool supplies_kinetic_energy() const { return reservoir && inertia != 0; }
-    bool loads_change() const { return !tension.is_constant() || !pressure.is_constant() || !force.is_constant(); }
+    bool loads_change() const {
+        return !tension.is_constant() || !pressure.is_constant() || !force.is_constant() || (beads && beads->change());
+    }
 };
 
 inline Loads loads_at(const MotionLaw& law, double t) {
@@ -120,7 +139,8 @@ inline Loads load_rates(const MotionLaw& law, double t) {
     return {law.tension.slope(t), law.pressure.slope(t), law.force.slope(t)};
 }
 inline double next_kink(const MotionLaw& law, double t) {
-    return std::min({law.tension.next_kink(t), law.pressure.next_kink(t), law.force.next_kink(t)});
+    return std::min({law.tension.next_kink(t), law.pressure.next_kink(t), law.force.next_kink(t),
+                     law.beads ? law.beads->next_kink(t) : HUGE_VAL});
 }
 // The scale of F - E over all times, a part of E_ref: theory.md (11.1).
 inline double load_scale(const MotionLaw& law, double area, double volume, double length) {
@@ -143,6 +163,8 @@ constexpr double default_friction(const ModelEntry& model) {
 inline MotionLaw motion_law(const Model& model) {
     const ModelEntry& has = model_entry(model.kind);
     const AreaRule area = area_rule(model);
+    std::optional<Beads> beads;
+    if (model.bead_width) beads = Beads{*model.bead_width, model.extension};
     return {.inertia = has.inertia ? 1.0 : 0.0,
             .viscosity = has.viscous ? 1 / model.Re : 0,
             .friction = has.inextensible ? model.gamma.value_or(default_friction(has)) : 1,
@@ -154,7 +176,8 @@ inline MotionLaw motion_law(const Model& model) {
             .tension = model.tension,
             .pressure = model.pressure,
             .force = model.force,
-            .pressure_of_volume = model.pressure_of_volume};
+            .pressure_of_volume = model.pressure_of_volume,
+            .beads = std::move(beads)};
 }
 
 }  // namespace tubule

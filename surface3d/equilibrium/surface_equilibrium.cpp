@@ -40,9 +40,9 @@ public:
             SurfaceSystem system(next_mesh(initial, triangles), problem_);
             Eigen::VectorXd u = system.unknowns_at_base();
             if (rounds_ == 0) {
-                first_ = system.area_and_volume(u);
+                first_ = system.extents(u);
                 keep(system, u);
-                if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_[0], first_[1], 1e-4))
+                if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_.area, first_.volume, 1e-4))
                     return end(Stop::solver_failed,
                                "a sphere leads to no other area and volume, since all directions are alike: start at "
                                "an ellipsoid or a sphere with waves");
@@ -124,8 +124,9 @@ private:
             return fmt::format(
                 "the mesh of the initial shape has bad triangles (quality {:.2g}) or kinks, or is behind a wall",
                 mesh_quality(out_.mesh).worst);
-        const auto [area, volume] = system.area_and_volume(u);
-        const std::string missed = missed_constraint(problem_.constraints, first_[0], first_[1], area, volume);
+        const Extents at = system.extents(u);
+        const std::string missed =
+            missed_constraint(problem_.constraints, first_.area, first_.volume, at.area, at.volume);
         return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", out_.iterations)
                               : missed;
     }
@@ -133,7 +134,7 @@ private:
     const StationaryProblem& problem_;
     const SurfaceEquilibriumSettings& settings_;
     SurfaceEquilibrium out_;
-    std::array<double, 2> first_{};
+    Extents first_{};
     int rounds_ = 0;
     Eigen::VectorXd multipliers_;
     std::optional<std::pair<double, int>> before_;  // energy and triangles of the mesh before

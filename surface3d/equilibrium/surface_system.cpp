@@ -223,7 +223,7 @@ EnergyValues SurfaceSystem::values(const Eigen::VectorXd& u) const {
     return v;
 }
 
-void SurfaceSystem::set_mu(Eigen::VectorXd& u) const {
+void SurfaceSystem::set_followers(Eigen::VectorXd& u) const {
     u[mu()] = problem_.bending.alpha ? area_difference_force(problem_.bending, values(u).M) : 0;
 }
 
@@ -315,13 +315,13 @@ double SurfaceSystem::merit(const Eigen::VectorXd& u) const {
     return lagrangian(problem_, v.energy, v.area, v.volume, mesh(u).period, u[sigma()], u[lambda()]);
 }
 
-std::array<double, 2> SurfaceSystem::area_and_volume(const Eigen::VectorXd& u) const {
+Extents SurfaceSystem::extents(const Eigen::VectorXd& u) const {
     const EnergyValues v = values(u);
-    return {v.area, v.volume};
+    return {v.area, v.volume, mesh(u).period};
 }
 
 double SurfaceSystem::size(const Eigen::VectorXd& u) const {
-    return std::sqrt(area_and_volume(u)[0]);
+    return std::sqrt(extents(u).area);
 }
 
 double SurfaceSystem::reference_energy(const Eigen::VectorXd& u) const {
@@ -391,7 +391,7 @@ bool SurfaceSystem::take_new_mesh(const CurvedMesh& shape, int triangles, Eigen:
 Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(unknowns());
     u[sigma()] = problem_.loads.tension, u[lambda()] = -problem_.loads.pressure_at(values(u).volume);
-    set_mu(u);
+    set_followers(u);
     return u;
 }
 

@@ -30,14 +30,15 @@ public:
     int sigma() const { return shape_size(); }
     int lambda() const { return shape_size() + 1; }
     int mu() const { return shape_size() + 2; }
-    void set_mu(Eigen::VectorXd& u) const;
+    void set_followers(Eigen::VectorXd& u) const;
+    void follow(const Eigen::VectorXd& change, Eigen::VectorXd& out) const { out[mu()] = change[mu()]; }
 
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping) const;
     Eigen::VectorXd constraint_residual(const Eigen::VectorXd& u) const;
     double constraint_error(const Eigen::VectorXd& u) const;
     double merit(const Eigen::VectorXd& u) const;
-    std::array<double, 2> area_and_volume(const Eigen::VectorXd& u) const;
+    Extents extents(const Eigen::VectorXd& u) const;
     double size(const Eigen::VectorXd& u) const;
     double reference_energy(const Eigen::VectorXd& u) const;
     bool admissible(const Eigen::VectorXd& u) const;

@@ -107,7 +107,7 @@ TEST(AreaDifference, equilibriaAreThoseOfAnEffectiveSpontaneousCurvature) {
             other.problem.bending = bending(0.5, H0);
             other.shape.sigma += constant, other.shape.mu = 0;
             const StationarySystem system(e.space, other.problem, e.gauge);
-            const Vector u = unknowns(other.shape),
+            const Vector u = unknowns(other.problem, other.shape),
                          step = Matrix(system.jacobian(u)).partialPivLu().solve(system.residual(u));
             EXPECT_LT(step.head(e.x.size()).lpNorm<Eigen::Infinity>(), 1e-10);
             EquilibriumSettings settings;
@@ -164,7 +164,7 @@ TEST(AreaDifference, theSecondVariationIsTheDerivativeOfTheGradient) {
     const auto gradient = [&](const Vector& x) {
         Vector at = u;
         at.head(n) = x;
-        system.set_mu(at);
+        system.set_followers(at);
         return Vector(system.residual(at).head(n));
     };
     Matrix hessian(n, n);
@@ -183,7 +183,7 @@ TEST(AreaDifference, theSecondVariationIsTheDerivativeOfTheGradient) {
         Eigen::SelfAdjointEigenSolver<Matrix>((reduced + reduced.transpose()) / 2, Eigen::EigenvaluesOnly)
             .eigenvalues();
     Vector settled = u;
-    system.set_mu(settled);
+    system.set_followers(settled);
     const Vector found = system.variation(settled).eigenvalues;
     ASSERT_EQ(found.size(), expected.size());
     EXPECT_LT((found - expected).lpNorm<Eigen::Infinity>(), 1e-6 * expected.lpNorm<Eigen::Infinity>());

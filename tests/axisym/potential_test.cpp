@@ -137,13 +137,7 @@ stationary = 1e-8
 )";
 
 Outcome shapes_of(const std::string& text, const std::vector<std::string>& sets = {}) {
-    const Case c = parse_case(text, sets, "case.toml");
-    Outcome out;
-    out.summary = run_equilibrium(c, out.log);
-    const auto names = equilibrium_series_names(c);
-    for (std::size_t i = 0; i < names.size(); ++i)
-        for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));
-    return out;
+    return run_shapes(parse_case(text, sets, "case.toml"));
 }
 
 // A vesicle is drawn to a wall and spreads there. Its end is the equilibrium; the balance of the energy closes.

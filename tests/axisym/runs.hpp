@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/run.hpp"
 #include "tests/support/summary_detail.hpp"
 
@@ -92,6 +93,15 @@ inline Outcome run_case(const Case& c, const Record* restart = nullptr,
     if (restart) from = Restart{*restart};
     out.summary = run(c, out.log, from ? &*from : nullptr);
     const auto names = series_names(c);
+    for (std::size_t i = 0; i < names.size(); ++i)
+        for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));
+    return out;
+}
+
+inline Outcome run_shapes(const Case& c) {
+    Outcome out;
+    out.summary = run_equilibrium(c, out.log);
+    const auto names = equilibrium_series_names(c);
     for (std::size_t i = 0; i < names.size(); ++i)
         for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));
     return out;

@@ -122,6 +122,7 @@ public:
         add(key, "list of floats", "");
     }
     void ramp(const std::string& key, const Ramp&) { add(key, "float or table", ""); }
+    void ramp(const std::string& key, const std::optional<Ramp>&) { ramp(key, Ramp()); }
     void ramp_or_formula(const std::string& key, const Ramp&, const std::shared_ptr<const Formula>&,
                          std::span<const std::string_view>) {
         add(key, "float, table or string", "");

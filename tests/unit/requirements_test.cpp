@@ -23,6 +23,8 @@ const std::string axisym = "tier = \"axisym\"\n" + tube + motion, surface = "tie
                       "tier = \"axisym\"\nequilibrium = {}\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\n"
                       "radius = 1\n";
 
+const std::string sphere = "tier = \"axisym\"\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n" + motion;
+
 // A case, what is set in it, and the property that the last of the keys then lacks.
 struct Refused {
     std::string text;
@@ -53,7 +55,15 @@ const std::vector<Refused> refused{
     {axisym, {"model.period=free"}, "a fixed area or volume"},
     {axisym, {"model.area=fixed", "model.tension=1"}, "model.area = \"free\" or"},
     {axisym, {"model.volume=fixed", "model.pressure=1"}, "model.volume = \"free\""},
-    {axisym, {"model.force=1"}, "model.period = \"free\""},
+    {axisym, {"model.force=1"}, "model.period = \"free\" or model.bead_width"},
+    {axisym, {"model.bead_width=0.1"}, "a closed surface"},
+    {surface_equilibrium, {"model.bead_width=0.1"}, "tier = \"axisym\""},
+    {sphere, {"model={kind=\"auto\", bead_width=0.1}"}, "a model that is named"},
+    {sphere, {"model={kind=\"fluid\", bead_width=0.1}", "model.extension=1"}, "a model without inertia"},
+    {equilibrium,
+     {"model.bead_width=0.1", "model.extension={time=[0,1],value=[0,1]}"},
+     "a motion, without [equilibrium]"},
+    {axisym, {"model.extension=1"}, "model.bead_width"},
     {equilibrium, {"model.tension={time=[0,1],value=[0,1]}"}, "a motion, without [equilibrium]"},
     {equilibrium, {"model.pressure={time=[0,1],value=[0,1]}"}, "a motion, without [equilibrium]"},
     {"tier = \"axisym\"\nequilibrium = {}\n" + tube,

@@ -24,9 +24,11 @@ Text table_of(const Result& result) {
     Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
     const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
-    const bool branch = has("parameter"), branches = has("branch"), modes = has("growth_0"), rates = has("rate_1");
+    const bool branch = has("parameter"), branches = has("branch"), modes = has("growth_0"), rates = has("rate_1"),
+               beads = has("bead_distance");
     if (branch) add(out, "{:>14}  ", "parameter");
     add(out, "{:>16} {:>14} {:>14} {:>9} {:>10} {:>4}", "energy", "tension", "pressure", "height", "r_max", "neg");
+    if (beads) add(out, " {:>12}", "force");
     if (modes || rates) add(out, "  {:>10} of m", "growth");
     add(out, "\n");
     const std::size_t rows = result.series.at("time").size();
@@ -38,6 +40,7 @@ Text table_of(const Result& result) {
         if (branch) add(out, "{:>14.9g}  ", value("parameter", i));
         add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("tension", i),
             value("pressure", i), value("height", i), value("r_max", i), known ? fmt::to_string(negative) : "?");
+        if (beads) add(out, " {:>12.6f}", value("force", i) + 0.0);
         if (modes && known) {
             int fastest = 0;
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)

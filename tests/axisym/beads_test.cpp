@@ -1,0 +1,244 @@
+// Beads at the poles: derivatives, a sphere's linear response, tethers by virtual work and by their own balance, runs.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "axisym/curve/curve_motion.hpp"
+#include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/equilibrium/mode_stability.hpp"
+#include "common/case/read.hpp"
+#include "common/equilibrium/equilibrium_task.hpp"
+#include "common/geometry/profile_point.hpp"
+#include "common/theory/dispersion.hpp"
+#include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/paths.hpp"
+#include "tests/support/random_vector.hpp"
+
+namespace tubule::axisym {
+namespace beads_test {
+
+using Vector = Eigen::VectorXd;
+using test::random_vector;
+
+std::shared_ptr<const CurveSpace> cell(int elements, double width) {
+    return std::make_shared<const CurveSpace>(Topology::cell, refined_at_beads(equal_breaks(elements), width, pi), 5,
+                                              4);
+}
+
+// Central differences with one extrapolation: their own error is of order h^4.
+template <class F>
+Vector slope(const F& f, double h) {
+    return (8 * (f(h / 2) - f(-h / 2)) - (f(h) - f(-h))) / (6 * h);
+}
+
+TEST(Beads, equationsHaveTheirDerivatives) {
+    const double width = 0.3;
+    const auto space = cell(6, width);
+    const Vector x = fit(*space, meridian(Ellipsoid{1, 1, 1.5})) + 0.003 * random_vector(space->size(), 1, 2);
+    for (const std::optional<double> held : {std::optional<double>(), std::optional(3.1)}) {
+        MotionLaw law{.friction = 1, .inextensible = false, .keeps_volume = false, .force = 2};
+        law.beads = Beads{width, held ? std::optional(Ramp(0.2)) : std::nullopt};
+        StationaryProblem problem{
+            bending(0.3, -0.4), {.area = 12, .volume = {}, .reduced_volume = {}}, {.force = held ? 0.0 : 2.0}};
+        problem.beads = law.beads, problem.bead_distance = 2.9;
+        const StationarySystem system(space, problem, 0.3);
+        Vector u = random_vector(system.unknowns(), 0.3, 3);
+        u.head(x.size()) = x;
+        u[system.lambda()] = u[system.beads() - 1] = 0;  // the volume is free, and nothing holds the place
+        u.tail<4>() << 1.4, -1.7, 1.45, -2.2;
+        const Vector w = random_vector(u.size(), 1, 4), expected = system.jacobian(u) * w;
+        const Vector found = slope([&](double h) { return system.residual(u + h * w); }, 1e-3);
+        EXPECT_LE((found - expected).lpNorm<Eigen::Infinity>(), 1e-7 * expected.lpNorm<Eigen::Infinity>());
+
+        // With positions that follow from the curve the merit has the force as its gradient.
+        const auto merit = [&](double h) {
+            Vector at = u;
+            at.head(x.size()) += h * w.head(x.size());
+            if (!held) system.set_followers(at);
+            return Vector::Constant(1, system.merit(at));
+        };
+        if (!held) {
+            system.set_followers(u);
+            EXPECT_NEAR(slope(merit, 1e-3)[0], system.residual(u).head(x.size()).dot(w.head(x.size())), 1e-6);
+        }
+        for (const bool inextensible : {false, true}) {
+            CurveLaw moves = law;
+            moves.inextensible = inextensible, moves.viscosity = inextensible ? 0.4 : 0;
+            CurveMotion motion(*space, problem.bending, moves, 0.3, 5, 2);
+            motion.hold_beads(x);
+            const int n = motion.layout().size, at = motion.layout().bead;
+            Vector y = random_vector(n, 0.3, 5);
+            y.head(x.size()) = x, y.segment<4>(at) = u.tail<4>();
+            const Vector rate = random_vector(n, 0.3, 6), v = random_vector(n, 1, 7);
+            Eigen::SparseMatrix<double> J = motion.pattern();
+            motion.jacobian(0, y.data(), rate.data(), 1.7, J.valuePtr());
+            const Vector by_J = J * v, by_F = slope(
+                                           [&](double h) {
+                                               const Vector to = y + h * v, of = rate + 1.7 * h * v;
+                                               Vector F(n);
+                                               EXPECT_TRUE(motion.residual(0, to.data(), of.data(), F.data()));
+                                               return F;
+                                           },
+                                           1e-3);
+            EXPECT_LE((by_J - by_F).lpNorm<Eigen::Infinity>(), 1e-7 * by_J.lpNorm<Eigen::Infinity>());
+        }
+    }
+}
+
+// The derivative d(theta) of the distance of beads on a unit sphere along its normal, from the definition alone.
+struct OnSphere {
+    double width, P = 0, by_P = 0;
+    static constexpr int points = 20000;
+
+    explicit OnSphere(double w) : width(w) {
+        double low = 0.5, high = 1.5;
+        for (int i = 0; i < 100; ++i)
+            (integral([&](double t) { return W(t); }) > 0 ? low : high) = P = (low + high) / 2;
+        by_P = -integral([&](double t) { return W_zeta(t); });
+    }
+    double zeta(double t) const { return std::cos(t) - P; }
+    double g(double t) const {
+        const double r = std::sin(t), far = zeta(t) - width;
+        return std::exp(-(r * r + far * far) / (2 * width * width));
+    }
+    double W(double t) const { return g(t) * zeta(t); }
+    double W_zeta(double t) const { return g(t) * (1 - zeta(t) * (zeta(t) - width) / (width * width)); }
+    double W_r(double t) const { return -W(t) * std::sin(t) / (width * width); }
+    template <class F>
+    static double integral(const F& f) {
+        double sum = 0;
+        for (int i = 0; i < points; ++i) {
+            const double t = (i + 0.5) * pi / points;
+            sum += f(t) * 2 * pi * std::sin(t) * pi / points;
+        }
+        return sum;
+    }
+    double slope(double t) const {  // of one bead; d INT W dS = INT (dW/dnu - H W) w dS, H = -2
+        return -(W_r(t) * std::sin(t) + W_zeta(t) * std::cos(t) + 2 * W(t)) / by_P;
+    }
+};
+
+// Under a small force a sphere of fixed volume, at a tension, gives way by f SUM d_l^2/stiffness_l in the modes l = 2,
+// 4,
+// ... of d: theory.md (8.5) has the stiffness.
+TEST(Beads, sphereGivesWayLinearly) {
+    const double width = 0.3, force = 1e-3;
+    const OnSphere exact(width);
+    double compliance = 0;
+    const theory::UniformSphere sphere{bending(0.5), 1, 3};
+    for (int l = 2; l < 60; l += 2) {
+        const double part =
+            OnSphere::integral([&](double t) { return exact.slope(t) * std::legendre(l, std::cos(t)); });
+        compliance += 4 * part * part * (2 * l + 1) / (4 * pi) / theory::stiffness(sphere, l);
+    }
+    StationaryProblem problem{
+        bending(0.5), {.area = {}, .volume = 4 * pi / 3, .reduced_volume = {}}, {.tension = 3, .force = force}};
+    problem.beads = Beads{width, std::nullopt};
+    const auto distance = [&](double f) {
+        problem.loads.force = f;
+        const Equilibrium e = find_equilibrium(problem, meridian(Sphere{1, {}}), {.accuracy = 1e-11});
+        EXPECT_EQ(e.stop, Stop::finished) << e.message;
+        EXPECT_NEAR(axial_force(problem, e), f, 1e-9);
+        return e.length;
+    };
+    EXPECT_NEAR(distance(0), 2 * exact.P, 1e-8);
+    EXPECT_NEAR((distance(force) - distance(-force)) / (2 * force), compliance, 1e-6 * compliance);
+}
+
+const std::string pulled = "/tether.toml", branch = "/branch_tether.toml";
+
+Case of(const std::string& name, const std::vector<std::string>& sets) {
+    return read_case(test::cases + name, sets);
+}
+
+// The free energy of shapes rises along a branch by the force times the distance (central differences, extrapolated).
+TEST(Beads, forceIsTheSlopeOfTheEnergy) {
+    const auto at = [](double extension) {
+        const Outcome o = run_shapes(
+            of(branch, {"equilibrium={}", fmt::format("model.extension={}", extension), "accuracy.energy=1e-9"}));
+        EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        return std::array{o.last("free_energy"), o.last("force")};
+    };
+    const double h = 0.04;
+    const auto F = [&](double shift) { return at(0.3 + shift)[0]; };
+    EXPECT_NEAR((8 * (F(h / 2) - F(-h / 2)) - (F(h) - F(-h))) / (6 * h), at(0.3)[1], 1e-5 * at(0.3)[1]);
+}
+
+// A long tether balances by itself, theory.md (2.23): f = 2 pi R (f + sigma) - pi R^2 P, with R where it is a cylinder.
+TEST(Beads, tethersBalance) {
+    const Outcome o = run_shapes(of(branch, {"equilibrium.branch.to=12", "equilibrium.branch.step=2"}));
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const Record& last = o.log.frames.back();
+    const auto array = [&](const std::string& name) {
+        for (const Array& a : last.arrays)
+            if (a.name == name) return a.data;
+        return std::vector<double>();
+    };
+    const std::vector<double> r = array("r"), z = array("z"), H = array("H");
+    double R = 0, off = HUGE_VAL;
+    for (std::size_t i = 0; i < r.size(); ++i)
+        if (z[i] > 1 && r[i] > 0.1 && std::abs(1 / r[i] + H[i]) < off) R = r[i], off = std::abs(1 / R + H[i]);
+    const double force = 2 * pi * R * (0.5 / (R * R) + 20) - pi * R * R * o.last("pressure");
+    EXPECT_GT((z.back() - 1) / R, 20);  // its length
+    EXPECT_NEAR(o.last("force"), force, 1e-6 * force);
+    // It overshoots before tethers have formed; where the force falls, one of the two grows at the other's expense.
+    const std::vector<double>& forces = o["force"];
+    EXPECT_GT(*std::ranges::max_element(forces), 1.04 * forces.back());
+    for (std::size_t i = 0; i < o["parameter"].size(); ++i)
+        if (o["parameter"][i] == 2 || o["parameter"][i] == 4) {
+            EXPECT_EQ(o["negative_directions"][i], o["parameter"][i] == 2 ? 0 : 1);
+        }
+}
+
+// Under a force a run comes to the equilibrium, at the rate of its slowest mode, and its energy balances.
+TEST(Beads, runsRelax) {
+    const std::string at_force =
+        "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[model]\narea = \"free\"\nvolume = \"fixed\"\ntension = 10\n"
+        "bead_width = 0.2\nforce = 15\n[shape]\nkind = \"sphere\"\nradius = 1\n";
+    const Outcome o = run_case(
+        parse_case(at_force + "[accuracy]\nenergy = 1e-7\n[time]\nend = 0.3\noutput = [0.2, 0.22]\n", {}, "case.toml"));
+    const Case c = parse_case(at_force + "[equilibrium]\nmodes = 1\n", {}, "case.toml");
+    const Outcome e = run_shapes(c);
+    ASSERT_EQ(e.summary.stop.reason, Stop::finished) << e.summary.stop.message;
+    const double rest = e.last("bead_distance"), before = o.at("bead_distance", 0.2) - rest,
+                 after = o.at("bead_distance", 0.22) - rest;
+    EXPECT_NEAR(std::log(before / after) / 0.02, -e.last("growth_0"), 1e-2 * -e.last("growth_0"));
+    EXPECT_NEAR(o.last("free_energy"), e.last("free_energy"), 1e-6 * o.summary.reference_energy);
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-5 * o.summary.reference_energy);
+}
+
+// In Stokes flow the distance follows what is asked for; what holds it does the work; a kink jumps in the force.
+TEST(Beads, distanceIsHeld) {
+    const Outcome o = run_case(of(pulled, {"model={kind=\"stokes\", area=\"reservoir\", tension=10, bead_width=0.2, "
+                                           "extension={time=[0, 0.1, 0.2], value=[0, 0.4, 0.4]}}",
+                                           "time={end=0.2, output=[0.05, 0.1]}", "accuracy.energy=1e-3"}));
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double first = o["bead_distance"].front();
+    EXPECT_NEAR(o.at("bead_distance", 0.05) - first, 0.2, 1e-7);
+    EXPECT_NEAR(o.last("bead_distance") - first, 0.4, 1e-7);
+    EXPECT_GT(o.last("work"), 0.9 * (o.last("free_energy") - o["free_energy"].front()));
+    EXPECT_LT(o.last("force"), 0.98 * o.at("force", 0.1));
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-4 * o.summary.reference_energy);
+}
+
+TEST(Beads, refusals) {
+    const auto refused = [](const std::vector<std::string>& sets) {
+        return test::message_of<CaseError>([&] { run_case(of(pulled, sets)); });
+    };
+    EXPECT_NE(refused({"model.bead_width=1.2"}).find("is too large for this shape"), std::string::npos);
+    EXPECT_NE(
+        refused({"shape={kind=\"torus\", radius=2, tube_radius=0.5}"}).find("needs a closed shape with two poles"),
+        std::string::npos);
+    // A force that tethers do not withstand draws the membrane out of what its elements resolve.
+    const Outcome o =
+        run_case(of(pulled, {"model={area=\"free\", volume=\"fixed\", tension=10, bead_width=0.1, force=40}",
+                             "discretisation.elements=8"}));
+    EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
+    EXPECT_NE(o.summary.stop.message.find("an element near a bead"), std::string::npos) << o.summary.stop.message;
+}
+
+}  // namespace beads_test
+}  // namespace tubule::axisym
