@@ -281,12 +281,14 @@ BeadLoad CurveMotion::bead_load(double t) const {
 }
 
 double CurveMotion::length(const double* y) const {
-    return at_.bead < 0 ? space().length(y) : BeadForms::distance(bead_numbers(y));
+    return at_.bead < 0 ? space().length(y) : BeadEquations::distance(bead_numbers(y));
 }
 
 double CurveMotion::lengthening(const double* y, const double* rate) const {
     if (at_.bead >= 0)
-        return beads_->distance_slope(y, bead_numbers(y)).dot(Eigen::Map<const Eigen::VectorXd>(rate, space().size()));
+        return beads_->equations()
+            .distance_slope(beads_->on(y), bead_numbers(y))
+            .dot(Eigen::Map<const Eigen::VectorXd>(rate, space().size()));
     return law_.free_period ? space().images() * rate[at_.rise] : 0;
 }
 
@@ -352,7 +354,8 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
     set_numbers(t, y, stdx::reduce(area), stdx::reduce(volume), F);
     if (at_.bead >= 0) {
         beads_->add_force(y, bead_numbers(y), law_.inextensible ? F + at_.u_r : F);
-        Eigen::Map<BeadNumbers>(F + at_.bead) = beads_->residual(bead_load(t), y, bead_numbers(y));
+        Eigen::Map<BeadNumbers>(F + at_.bead) =
+            beads_->equations().residual(beads_->on(y), bead_load(t), bead_numbers(y));
     }
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
@@ -599,12 +602,12 @@ void CurveMotion::add_beads(double t, const double* y, double* values) const {
     beads_->add_hessian(y, bead_numbers(y), forms_.slots(), entries.data());
     const std::vector<int>& slots = law_.inextensible ? momentum_slots_ : curve_slots_;
     for (std::size_t i = 0; i < entries.size(); ++i) values[slots[i]] += entries[i];
-    const BeadForms::Slopes s = beads_->slopes(bead_load(t), y, bead_numbers(y));
+    const BeadEquations::Slopes s = beads_->equations().slopes(beads_->on(y), bead_load(t), bead_numbers(y));
     for (int k = 0; k < 4; ++k) {
         double* column = values + pattern_.outerIndexPtr()[at_.bead + k];
         const std::vector<int>& row = number_rows_.at(at_.bead + k);
         for (int i = 0; i < n; ++i) column[rows + i] += s.force_by_numbers(i, k);
-        for (int i = 0; i < n; ++i) values[row[i]] += s.equations_by_curve(k, i);
+        for (int i = 0; i < n; ++i) values[row[i]] += s.equations_by_shape(k, i);
         for (int j = 0; j < 4; ++j) values[row[at_.bead + j]] += s.equations_by_numbers(k, j);
     }
 }

@@ -109,17 +109,12 @@ void require_place(const Problem& c, const Curve& shape) {
 
 double bead_distance(const Problem& c, const Curve& shape) {
     constexpr int elements = 100;  // the distance to rounding
-    if (shape.topology != Topology::cell)
-        throw complaint(c, "model.bead_width", "needs a closed shape with two poles: its beads pull at them");
+    if (shape.topology != Topology::cell) require_beads(c, false, 0);
     const ArcLength arc(shape);
     const CurveSpace space(Topology::cell,
                            refined_at_beads(equal_breaks(elements), c.law.beads->width / 2, arc.total()), 5, 4);
     const double distance = BeadForms(space, c.law.beads->width).distance(fit(space, arc).data());
-    if (!(distance > 2 * c.law.beads->width))
-        throw complaint(c, "model.bead_width",
-                        fmt::format("is too large for this shape: beads of {:.4g} need a distance that is larger than "
-                                    "2 widths",
-                                    c.law.beads->width));
+    require_beads(c, true, distance);
     return distance;
 }
 

@@ -56,7 +56,7 @@ void StationarySystem::follow(const Eigen::VectorXd& change, Eigen::VectorXd& ou
 }
 
 double StationarySystem::length(const Eigen::VectorXd& u) const {
-    return bead_forms_ ? BeadForms::distance(bead_numbers(u)) : space_->length(u.data());
+    return bead_forms_ ? BeadEquations::distance(bead_numbers(u)) : space_->length(u.data());
 }
 
 Weights StationarySystem::weights(const Eigen::VectorXd& u) const {
@@ -73,7 +73,9 @@ void StationarySystem::set_constraints(const CurveObservation& o, const Eigen::V
     F.segment<2>(n) = equations(o, u).F;
     F[n + 2] = u[n + 2] - area_difference_force(problem_.bending, o.M);
     F[n + 3] = drifts() ? place_.dot(u.head(n)) : u[n + 3];
-    if (bead_forms_) F.segment<4>(beads()) = bead_forms_->residual(bead_load(), u.data(), bead_numbers(u));
+    if (bead_forms_)
+        F.segment<4>(beads()) =
+            bead_forms_->equations().residual(bead_forms_->on(u.data()), bead_load(), bead_numbers(u));
 }
 
 Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) const {
@@ -137,8 +139,9 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
     else
         corner(3, 3) = 1;
     if (bead_forms_) {
-        const BeadForms::Slopes s = bead_forms_->slopes(bead_load(), x.data(), bead_numbers(u));
-        columns.rightCols<4>() = s.force_by_numbers, rows.bottomRows<4>() = s.equations_by_curve;
+        const BeadEquations::Slopes s =
+            bead_forms_->equations().slopes(bead_forms_->on(x.data()), bead_load(), bead_numbers(u));
+        columns.rightCols<4>() = s.force_by_numbers, rows.bottomRows<4>() = s.equations_by_shape;
         corner.bottomRightCorner<4, 4>() = s.equations_by_numbers;
     }
 
@@ -167,14 +170,10 @@ Eigen::VectorXd StationarySystem::slope_of_M(const Eigen::VectorXd& x) const {
 
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
-    double value =
+    const double value =
         lagrangian(problem_, o.energy, o.area, o.volume, length(u), u[sigma()], u[lambda()]) + gauge_ * o.gauge;
     if (!bead_forms_) return value;
-    const BeadNumbers at = bead_numbers(u), F = bead_forms_->residual({}, u.data(), at);
-    value += at[1] * F[0] + at[3] * F[2];
-    if (const auto held = problem_.held_distance())
-        value -= bead_forms_->force(u.data(), at) * (BeadForms::distance(at) - *held);
-    return value;
+    return value + bead_forms_->equations().lagrangian(bead_forms_->on(u.data()), bead_load(), bead_numbers(u));
 }
 
 Eigen::VectorXd StationarySystem::way_down(const Eigen::VectorXd& u) const {
@@ -206,8 +205,12 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
         hessian += u[lambda()] * slopes.by_area_twice * area * area.transpose();
     }
     if (drifts()) fix(place_);
-    if (bead_forms_) hessian += bead_forms_->following_hessian(x.data(), bead_numbers(u));
-    if (problem_.held_distance()) fix(bead_forms_->distance_slope(x.data(), bead_numbers(u)));
+    if (bead_forms_) {
+        const BeadSurface on = bead_forms_->on(x.data());
+        const auto [columns, factors] = bead_forms_->equations().following(on, bead_numbers(u));
+        hessian += columns * factors.asDiagonal() * columns.transpose();
+        if (problem_.held_distance()) fix(bead_forms_->equations().distance_slope(on, bead_numbers(u)));
+    }
     const int constraints = static_cast<int>(fixed.cols()), free = n - constraints;
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints > 0 ? fixed : Eigen::MatrixXd::Zero(n, 1));
     if (constraints > 0) {

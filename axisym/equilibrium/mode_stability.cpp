@@ -75,7 +75,7 @@ J functional_density(const Bending& bending, const std::optional<Formula>& poten
     }
     for (int bead = 0; beads && bead < 2; ++bead) {
         const J place[]{d.r, d.z, J(shape.beads[2 * bead])};
-        sum += shape.beads[2 * bead + 1] * evaluate(beads->density(bead), place);
+        sum += shape.beads[2 * bead + 1] * evaluate(beads->equations().density(bead), place);
     }
     return square * inverse_area * sum + (shape.lambda / 2) * (d.r * n_r);
 }
@@ -129,8 +129,8 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
                 for (int bead = 0; beads_ && bead < 2; ++bead) {
                     const double P = shape.beads[2 * bead];
-                    p.bead[2 * bead] = slope_along_normal(beads_->density(bead), P, p);
-                    p.bead[2 * bead + 1] = slope_along_normal(beads_->density_by_P(bead), P, p);
+                    p.bead[2 * bead] = slope_along_normal(beads_->equations().density(bead), P, p);
+                    p.bead[2 * bead + 1] = slope_along_normal(beads_->equations().density_by_P(bead), P, p);
                 }
                 points_.push_back(p);
                 first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q]});
@@ -390,7 +390,7 @@ void ModeStability::add_beads(Forms& forms, Matrix& fixed) const {
     Vector lengthens = Vector::Zero(forms.mean.size());
     for (int k = 0; k < 2; ++k) {
         const double q = shape_.beads[2 * k + 1];
-        const auto [by_P, by_PP] = beads_->slopes_in_P(k, shape_.beads[2 * k], shape_.x.data());
+        const auto [by_P, by_PP] = beads_->equations().slopes_in_P(beads_->on(shape_.x.data()), k, shape_.beads[2 * k]);
         const Vector follows = -whole * forms.bead[2 * k] / by_P, with = q * forms.bead[2 * k + 1];
         forms.second_variation +=
             with * follows.transpose() + follows * with.transpose() + q * by_PP / whole * follows * follows.transpose();
@@ -425,13 +425,13 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
     }
     if (m == 0 && beads_) add_beads(forms, fixed);
     const std::vector<Potential>& potentials = problem_.bending.potentials;  // hold it in its place, but along planes
-    const bool free = std::ranges::none_of(potentials, &Potential::acts) && (m == 0 || !beads_);  // those on the axis
+    const bool free = std::ranges::none_of(potentials, &Potential::acts);
     const bool planes =
         std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
     const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());
-        if (!exists || mirror(parity) == (across ? -1 : 1) || !(free || (across && planes && !beads_))) continue;
+        if (!exists || mirror(parity) == (across ? -1 : 1) || !(free || (across && planes))) continue;
         const Vector motion = projection.solve(forms.rigid[k]);
         if (motion.dot(forms.mass * motion) < 1e-12 * forms.mass.sum()) continue;
         // Without friction a rigid motion dissipates nothing, and what it is orthogonal to does not matter.

@@ -87,6 +87,15 @@ void require_place(const Problem& c, bool closed, double energy, double distance
     if (!std::isfinite(energy)) refuse("must be finite on the initial shape");
 }
 
+void require_beads(const Problem& c, bool closed, double distance) {
+    const double width = c.law.beads->width;
+    const auto refuse = [&](const std::string& what) { throw complaint(c, "model.bead_width", what); };
+    if (!closed || !std::isfinite(distance))
+        refuse("needs a closed shape with two poles on the axis, where beads pull");
+    if (!(distance > 2 * width))
+        refuse(fmt::format("must be less than half of the distance of the poles, {:.4g}, not {:.4g}", distance, width));
+}
+
 namespace {
 
 constexpr double no_change = 1e-9;  // of E_ref: the shape was in equilibrium

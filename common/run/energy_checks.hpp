@@ -27,6 +27,9 @@ void require_pressure(const Problem& c, double volume);
 // point behind a wall (`distance` is the least one to a wall).
 void require_place(const Problem& c, bool closed, double energy, double distance);
 
+// CaseError where beads have no place on the initial shape: none with two poles, or poles that are too near.
+void require_beads(const Problem& c, bool closed, double distance);
+
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.
 std::string key_of_ill_posed(const Problem& c);

@@ -546,6 +546,42 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
     return out;
 }
 
+double DiscreteEnergy::place_integral(const CurvedMesh& mesh, const Formula& W, double P) const {
+    const Tabulation& table = space_.tabulation();
+    double sum = 0;
+    for (int cell = 0; cell < space_.cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const double place[]{p.x[0], p.x[1], p.x[2], P};
+            sum += table.weight[q] * p.area * evaluate(W, place);
+        }
+    }
+    return sum;
+}
+
+Eigen::VectorXd DiscreteEnergy::place_slope(const CurvedMesh& mesh, const Directions& directions, const Formula& W,
+                                            double P) const {
+    using J = Jet<double, 3, 1>;
+    const Tabulation& table = space_.tabulation();
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(space_.size());
+    for (int cell = 0; cell < space_.cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell), D = space_.gather<3>(directions.normal, cell);
+        for (int q = 0; q < table.points(); ++q) {
+            const Frame f(X, table, q);
+            const J place[]{J::variable(f.x[0], 0), J::variable(f.x[1], 1), J::variable(f.x[2], 2), J(P)},
+                w = evaluate(W, place);
+            const Eigen::Vector3d climbs = f.area * Eigen::Vector3d(w.d[0], w.d[1], w.d[2]),
+                                  along_t = w.v * f.area_slope.head<3>(), along_c = w.v * f.area_slope.tail<3>();
+            for (int a = 0; a < space_.width(); ++a)
+                out[space_.node(cell, a)] +=
+                    table.weight[q] *
+                    D.col(a).dot(table.value(a, q) * climbs + table.d[0](a, q) * along_t + table.d[1](a, q) * along_c);
+        }
+    }
+    return out;
+}
+
 Eigen::SparseMatrix<double> DiscreteEnergy::mass(const CurvedMesh& mesh, const Directions& directions) const {
     Eigen::SparseMatrix<double> out = pattern_;
     const Tabulation& table = space_.tabulation();

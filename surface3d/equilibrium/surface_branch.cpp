@@ -13,7 +13,8 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr double finer_by = 1.8;  // triangles of a finer mesh over those of the one before
+constexpr double finer_by = 1.8;      // triangles of a finer mesh over those of the one before
+constexpr double refined_bead = 0.5;  // before SurfaceSystem::coarsest_bead
 
 // What Follower asks for. The unknowns are displacements of a base that follows the branch.
 class SurfaceTier {
@@ -24,6 +25,7 @@ public:
     SurfaceTier(const StationaryProblem& problem, const SurfaceEquilibrium& start, const Settings& settings)
         : settings_(settings), system_(start.mesh, problem, start.H0), start_(system_.unknowns_at_base()) {
         start_[system_.sigma()] = start.sigma, start_[system_.lambda()] = start.lambda;
+        if (problem.beads) start_.segment<4>(system_.beads()) = start.beads.numbers;
         size_ = system_.size(start_);
         // The penalty on kinks belongs to the base, which was another one.
         int iterations = 0;
@@ -67,6 +69,7 @@ public:
         SurfaceEquilibrium e;
         e.mesh = system_.mesh(u);
         e.sigma = u[system_.sigma()], e.lambda = u[system_.lambda()], e.mu = u[system_.mu()];
+        e.beads = system_.bead_state(u);
         e.values = system_.values(u);
         e.reference_energy = reference_energy(problem, system_, u);
         e.estimated_error = std::max(settings_.accuracy, e.values.kinks / e.reference_energy);
@@ -93,8 +96,8 @@ public:
         Eigen::VectorXd u = place.u();
         Eigen::VectorXd along = place.tangent.head(system_.shape_size());
         Eigen::VectorXd others = place.tangent.tail(place.tangent.size() - along.size());
-        others.segment(3, SurfaceSystem::most_motions).setZero();
-        const bool finer = kinks(u) > most_kinks_;
+        others.segment(system_.motions() - system_.shape_size(), SurfaceSystem::most_motions).setZero();
+        const bool finer = kinks(u) > most_kinks_ || system_.bead_coarseness(u) > refined_bead;
         const int triangles = finer ? static_cast<int>(finer_by * system_.base().triangles()) : triangles_;
         if (triangles > settings_.max_triangles) return Renewal::impossible;
         const double parameter = place.parameter();

@@ -54,7 +54,7 @@ public:
             out_.stop = found ? Stop::finished : sound ? Stop::solver_failed : Stop::mesh_lost;
             keep(system, u);
             ++rounds_;
-            const bool enough = given ? rounds_ > 1 : found && out_.estimated_error <= settings_.accuracy;
+            const bool enough = given ? rounds_ > 1 : found && out_.estimated_error <= settings_.accuracy && resolved();
             triangles =
                 given ? settings_.triangles : static_cast<int>(refinement * std::max(triangles, out_.mesh.triangles()));
             if (enough || triangles > settings_.max_triangles || (!found && !given && rounds_ == most_attempts))
@@ -77,11 +77,12 @@ private:
     void keep(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         out_.mesh = system.mesh(u);
         out_.sigma = u[system.sigma()], out_.lambda = u[system.lambda()], out_.mu = u[system.mu()];
+        out_.beads = system.bead_state(u);
         out_.values = system.values(u);
         out_.reference_energy = reference_energy(problem_, system, u);
         out_.held_motions = system.held_motions();
         const double energy =
-            out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume, out_.mesh.period);
+            out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume, system.length(u));
         multipliers_ = u.tail(u.size() - system.shape_size());
         if (out_.stop != Stop::finished) {
             before_.reset(), out_.estimated_error = 1;
@@ -109,10 +110,16 @@ private:
         if (settings_.triangles == 0 && out_.estimated_error > settings_.accuracy)
             return end(Stop::resolution_lost, fmt::format("with {} triangles, the error of the energy is still {:.1e}",
                                                           out_.mesh.triangles(), out_.estimated_error));
+        if (!resolved())
+            return end(Stop::resolution_lost,
+                       fmt::format("with {} triangles, nodes near a bead are {:.2g} times model.bead_width apart",
+                                   out_.mesh.triangles(), out_.beads.coarseness));
         if (!out_.spectrum.doubt.empty())
             return end(Stop::resolution_lost, "the stability is undetermined: " + out_.spectrum.doubt);
         return end(Stop::finished, "");
     }
+
+    bool resolved() const { return out_.beads.coarseness <= SurfaceSystem::coarsest_bead; }
 
     SurfaceEquilibrium end(Stop stop, std::string message) {
         out_.stop = stop, out_.message = std::move(message);
@@ -150,7 +157,7 @@ SurfaceEquilibrium find_equilibrium(const StationaryProblem& problem, const Make
 double reference_energy(const StationaryProblem& problem, const SurfaceSystem& system, const Eigen::VectorXd& u) {
     const EnergyValues v = system.values(u);
     const Loads& loads = problem.loads;
-    const double length = system.mesh(u).period;
+    const double length = system.length(u);
     return std::max(std::abs(v.energy + loads.energy(v.area, v.volume, length)),
                     system.reference_energy(u) + loads.scale(v.area, v.volume, length));
 }

@@ -25,6 +25,7 @@ struct SurfaceEquilibrium {
     CurvedMesh mesh;
     Eigen::VectorXd H0;  // at the nodes, where it varies
     double sigma = 0, lambda = 0, mu = 0;
+    BeadState beads;
     EnergyValues values;                               // E with area differences
     double reference_energy = 0, estimated_error = 1;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
@@ -36,6 +37,11 @@ struct SurfaceEquilibrium {
     Stop stop = Stop::solver_failed;
     std::string message;
 };
+
+// L of theory.md (3.16).
+inline double length(const StationaryProblem& problem, const SurfaceEquilibrium& shape) {
+    return problem.beads ? BeadEquations::distance(shape.beads.numbers) : shape.mesh.period;
+}
 
 // A mesh of the initial shape of about this many triangles.
 using MakeMesh = std::function<CurvedMesh(int triangles)>;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/remesh.hpp"
 
 namespace tubule::surface3d {
@@ -74,7 +75,8 @@ Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, con
 bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
            p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
-           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty();
+           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty() &&
+           !p.beads;
 }
 
 // Whether both have the same first and second derivatives at given multipliers.
@@ -110,6 +112,7 @@ SurfaceSystem::SurfaceSystem(const CurvedMesh& base, const StationaryProblem& pr
     : problem_(problem), H0_(H0) {
     check_problem(problem, base.period);
     directions_.stretch = problem.free_period;
+    if (problem.beads) beads_.emplace(problem.beads->width, BeadEquations::in_space);
     set_mesh(base);
 }
 
@@ -214,7 +217,56 @@ CurvedMesh SurfaceSystem::mesh(const Eigen::VectorXd& u) const {
 Bending SurfaceSystem::bending(const Eigen::VectorXd& u) const {
     Bending out = problem_.bending;
     if (out.alpha) out.mu = u[mu()];
+    if (beads_)
+        out.potentials.push_back({.kind = Potential::Kind::formula,
+                                  .formula = std::make_shared<const Formula>(
+                                      parse_formula(beads_->force_density(bead_numbers(u)), Potential::in_space))});
     return out;
+}
+
+namespace {
+
+// Of nodes along the axis: where beads are looked for.
+std::array<double, 2> poles(const CurvedMesh& mesh) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Eigen::Vector3d& x : mesh.nodes) low = std::min(low, x.z()), high = std::max(high, x.z());
+    return {-low, high};
+}
+
+}  // namespace
+
+double bead_distance(const CurvedMesh& mesh, const Bending& bending, double width) {
+    const DiscreteEnergy energy(mesh, bending);
+    const BeadEquations beads(width, BeadEquations::in_space);
+    const BeadSurface on{[&](const Formula& W, double P) { return energy.place_integral(mesh, W, P); }, {}};
+    return BeadEquations::distance(beads.numbers(on, poles(mesh), 0));
+}
+
+BeadSurface SurfaceSystem::on(const Eigen::VectorXd& u) const {
+    const auto at = std::make_shared<const CurvedMesh>(mesh(u));
+    return {[this, at](const Formula& W, double P) { return energy_->place_integral(*at, W, P); },
+            [this, at](const Formula& W, double P) { return energy_->place_slope(*at, directions_, W, P); }};
+}
+
+double SurfaceSystem::bead_coarseness(const Eigen::VectorXd& u) const {
+    if (!beads_) return 0;
+    constexpr double near = 2;  // widths
+    const TriangleMesh at = corner_triangles(mesh(u));
+    const BeadNumbers numbers = bead_numbers(u);
+    double longest = 0;
+    for (const auto& corner : at.triangles) {
+        double distance = HUGE_VAL;
+        for (const int c : corner)
+            for (const double z : {-numbers[0], numbers[2]})
+                distance = std::min(distance, (at.points[c] - z * Eigen::Vector3d::UnitZ()).norm());
+        for (int c = 0; c < 3 && distance < near * beads_->width(); ++c)
+            longest = std::max(longest, (at.points[corner[(c + 1) % 3]] - at.points[corner[c]]).norm());
+    }
+    return longest / (beads_->width() * base_.order);
+}
+
+double SurfaceSystem::length(const Eigen::VectorXd& u) const {
+    return beads_ ? BeadEquations::distance(bead_numbers(u)) : mesh(u).period;
 }
 
 EnergyValues SurfaceSystem::values(const Eigen::VectorXd& u) const {
@@ -225,6 +277,9 @@ EnergyValues SurfaceSystem::values(const Eigen::VectorXd& u) const {
 
 void SurfaceSystem::set_followers(Eigen::VectorXd& u) const {
     u[mu()] = problem_.bending.alpha ? area_difference_force(problem_.bending, values(u).M) : 0;
+    if (beads_)
+        u.segment<4>(beads()) =
+            beads_->numbers(on(u), poles(mesh(u)), problem_.held_distance() ? bead_force(u) : problem_.loads.force);
 }
 
 const EnergyDerivatives& SurfaceSystem::derivatives(const Eigen::VectorXd& u) const {
@@ -244,7 +299,8 @@ void SurfaceSystem::set_constraints(const EnergyValues& v, const Eigen::VectorXd
     F[mu()] = u[mu()] - area_difference_force(problem_.bending, v.M);
     const Eigen::Index held = motions_.cols();
     F.tail(most_motions) = u.tail(most_motions);
-    F.segment(mu() + 1, held) = motions_.transpose() * u.head(shape_size());
+    F.segment(motions(), held) = motions_.transpose() * u.head(shape_size());
+    if (beads_) F.segment<4>(beads()) = beads_->residual(on(u), bead_load(), bead_numbers(u));
 }
 
 Eigen::VectorXd SurfaceSystem::constraint_residual(const Eigen::VectorXd& u) const {
@@ -255,7 +311,9 @@ Eigen::VectorXd SurfaceSystem::constraint_residual(const Eigen::VectorXd& u) con
 
 double SurfaceSystem::constraint_error(const Eigen::VectorXd& u) const {
     const EnergyValues v = values(u);
-    return tubule::constraint_error(problem_.constraints, equations(v, u), std::sqrt(v.area));
+    const double held = tubule::constraint_error(problem_.constraints, equations(v, u), std::sqrt(v.area));
+    const std::optional<double> distance = problem_.held_distance();
+    return distance ? std::max(held, std::abs(length(u) - *distance) / std::sqrt(v.area)) : held;
 }
 
 Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
@@ -266,7 +324,7 @@ Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
     const EnergyDerivatives& d = known ? *last_ : first;
     Eigen::VectorXd F(unknowns());
     F.head(shape_size()) =
-        d.energy + u[sigma()] * d.area + u[lambda()] * d.volume + motions_ * u.segment(mu() + 1, motions_.cols());
+        d.energy + u[sigma()] * d.area + u[lambda()] * d.volume + motions_ * u.segment(motions(), motions_.cols());
     if (problem_.free_period) F[shape_size() - 1] -= problem_.loads.force * base_.period;
     set_constraints(d.values, u, F);
     return F;
@@ -283,8 +341,14 @@ Eigen::SparseMatrix<double> SurfaceSystem::jacobian(const Eigen::VectorXd& u, do
     corner.topLeftCorner<2, 2>() = e.by_multipliers;
     if (problem_.bending.alpha) columns.col(2) = d.M, rows.row(2) = -*problem_.bending.alpha * d.M.transpose();
     const Eigen::Index held = motions_.cols();
-    columns.middleCols(3, held) = motions_, rows.middleRows(3, held) = motions_.transpose();
-    corner.diagonal().segment(3, held).setZero();
+    const int first = motions() - n;
+    columns.middleCols(first, held) = motions_, rows.middleRows(first, held) = motions_.transpose();
+    corner.diagonal().segment(first, held).setZero();
+    if (beads_) {
+        const BeadEquations::Slopes s = beads_->slopes(on(u), bead_load(), bead_numbers(u));
+        columns.middleCols<4>(3) = s.force_by_numbers, rows.middleRows<4>(3) = s.equations_by_shape;
+        corner.block<4, 4>(3, 3) = s.equations_by_numbers;
+    }
 
     Eigen::SparseMatrix<double> J(unknowns(), unknowns());
     const Eigen::SparseMatrix<double> H = damping != 0 ? d.hessian + damping * mass_ : d.hessian;
@@ -312,12 +376,13 @@ Eigen::SparseMatrix<double> SurfaceSystem::jacobian(const Eigen::VectorXd& u, do
 
 double SurfaceSystem::merit(const Eigen::VectorXd& u) const {
     const EnergyValues v = values(u);
-    return lagrangian(problem_, v.energy, v.area, v.volume, mesh(u).period, u[sigma()], u[lambda()]);
+    const double value = lagrangian(problem_, v.energy, v.area, v.volume, length(u), u[sigma()], u[lambda()]);
+    return beads_ ? value + beads_->lagrangian(on(u), bead_load(), bead_numbers(u)) : value;
 }
 
 Extents SurfaceSystem::extents(const Eigen::VectorXd& u) const {
     const EnergyValues v = values(u);
-    return {v.area, v.volume, mesh(u).period};
+    return {v.area, v.volume, length(u)};
 }
 
 double SurfaceSystem::size(const Eigen::VectorXd& u) const {
@@ -436,6 +501,12 @@ ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u) const 
     if (problem_.bending.alpha.value_or(0) != 0) append(A.low_rank, d.M), weigh(*problem_.bending.alpha);
     if (const double slope = problem_.loads.pressure_slope(d.values.volume); slope != 0)
         append(A.low_rank, d.volume), weigh(-slope);
+    if (!beads_) return A;
+    const BeadSurface at = on(u);
+    const auto [columns, weights] = beads_->following(at, bead_numbers(u));
+    for (Eigen::Index i = 0; i < weights.size(); ++i)
+        if (weights[i] != 0) append(A.low_rank, columns.col(i)), weigh(weights[i]);
+    if (problem_.held_distance()) append(A.constraints, beads_->distance_slope(at, bead_numbers(u)));
     return A;
 }
 

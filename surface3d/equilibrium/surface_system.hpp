@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/energy/bead_equations.hpp"
 #include "common/equilibrium/stationary_problem.hpp"
 #include "common/solve/bordered_ldlt.hpp"
 #include "surface3d/equilibrium/discrete_energy.hpp"
@@ -13,25 +14,37 @@
 
 namespace tubule::surface3d {
 
+// Of a surface with beads.
+struct BeadState {
+    BeadNumbers numbers = BeadNumbers::Zero();
+    double force = 0, coarseness = 0;  // see SurfaceSystem::bead_coarseness()
+};
+
 // u holds the displacements w_i along the normals of a base mesh, of a free period the stretch, then sigma, lambda, mu
-// = alpha (M - M0), and one multiplier for each motion that costs no energy and is held: rigid ones, and where the
-// energy has them dilations and conformal maps. These multipliers vanish up to the error of the mesh.
+// = alpha (M - M0), the numbers of beads, if there are any, and one multiplier for each motion that costs no energy and
+// is held: rigid ones, and where the energy has them dilations and conformal maps. These multipliers vanish up to the
+// error of the mesh.
 class SurfaceSystem {
 public:
     static constexpr int most_motions = 10;
+    static constexpr double coarsest_bead = 0.6;  // see bead_coarseness(): docs/decisions/equilibria.md
 
     // Throws as check_problem(). H0: at the nodes, where it varies.
     SurfaceSystem(const CurvedMesh& base, const StationaryProblem& problem, const Eigen::VectorXd& H0 = {});
 
     const StationaryProblem& problem() const { return problem_; }
     void set_problem(const StationaryProblem& problem);
-    int unknowns() const { return mu() + 1 + most_motions; }
+    int unknowns() const { return motions() + most_motions; }
     int shape_size() const { return space().size() + problem_.free_period; }
     int sigma() const { return shape_size(); }
     int lambda() const { return shape_size() + 1; }
     int mu() const { return shape_size() + 2; }
+    int beads() const { return mu() + 1; }
+    int motions() const { return beads() + (beads_ ? 4 : 0); }
     void set_followers(Eigen::VectorXd& u) const;
-    void follow(const Eigen::VectorXd& change, Eigen::VectorXd& out) const { out[mu()] = change[mu()]; }
+    void follow(const Eigen::VectorXd& change, Eigen::VectorXd& out) const {
+        out.segment(mu(), motions() - mu()) = change.segment(mu(), motions() - mu());
+    }
 
     Eigen::VectorXd residual(const Eigen::VectorXd& u) const;
     Eigen::SparseMatrix<double> jacobian(const Eigen::VectorXd& u, double damping) const;
@@ -40,6 +53,16 @@ public:
     double merit(const Eigen::VectorXd& u) const;
     Extents extents(const Eigen::VectorXd& u) const;
     double size(const Eigen::VectorXd& u) const;
+    double length(const Eigen::VectorXd& u) const;  // L of theory.md (3.16)
+    BeadNumbers bead_numbers(const Eigen::VectorXd& u) const {
+        return beads_ ? BeadNumbers(u.segment<4>(beads())) : BeadNumbers(BeadNumbers::Zero());
+    }
+    // The longest edge near a bead, over the width of its weight and the order: how far apart nodes are there.
+    double bead_coarseness(const Eigen::VectorXd& u) const;
+    double bead_force(const Eigen::VectorXd& u) const { return beads_ ? beads_->force(on(u), bead_numbers(u)) : 0; }
+    BeadState bead_state(const Eigen::VectorXd& u) const {
+        return {bead_numbers(u), bead_force(u), bead_coarseness(u)};
+    }
     double reference_energy(const Eigen::VectorXd& u) const;
     bool admissible(const Eigen::VectorXd& u) const;
     // Makes the shape the base; on a new mesh where its triangles have become bad, or about this many are asked for.
@@ -67,6 +90,8 @@ public:
 
 private:
     Bending bending(const Eigen::VectorXd& u) const;
+    BeadSurface on(const Eigen::VectorXd& u) const;
+    BeadLoad bead_load() const { return {problem_.loads.force, problem_.held_distance()}; }
     MultiplierEquations equations(const EnergyValues& v, const Eigen::VectorXd& u) const;
     void set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     const EnergyDerivatives& derivatives(const Eigen::VectorXd& u) const;
@@ -82,6 +107,7 @@ private:
     CurvedMesh base_;
     Eigen::VectorXd H0_;
     std::shared_ptr<DiscreteEnergy> energy_;
+    std::optional<BeadEquations> beads_;
     Ordering ordering_;  // of the shape's unknowns
     Directions directions_;
     Eigen::SparseMatrix<double> mass_;
@@ -96,6 +122,9 @@ private:
     mutable Eigen::VectorXd at_;
     mutable std::optional<EnergyDerivatives> last_;
 };
+
+// The distance of beads of this width on a closed surface.
+double bead_distance(const CurvedMesh& mesh, const Bending& bending, double width);
 
 // Unit normals at the nodes: means over the triangles around them.
 VectorField node_normals(const SurfaceSpace& space, const CurvedMesh& mesh);

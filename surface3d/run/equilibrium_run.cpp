@@ -27,11 +27,13 @@ struct Task {
     BranchSettings branch;
 };
 
-// With edges of twice the shortest range of a wall at most: of order 4 their nodes are half of it apart.
-int triangles_for(const std::vector<Potential>& potentials, double area) {
-    double out = 0;
-    for (const Potential& p : potentials)
-        if (p.is_wall()) out = std::max(out, area / (std::sqrt(3.0) * p.range * p.range));
+// With edges of twice the shortest range of a wall, or width of beads, at most: of order 4 their nodes are half of it
+// apart.
+int triangles_for(const Problem& c, double area) {
+    double shortest = c.law.beads ? c.law.beads->width : HUGE_VAL;
+    for (const Potential& p : c.energy.potentials)
+        if (p.is_wall()) shortest = std::min(shortest, p.range);
+    const double out = area / (std::sqrt(3.0) * shortest * shortest);
     return static_cast<int>(std::min(out, 1e6));
 }
 
@@ -46,10 +48,14 @@ Task task_of(const Problem& c, const Start& start) {
     require_place(c, mesh.period == 0, v.potential, distance);
     Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
+    if (c.law.beads) {
+        task.problem.bead_distance = bead_distance(mesh, c.energy, c.law.beads->width);
+        require_beads(c, mesh.period == 0, task.problem.bead_distance);
+    }
     SurfaceEquilibriumSettings& s = task.settings;
     s.accuracy = c.accuracy.energy;
     s.descend = c.equilibrium->descend;
-    s.first_triangles = std::max(s.first_triangles, triangles_for(c.energy.potentials, v.area));
+    s.first_triangles = std::max(s.first_triangles, triangles_for(c, v.area));
     s.near = std::holds_alternative<ResultFrame>(c.shape);
     s.modes = c.equilibrium->rates.value_or(1);
     if (!start.resizable())
@@ -110,15 +116,18 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     table.add({{"free_energy",
                 [](const ShapeRow& r) {
                     const EnergyValues& v = r.shape.values;
-                    return v.energy + r.problem.loads.energy(v.area, v.volume, r.shape.mesh.period);
+                    return v.energy + r.problem.loads.energy(v.area, v.volume, length(r.problem, r.shape));
                 }},
                {"area", [](const ShapeRow& r) { return r.shape.values.area; }},
                {"volume", [](const ShapeRow& r) { return r.shape.values.volume; }},
                {"reduced_volume",
                 [](const ShapeRow& r) { return reduced_volume(r.shape.values.area, r.shape.values.volume); }},
                {"tension", [](const ShapeRow& r) { return r.shape.sigma; }},
-               {"pressure", [](const ShapeRow& r) { return -r.shape.lambda; }},
-               {"negative_directions", [](const ShapeRow& r) {
+               {"pressure", [](const ShapeRow& r) { return -r.shape.lambda; }}});
+    if (c.law.beads)
+        table.add({{"force", [](const ShapeRow& r) { return r.shape.beads.force; }},
+                   {"bead_distance", [](const ShapeRow& r) { return length(r.problem, r.shape); }}});
+    table.add({{"negative_directions", [](const ShapeRow& r) {
                     return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
                 }}});
     std::vector<std::string> numbers;

@@ -228,7 +228,8 @@ TEST(Beads, refusals) {
     const auto refused = [](const std::vector<std::string>& sets) {
         return test::message_of<CaseError>([&] { run_case(of(pulled, sets)); });
     };
-    EXPECT_NE(refused({"model.bead_width=1.2"}).find("is too large for this shape"), std::string::npos);
+    EXPECT_NE(refused({"model.bead_width=1.2"}).find("must be less than half of the distance of the poles"),
+              std::string::npos);
     EXPECT_NE(
         refused({"shape={kind=\"torus\", radius=2, tube_radius=0.5}"}).find("needs a closed shape with two poles"),
         std::string::npos);

@@ -450,7 +450,9 @@ TEST(Branch, bothHalvesOfATranscriticalBifurcationOneOfAPitchfork) {
     std::vector<double> begins, at_25;
     for (const auto& p : all.points) {
         if (p.branch > 0 && p.kind == PointKind::bifurcation) begins.push_back(p.parameter);
-        if (p.branch == 0 && p.kind == PointKind::bifurcation) EXPECT_NEAR(p.parameter, -24, 1e-4);
+        if (p.branch == 0 && p.kind == PointKind::bifurcation) {
+            EXPECT_NEAR(p.parameter, -24, 1e-4);
+        }
         if (p.parameter == -25) at_25.push_back(p.shape.observed.energy - 25 * (4 * pi / 3 - p.shape.observed.volume));
     }
     ASSERT_EQ(begins.size(), 2u);

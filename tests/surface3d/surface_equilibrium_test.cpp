@@ -182,6 +182,41 @@ TEST(SurfaceEquilibrium, vesiclesAdhere) {
     EXPECT_EQ(e.spectrum.negative, 0);
 }
 
+// With beads: the Jacobian by central differences, and the gradient of the merit where positions follow from the shape.
+TEST(SurfaceSystem, beads) {
+    for (const std::optional<double> held : {std::optional<double>(), std::optional(0.1)}) {
+        StationaryProblem problem{{.k = {0.5, 0.02, 0.03}, .H0 = -0.3}, {{}, 4.5, {}}};
+        problem.loads.tension = 3, problem.loads.force = held ? 0 : 2;
+        problem.beads = Beads{0.5, held ? std::optional(Ramp(*held)) : std::nullopt}, problem.bead_distance = 2.3;
+        const SurfaceSystem system(spheroid(80, 1, 1.2), problem);
+        Eigen::VectorXd u = system.unknowns_at_base(), w = Eigen::VectorXd::Zero(u.size());
+        for (int i = 0; i < system.motions(); ++i) w[i] = std::sin(3 * i + 1);
+        u.head(system.shape_size()) = 1e-3 * w.head(system.shape_size());
+        u[system.lambda()] = -4;
+        u.segment<4>(system.beads()) << 1.1, -1.8, 1.15, -2.1;
+        const auto slope = [](const auto& f, double h) -> decltype(f(h)) {
+            return (8 * (f(h / 2) - f(-h / 2)) - (f(h) - f(-h))) / (6 * h);
+        };
+        const Eigen::VectorXd by_J = system.jacobian(u, 0) * w,
+                              by_F = slope([&](double h) { return system.residual(u + h * w); }, 2e-4);
+        EXPECT_LT((by_J - by_F).norm(), 1e-6 * by_J.norm());
+        if (held) continue;
+        u[system.lambda()] = 0, u[system.sigma()] = 3;
+        system.set_followers(u);
+        StationaryProblem free = problem;
+        free.constraints = {};
+        SurfaceSystem unconstrained(spheroid(80, 1, 1.2), free);
+        const auto merit = [&](double h) {
+            Eigen::VectorXd at = u;
+            at.head(system.shape_size()) += h * w.head(system.shape_size());
+            unconstrained.set_followers(at);
+            return unconstrained.merit(at);
+        };
+        const double expected = unconstrained.residual(u).head(system.shape_size()).dot(w.head(system.shape_size()));
+        EXPECT_NEAR(slope(merit, 2e-4), expected, 1e-6 * std::abs(expected));
+    }
+}
+
 // Waves of a straight tube under tension and pressure, two each (four with m > 0): theory.md (5.8).
 TEST(SurfaceSpectrum, straightTube) {
     const double length = 5;
