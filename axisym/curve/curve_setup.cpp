@@ -73,6 +73,17 @@ std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, co
                                         c.law.free_period);
 }
 
+// No other shape has the area and the volume of a sphere, or of a straight tube with its period: what would deform it
+// is refused, since no multiplier then holds the volume.
+void refuse_to_deform(const Problem& c) {
+    const std::string why =
+        "would deform a sphere or a straight tube whose area and volume are fixed, and no other shape has these: free "
+        "one of them (model.area, model.volume), or begin with another shape";
+    if (c.law.beads) throw complaint(c, "model.bead_width", why);
+    if (!c.energy.potentials.empty()) throw complaint(c, "energy.potential", why);
+    if (c.energy.H0_varies()) throw complaint_about_H0(c, why);
+}
+
 // H0 is a property of the points of the initial shape.
 void fix_H0(const Problem& c, CurveForms& forms, const Eigen::VectorXd& x) {
     if (!c.energy.H0_varies()) return;
@@ -181,7 +192,10 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
     // Where area and volume are the same condition, one multiplier has no value.
     const bool keeps_both = law.keeps_volume && !law.area_is_free() && !law.free_period;
-    if (keeps_both && variation <= same_everywhere) law.keeps_volume = false;
+    if (keeps_both && variation <= same_everywhere) {
+        refuse_to_deform(c);
+        law.keeps_volume = false;
+    }
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
     if (c.energy.H0_varies()) motion->fix_H0(x);

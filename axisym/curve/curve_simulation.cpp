@@ -23,6 +23,9 @@ constexpr double start_steps = 40;                 // over which steps grow wher
 constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
 constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
 constexpr int few_steps = 8;
+const char* const too_far =
+    "fixed area and volume allow only some distances of the beads: free one of them, end the extension earlier, or try "
+    "another accuracy";
 const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
 constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
 constexpr double tiny_step = 1e-9;
@@ -199,6 +202,12 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     keep_good();
 }
 
+// Whether area, volume and the distance of beads are held.
+bool CurveSimulation::holds_all() const {
+    const MotionLaw& law = setup_.motion->law();
+    return law.beads && law.beads->extension && law.keeps_volume && !law.area_is_free();
+}
+
 // By a reservoir, and by what holds the distance of beads.
 double CurveSimulation::power_supplied(const Snapshot& s) const {
     return s.balance.supplied + s.balance.loads.force * past_.extends;
@@ -263,7 +272,7 @@ std::optional<StopReport> CurveSimulation::advance(double until) {
         return undefined_pressure(now_.pressure_domain, t);
     if (outcome_ == TimeIntegrator::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + integrator_->failure(),
-                          another_resolution};
+                          holds_all() ? too_far : another_resolution};
     if (outcome_ == TimeIntegrator::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
     return find_rise(observe(t, integrator_->x(), integrator_->v()));
 }

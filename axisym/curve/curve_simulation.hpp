@@ -71,6 +71,7 @@ private:
     void compare(double t, const Snapshot& s);
     double share(double t) const;
     double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }
+    bool holds_all() const;
     double power_supplied(const Snapshot& s) const;
     void keep_good();
     void add_to_trace(double t);

@@ -31,7 +31,7 @@ struct Variation {
 // (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
-    // Of unknowns beside the curve.
+    // How many unknowns stand beside the curve.
     static int numbers(const StationaryProblem& problem) { return problem.beads ? 8 : 4; }
     int numbers() const { return numbers(problem_); }
     // Throws as set_problem().
@@ -142,7 +142,7 @@ Eigen::VectorXd unknowns(const StationaryProblem& problem, const Equilibrium& sh
 // The axial force of an equilibrium, theory.md (3.19): given, or what holds a period or the distance of beads.
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 
-// Of half a curve: directions that lower the energy and do not mirror themselves, of at most 10; else 0.
+// Directions of half a curve that lower the energy and do not mirror themselves, 10 at most; 0 of a whole curve.
 int directions_without_mirror(const StationaryProblem& problem, const Equilibrium& shape);
 
 // The same grading with another number of elements.

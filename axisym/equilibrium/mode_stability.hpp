@@ -38,8 +38,8 @@ public:
     // for half a curve, of those that mirror themselves and those that do so with a change of sign. Throws SolveError
     // if the eigenproblem is not solved.
     ModeRates rates(int m, const MotionLaw& law, int count = 3) const;
-    // Of m = 0 in gradient flow: displacements of a half curve that mirror themselves, or change their sign at its
-    // planes of symmetry; of a whole curve all are even.
+    // Rates of m = 0 in gradient flow: displacements of a half curve that mirror themselves, or change their sign at
+    // its planes of symmetry; of a whole curve all are even.
     std::vector<double> axisymmetric_rates(bool even, int count) const;
 
 private:

@@ -31,7 +31,7 @@ struct BranchChoices {
     std::optional<double> to, step;
     std::optional<int> mode;  // it bifurcates from the first shape along this mode, 1 the lowest
     bool branches = false;    // also those that bifurcate from it, one after another
-    // Of the mode where a bifurcating branch begins, over the radius of a sphere of this area.
+    // Amplitude of the mode where a bifurcating branch begins, over the radius of a sphere of this area.
     std::optional<double> amplitude;
 };
 

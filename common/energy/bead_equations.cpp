@@ -128,7 +128,7 @@ Eigen::VectorXd BeadEquations::distance_slope(const BeadSurface& on, const BeadN
     return out;
 }
 
-// Of each bead q (2 d(dG/dP) dP + d^2G/dP^2 dP^2), the product as a difference of two squares.
+// Each bead has q (2 d(dG/dP) dP + d^2G/dP^2 dP^2), the product written as a difference of two squares.
 BeadEquations::Following BeadEquations::following(const BeadSurface& on, const BeadNumbers& at) const {
     Following out;
     for (int k = 0; k < 2; ++k) {

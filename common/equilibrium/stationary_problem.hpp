@@ -61,7 +61,7 @@ ReducedVolumeSlopes reduced_volume_slopes(double reduced_volume, double area);
 // Deviation of area and volume from what is held, 0 for what is free, in units of a length.
 double constraint_error(const Constraints& c, const MultiplierEquations& equations, double length);
 
-// Of a shape: what may be held, with L of theory.md (3.16).
+// What a shape has and may be held, with L of theory.md (3.16).
 struct Extents {
     double area, volume, length;
 };

@@ -27,7 +27,7 @@ struct Beads {
     double width = 0;  // of the weight that places a bead
     std::optional<Ramp> extension{};
 
-    // Of the distance that is held, none where the force is given.
+    // Rate and kinks of the distance that is held; none where the force is given.
     double rate(double t) const { return extension ? extension->slope(t) : 0; }
     double next_kink(double t) const { return extension ? extension->next_kink(t) : HUGE_VAL; }
     bool change() const { return extension && !extension->is_constant(); }

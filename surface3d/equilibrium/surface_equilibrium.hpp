@@ -29,7 +29,7 @@ struct SurfaceEquilibrium {
     EnergyValues values;                               // E with area differences
     double reference_energy = 0, estimated_error = 1;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
-    // Of displacements along the normal, with the mass INT w^2 dS: the rates of gradient flow are minus its values.
+    // Spectrum of displacements along the normal, mass INT w^2 dS: minus its values are the rates of gradient flow.
     SurfaceSpectrum spectrum;
     std::vector<int> wave_numbers;  // of its vectors: see SurfaceSystem
     int held_motions = 0;

@@ -226,7 +226,7 @@ Bending SurfaceSystem::bending(const Eigen::VectorXd& u) const {
 
 namespace {
 
-// Of nodes along the axis: where beads are looked for.
+// The ends of the surface along the axis, outward: where beads are looked for.
 std::array<double, 2> poles(const CurvedMesh& mesh) {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (const Eigen::Vector3d& x : mesh.nodes) low = std::min(low, x.z()), high = std::max(high, x.z());

@@ -14,7 +14,7 @@
 
 namespace tubule::surface3d {
 
-// Of a surface with beads.
+// The beads of a surface, zeros without any.
 struct BeadState {
     BeadNumbers numbers = BeadNumbers::Zero();
     double force = 0, coarseness = 0;  // see SurfaceSystem::bead_coarseness()
@@ -83,7 +83,7 @@ public:
     SurfaceSpectrum spectrum(const Eigen::VectorXd& u, int count) const;
     // Its negative directions alone.
     int index(const Eigen::VectorXd& u) const;
-    // Of a surface of revolution: the wave number m around its axis of each displacement of the nodes, one column each,
+    // The wave number m around the axis of a surface of revolution of each displacement of the nodes, one column each,
     // if that has one; -1 where there is none.
     std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
     int held_motions() const { return static_cast<int>(motions_.cols()); }

@@ -212,9 +212,10 @@ TEST(Beads, runsRelax) {
 
 // In Stokes flow the distance follows what is asked for; what holds it does the work; a kink jumps in the force.
 TEST(Beads, distanceIsHeld) {
-    const Outcome o = run_case(of(pulled, {"model={kind=\"stokes\", area=\"reservoir\", tension=10, bead_width=0.2, "
-                                           "extension={time=[0, 0.1, 0.2], value=[0, 0.4, 0.4]}}",
-                                           "time={end=0.2, output=[0.05, 0.1]}", "accuracy.energy=1e-3"}));
+    const Case c = of(pulled, {"model={kind=\"stokes\", area=\"reservoir\", tension=10, bead_width=0.2, "
+                               "extension={time=[0, 0.1, 0.2], value=[0, 0.4, 0.4]}}",
+                               "time={end=0.2, output=[0.05, 0.1]}", "accuracy.energy=1e-3"});
+    const Outcome o = run_case(c);
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     const double first = o["bead_distance"].front();
     EXPECT_NEAR(o.at("bead_distance", 0.05) - first, 0.2, 1e-7);
@@ -222,6 +223,14 @@ TEST(Beads, distanceIsHeld) {
     EXPECT_GT(o.last("work"), 0.9 * (o.last("free_energy") - o["free_energy"].front()));
     EXPECT_LT(o.last("force"), 0.98 * o.at("force", 0.1));
     for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-4 * o.summary.reference_energy);
+    // Interrupted and resumed it ends alike.
+    const Outcome part = run_case(c, nullptr, [](double t) { return t > 0.12; });
+    ASSERT_EQ(part.summary.stop.reason, Stop::interrupted) << part.summary.stop.message;
+    const Outcome rest = run_case(c, &part.log.checkpoints.back());
+    EXPECT_EQ(rest.summary.stop.reason, Stop::finished) << rest.summary.stop.message;
+    EXPECT_NEAR(rest.last("bead_distance"), o.last("bead_distance"), 1e-7);
+    EXPECT_NEAR(rest.last("force"), o.last("force"), 1e-3 * o.last("force"));
+    EXPECT_LT(std::abs(rest.last("identity_defect")), 1e-4 * o.summary.reference_energy);
 }
 
 TEST(Beads, refusals) {
@@ -233,6 +242,13 @@ TEST(Beads, refusals) {
     EXPECT_NE(
         refused({"shape={kind=\"torus\", radius=2, tube_radius=0.5}"}).find("needs a closed shape with two poles"),
         std::string::npos);
+    EXPECT_NE(refused({"model={kind=\"stokes\", bead_width=0.2, force=1}"}).find("no other shape has these"),
+              std::string::npos);
+    const Outcome full =
+        run_case(of(pulled, {"model={kind=\"stokes\", bead_width=0.2, extension={time=[0, 1], value=[0, 1]}}",
+                             "shape={kind=\"ellipsoid\", a=1, b=1, c=1.1}"}));
+    EXPECT_EQ(full.summary.stop.reason, Stop::solver_failed);
+    EXPECT_NE(full.summary.stop.advice.find("fixed area and volume"), std::string::npos) << full.summary.stop.advice;
     // A force that tethers do not withstand draws the membrane out of what its elements resolve.
     const Outcome o =
         run_case(of(pulled, {"model={area=\"free\", volume=\"fixed\", tension=10, bead_width=0.1, force=40}",

@@ -432,7 +432,8 @@ TEST(Ensembles, pressuresThatCeaseToBeDefinedStopARun) {
     Model model{.keeps_volume = false, .pressure_of_volume = of_volume("0.1/(5 - V)")};
     const Outcome o = run_case(case_of(bending(0.1), Sphere{1, {}}, model, 1000));
     EXPECT_EQ(o.summary.stop.reason, Stop::undefined) << o.summary.stop.message;
-    EXPECT_NE(o.summary.stop.message.find("the pressure is hardly defined any more at the volume 4.99"), std::string::npos)
+    EXPECT_NE(o.summary.stop.message.find("the pressure is hardly defined any more at the volume 4.99"),
+              std::string::npos)
         << o.summary.stop.message;
     for (const double F : o["free_energy"]) EXPECT_TRUE(std::isfinite(F));
     model.pressure_of_volume = of_volume("1/(V - 3)");  // the energy is counted from V = 1

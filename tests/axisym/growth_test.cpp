@@ -105,7 +105,8 @@ TEST(Growth, wavesFollowTheDispersionRelation) {
 
 TEST(Growth, wavesOfTermsThatACaseAddsFollowTheDispersionRelation) {
     // theory.md (5.3), (5.6) for any density, as common/theory has them.
-    const Bending definite = with_terms(bending(0.2, -0.5), {powers(0.02, 6, 0), powers(0.03, 4, 2), powers(0.1, 2, 2)});
+    const Bending definite =
+        with_terms(bending(0.2, -0.5), {powers(0.02, 6, 0), powers(0.03, 4, 2), powers(0.1, 2, 2)});
     const Bending indefinite = with_terms(bending(0.2, -0.5), {powers(0.05, 2, 1), powers(-0.03, 1, 1)});
     const Bending odd = with_terms(bending(0.2, -0.5), {powers(0.03, 3, 0), powers(-0.02, 1, 2), powers(0.01, 0, 3)});
     const Bending general = with_terms(bending(0.2, -0.5), {formula(0.1, "sqrt(1 + (H - H0)^2 + K^2) + 0.3*H*K")});

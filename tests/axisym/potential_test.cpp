@@ -209,6 +209,7 @@ TEST(Potential, wallsAreNotPassed) {
         EXPECT_NE(begins({formula}, still).find("energy.potential must be finite on the initial shape"),
                   std::string::npos);
     }
+    EXPECT_NE(begins({"shape={kind=\"sphere\", radius=1}"}, false).find("no other shape has these"), std::string::npos);
     const auto refusal = [&](const std::vector<std::string>& sets) {
         return test::message_of<CaseError>([&] { parse_case(at_wall, sets, "case.toml"); });
     };

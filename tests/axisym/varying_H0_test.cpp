@@ -1,4 +1,5 @@
 // A spontaneous curvature that varies along a profile: derivatives, forces, motions and equilibria.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -228,6 +229,20 @@ TEST(VaryingH0, motionsLoseWhatTheyDissipateAndEndAtRest) {
                                   {"model.kind=overdamped", "model.volume=free"});
     ASSERT_EQ(rest.summary.stop.reason, Stop::finished) << rest.summary.stop.message;
     EXPECT_NEAR(rest.last("energy"), 4.3320484329, 1e-6 * rest.summary.reference_energy);
+}
+
+// A sphere of fixed area and volume is the only shape that has both.
+TEST(VaryingH0, aSphereOfFixedAreaAndVolumeIsRefused) {
+    for (const char* model : {"kind = \"overdamped\"", "area = \"fixed\"\nvolume = \"fixed\""}) {
+        const std::string text = fmt::format(
+            "tier = \"axisym\"\n[energy]\nk20 = 0.5\nH0 = \"-1 + 3*sin(6*area)\"\n[model]\n{}\n"
+            "[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 0.1\n",
+            model);
+        EXPECT_NE(test::message_of<CaseError>([&] {
+                      run_case(parse_case(text, {}, "case.toml"));
+                  }).find("no other shape has these"),
+                  std::string::npos);
+    }
 }
 
 TEST(VaryingH0, aConstantFormulaIsTheNumber) {

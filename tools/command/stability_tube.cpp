@@ -195,7 +195,7 @@ void add_factors(const TubeSubject& subject, ModelReport& report) {
     report.radius_at_end = end.radius;
 }
 
-// Of a tube that is a minimum for all waves that fit its length and m = 0 ... last.
+// For a tube that is a minimum for all waves that fit its length and m = 0 ... last.
 void add_mean_squares(double kT, const TubeSubject& subject, int last, ModelReport& report) {
     const UniformTube& tube = report.tube;
     const MotionLaw& law = report.problem.law;

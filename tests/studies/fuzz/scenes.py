@@ -6,12 +6,12 @@ asked for a thirtieth of the accuracy; where they differ by more than the run st
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
 
-    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places]
+    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places | --beads]
 
 prints how true and stated errors compare over many scenes, for a program and for one of before: a run that finishes
 rightly with that one and now stops or does not know its error is a *false alarm*. With --ensembles, every scene has
 random rules and loads; otherwise every other one. With --places, all are closed surfaces at a wall, a particle or in a field; where
-their volume is free, most are under osmosis.
+their volume is free, most are under osmosis. With --beads, two beads draw a closed surface apart, by a force or by an extension.
 
     scenes.py TUBULE --print N                       the case of scene N
 
@@ -144,10 +144,21 @@ def place(draw, case, size, modulus):
         model["pressure"] = f"{number(pressure)}*({number(4.2 * size**3 * draw.uniform(0.3, 1.5))}/V - 1)"
 
 
-def scene(draw, ensembles=0.5, places=False):
-    """The case of a scene; `ensembles` is the probability of random rules and loads."""
+def pull(draw, case, size, modulus):
+    """Draws a closed surface apart by beads at its poles."""
+    model, end = case["model"], case["time"]["end"]
+    model["bead_width"] = number(size * math.exp(draw.uniform(math.log(0.08), math.log(0.25))))
+    if model["kind"] == "fluid" or draw.random() < 0.4:
+        model["force"] = draw_load(draw, 8 * modulus * size, end)
+    else:
+        until = number(end * draw.uniform(0.2, 1))
+        model["extension"] = {"time": [0.0, until], "value": [0.0, number(size * draw.uniform(-0.3, 1))]}
+
+
+def scene(draw, ensembles=0.5, at=None):
+    """The case of a scene; `ensembles` is the probability of random rules and loads; `at`: what acts at places, place() or pull()."""
     shape, size = draw_shape(draw)
-    while places and shape["kind"] == "tube":
+    while (at and shape["kind"] == "tube") or (at is pull and shape["kind"] == "torus"):
         shape, size = draw_shape(draw)
     energy, modulus = draw_energy(draw, size)
     kind = draw.choice(MODELS)
@@ -169,8 +180,8 @@ def scene(draw, ensembles=0.5, places=False):
         "accuracy": {"energy": number(asked)},
         "time": {"end": number(end), "output": [number(end * 10 ** (-i / 2)) for i in range(12, 0, -1)]},
     }
-    if places:
-        place(draw, case, size, modulus)
+    if at:
+        at(draw, case, size, modulus)
     return case
 
 
@@ -273,7 +284,7 @@ def wild(rng, case):
 
 
 def one(rng, box):
-    case = scene(rng, places=rng.random() < 0.25)
+    case = scene(rng, at=rng.choice((None, None, place, pull)))
     tame = rng.random() < 0.5
     if not tame:
         wild(rng, case)
@@ -293,8 +304,8 @@ def one(rng, box):
 # ------------------------------------------------------------------------------------------------ many scenes
 
 
-def scene_number(n, ensembles, places):
-    return scene(random.Random(f"scene {n}"), ensembles, places)
+def scene_number(n, ensembles, at):
+    return scene(random.Random(f"scene {n}"), ensembles, at)
 
 
 def judge(n, case, programs, top):
@@ -342,17 +353,18 @@ def main():
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--save", type=Path, help="a line of JSON for each scene")
     parser.add_argument("--ensembles", action="store_const", const=1, default=0.5, help="in every scene")
-    parser.add_argument("--places", action="store_true", help="closed surfaces at walls, particles and in fields")
+    parser.add_argument("--places", dest="at", action="store_const", const=place, help="closed surfaces at walls, particles and in fields")
+    parser.add_argument("--beads", dest="at", action="store_const", const=pull, help="closed surfaces that two beads draw apart")
     parser.add_argument("--print", type=int)
     a = parser.parse_args()
     if a.print is not None:
-        print(toml.dump(scene_number(a.print, a.ensembles, a.places)), end="")
+        print(toml.dump(scene_number(a.print, a.ensembles, a.at)), end="")
         return 0
     programs = {"now": a.program} | ({"before": a.before} if a.before else {})
     lines = []
     for n in range(a.first, a.first + a.count):
         with tempfile.TemporaryDirectory() as top:
-            lines.append(judge(n, scene_number(n, a.ensembles, a.places), programs, top))
+            lines.append(judge(n, scene_number(n, a.ensembles, a.at), programs, top))
         if a.save:
             a.save.write_text("".join(json.dumps(x) + "\n" for x in lines))
     report(lines)
