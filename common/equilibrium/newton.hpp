@@ -60,12 +60,15 @@ public:
             const double noise = 1e-13 * scale_;
             if (!step.sound || (step.feasible && gain < 0.1 * step.predicted - noise)) {
                 damping_ *= 5;
-                if (damping_ > 1e12 * damping_start_) return false;
+                if (damping_ <= 1e12 * damping_start_) continue;
+                if (step.feasible || farthest_ < least) return false;
+                farthest_ /= 4, damping_ = damping_start_;
                 continue;
             }
             const double length = relative(step.to - u_);
             u_ = step.to;
             if (system_.rebase(u_)) lu_ = system_.factors();
+            farthest_ = std::min(2 * farthest_, farthest);
             if (!step.feasible) continue;
             if (length < tolerance && damping_ < 1e-3 * damping_start_) return true;
             if (length < tolerance || gain > 0.6 * step.predicted) damping_ /= 6;
@@ -89,6 +92,9 @@ private:
         return false;
     }
 
+    // Steps for the sake of area and volume; where no damping makes these sound, as beside a sphere, shorter ones.
+    static constexpr double farthest = 0.05, least = 1e-3;
+
     auto shape(const Eigen::VectorXd& u) const { return u.head(system_.shape_size()); }
     double relative(const Eigen::VectorXd& step) const {
         return shape(step).template lpNorm<Eigen::Infinity>() / size_;
@@ -108,7 +114,6 @@ private:
 
     // One damped step, then corrections that bring area and volume to what they were meant to be.
     Attempt attempt() {
-        constexpr double farthest = 0.05;  // for the sake of area and volume
         const int n = system_.shape_size();
         Attempt out;
         system_.set_followers(u_);
@@ -119,7 +124,7 @@ private:
             Eigen::VectorXd force = F, off = F;
             force.tail(F.size() - n).setZero(), off.head(n).setZero();
             const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
-            const double off_before = system_.constraint_error(u_), part = std::min(1.0, farthest / relative(back));
+            const double off_before = system_.constraint_error(u_), part = std::min(1.0, farthest_ / relative(back));
             const Eigen::VectorXd step = down + part * back, dx = step.head(n);
             Eigen::VectorXd within = Eigen::VectorXd::Zero(u_.size());
             within.head(n) = dx, system_.follow(step, within);
@@ -147,6 +152,7 @@ private:
     int& iterations_;
     double size_;
     double scale_, damping_start_, damping_;
+    double farthest_ = farthest;
     decltype(std::declval<const System&>().factors()) lu_;
 };
 

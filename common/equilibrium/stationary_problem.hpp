@@ -34,6 +34,9 @@ struct StationaryProblem {
     }
 };
 
+// Whether shapes of all sizes have the same energy, and nothing acts on them.
+bool scale_free(const StationaryProblem& problem);
+
 // Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
 // constraints that contradict each other, and for values that no shape has. `period`: 0 of a closed surface.
 void check_problem(const StationaryProblem& problem, double period);

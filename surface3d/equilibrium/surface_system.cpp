@@ -72,13 +72,6 @@ Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, con
     return out;
 }
 
-bool scale_free(const StationaryProblem& p) {
-    return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
-           p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
-           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty() &&
-           !p.beads;
-}
-
 // Whether both have the same first and second derivatives at given multipliers.
 bool same_energy(const Bending& a, const Bending& b) {
     if (a.H0 != b.H0 || count_terms(a) != count_terms(b) || a.alpha.has_value() != b.alpha.has_value()) return false;

@@ -194,6 +194,20 @@ TEST(EquilibriumCase, whatIsHeld) {
     EXPECT_NEAR(outcome(single, {"equilibrium.held=volume"}).at("tension", 0), 0, 0);
 }
 
+// From nearly a sphere, where area and volume are nearly one condition, to the prolate of tests/surface3d and its
+// energy (tier axisym to 1e-10, from c = 1.4). A size that the energy does not determine stays.
+TEST(EquilibriumCase, beginsBesideASphere) {
+    const std::string text =
+        "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[shape]\nkind = \"ellipsoid\"\na = 1\nb = 1\nc = 1.05\n"
+        "[accuracy]\nenergy = 1e-7\n[equilibrium]\nreduced_volume = 0.9\n";
+    for (const char* held : {"area-and-volume", "reduced-volume"}) {
+        const Outcome o = outcome(text, {fmt::format("equilibrium.held={}", held)});
+        EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        EXPECT_NEAR(o.at("energy", 0), 29.899015632, 1e-6);
+        EXPECT_NEAR(2 * o.at("tension", 0) * o.at("area", 0) - 3 * o.at("pressure", 0) * o.at("volume", 0), 0, 1e-5);
+    }
+}
+
 // theory.md (3.21), (3.23): the equilibrium radius under a tension and a pressure, also where a motion would leave it.
 TEST(EquilibriumCase, restsUnderTensionAndPressure) {
     const std::string sphere = R"(tier = "axisym"
