@@ -496,6 +496,8 @@ equilibrium = {modes = 2, area = 41.074}
         self.refuses("with the volume free", self.write("fluid.toml", FLUID), "--set", 'model.volume="free"', "--tension", "1")
         self.refuses("a picture is written as", self.tube, "--plot", "waves.txt")
         self.refuses("apply only to straight tubes", self.write("cell.toml", CAPSULE), "--plot", "cell.svg")
+        sphere = self.write("pulled.toml", 'tier = "axisym"\nenergy.k20 = 1.0\nshape = {kind = "sphere", radius = 1.0}\nmodel.bead_width = 0.2\ntime.end = 1.0\n')
+        self.refuses("its rates are those of equilibrium.modes", sphere)
         self.refuses("missing.hdf", self.folder / "missing.hdf")
         for option in ("--tension", "--Re", "--gamma"):
             for number in ("nan", "inf", "1e999"):

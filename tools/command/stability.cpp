@@ -222,9 +222,9 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     std::optional<TubeSubject> tube;
     if (subject.frame ? subject.frame->mesh.has_value() : subject.c.unknowns == Unknowns::surface_equilibrium)
         return surface_report(options, subject);
-    // Closed forms have a pressure that does not change with the volume, and no potentials.
-    const bool closed_form =
-        !options.numerical && !subject.c.model.pressure_of_volume && subject.c.energy.potentials.empty();
+    // Closed forms have a pressure that does not change with the volume, and nothing that acts at places.
+    const bool closed_form = !options.numerical && !subject.c.model.pressure_of_volume &&
+                             subject.c.energy.potentials.empty() && !subject.c.law.beads;
     if (closed_form) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
     if (tube) {
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
