@@ -125,9 +125,12 @@ private:
             force.tail(F.size() - n).setZero(), off.head(n).setZero();
             const Eigen::VectorXd down = -lu_.solve(force), back = -lu_.solve(off);
             const double off_before = system_.constraint_error(u_), part = std::min(1.0, farthest_ / relative(back));
-            const Eigen::VectorXd step = down + part * back, dx = step.head(n);
+            const Eigen::VectorXd step = down + part * back;
+            // The force of beads changes where a step changes their distance: that is no curvature.
+            const Eigen::VectorXd& along = system_.problem().beads ? down : step;
+            const Eigen::VectorXd dx = along.head(n);
             Eigen::VectorXd within = Eigen::VectorXd::Zero(u_.size());
-            within.head(n) = dx, system_.follow(step, within);
+            within.head(n) = dx, system_.follow(along, within);
             const double curvature = dx.dot((J * within).head(n));
             if (!(curvature >= 0) || !(relative(step) < 0.3)) return out;
             out.predicted = curvature / 2;

@@ -93,7 +93,9 @@ void require_beads(const Problem& c, bool closed, double distance) {
     if (!closed || !std::isfinite(distance))
         refuse("needs a closed shape with two poles on the axis, where beads pull");
     if (!(distance > 2 * width))
-        refuse(fmt::format("must be less than half of the distance of the poles, {:.4g}, not {:.4g}", distance, width));
+        refuse(fmt::format(
+            "must be small beside the shape: beads of {:.4g} are {:.4g} apart, and need two widths at least", width,
+            distance));
 }
 
 namespace {

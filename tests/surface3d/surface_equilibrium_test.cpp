@@ -205,6 +205,16 @@ TEST(SurfaceSystem, beads) {
     }
 }
 
+// A mesh that does not resolve the beads is refused, not answered.
+TEST(SurfaceEquilibrium, beadsNeedFineMeshes) {
+    StationaryProblem problem{{.k = {0.5}}, {{}, 4 * pi / 3, {}}};
+    problem.loads.tension = 10, problem.loads.force = 0.1, problem.beads = Beads{0.12, std::nullopt};
+    const auto make = [](int triangles) { return spheroid(triangles, 0.99, 1.02); };
+    const SurfaceEquilibrium e = find_equilibrium(problem, make, {.triangles = 80});
+    EXPECT_EQ(e.stop, Stop::resolution_lost);
+    EXPECT_NE(e.message.find("times model.bead_width apart"), std::string::npos) << e.message;
+}
+
 // Waves of a straight tube under tension and pressure, two each (four with m > 0): theory.md (5.8).
 TEST(SurfaceSpectrum, straightTube) {
     const double length = 5;
