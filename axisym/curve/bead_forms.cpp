@@ -22,13 +22,16 @@ BeadNumbers BeadForms::numbers(const double* x, double force) const {
 }
 
 void BeadForms::add_force(const double* x, const BeadNumbers& at, double* out) const {
-    for (int k = 0; k < 2; ++k) add_potential_gradient(space_, equations_.density(k), at[2 * k + 1], x, out, at[2 * k]);
+    for (int k = 0; k < 2; ++k)
+        if (equations_.has_bead(k))
+            add_potential_gradient(space_, equations_.density(k), at[2 * k + 1], x, out, at[2 * k]);
 }
 
 void BeadForms::add_hessian(const double* x, const BeadNumbers& at, const std::vector<int>& slots,
                             double* values) const {
     for (int k = 0; k < 2; ++k)
-        add_potential_hessian(space_, equations_.density(k), at[2 * k + 1], x, slots, values, at[2 * k]);
+        if (equations_.has_bead(k))
+            add_potential_hessian(space_, equations_.density(k), at[2 * k + 1], x, slots, values, at[2 * k]);
 }
 
 double BeadForms::coarseness(const double* x) const {
@@ -38,7 +41,7 @@ double BeadForms::coarseness(const double* x) const {
     const Eigen::VectorXd curve = Eigen::Map<const Eigen::VectorXd>(x, space_.size());
     const int n = static_cast<int>(breaks.size()) - 1;
     double longest = 0;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = equations_.has_bead(0) ? 0 : 1; k < 2; ++k) {
         const CurveSample pole = space_.evaluate(curve, k);
         for (int i = 0; i < n; ++i) {
             const int e = k == 0 ? i : n - 1 - i;
@@ -50,7 +53,8 @@ double BeadForms::coarseness(const double* x) const {
     return longest / width;
 }
 
-std::vector<double> refined_at_beads(const std::vector<double>& breaks, double width, double length) {
+std::vector<double> refined_at_beads(Topology topology, const std::vector<double>& breaks, double width,
+                                     double length) {
     constexpr double at_bead = 1.0 / 3, growth = 0.2;  // size over the width; its growth with the distance
     std::vector<double> out{breaks.front()};
     for (std::size_t e = 0; e + 1 < breaks.size(); ++e) {
@@ -58,7 +62,8 @@ std::vector<double> refined_at_beads(const std::vector<double>& breaks, double w
         // Allowed at the end that is nearer to a pole: sizes are halved until they fit.
         std::vector<double> ends{to};
         while (!ends.empty()) {
-            const double from = out.back(), distance = std::min(from, 1 - ends.back());
+            const double from = out.back(), to_end = 1 - ends.back(),
+                         distance = topology == Topology::cell ? std::min(from, to_end) : to_end;
             if (ends.back() - from <= at_bead * width / length + growth * distance ||
                 ends.back() - from < 1e-6 * left) {
                 out.push_back(ends.back());

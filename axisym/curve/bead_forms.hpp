@@ -1,7 +1,9 @@
-// Two beads at the poles of a closed profile curve, theory.md (2.23): BeadEquations in the coefficients of the curve.
+// Two beads at the poles of a closed profile curve, or one at the pole of a patch, theory.md (2.23): BeadEquations in
+// the coefficients of the curve.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "axisym/splines/curve_space.hpp"
@@ -11,8 +13,9 @@ namespace tubule::axisym {
 
 class BeadForms {
 public:
-    // Keeps the space, of a whole closed curve, which must outlive it.
-    BeadForms(const CurveSpace& space, double width) : space_(space), equations_(width, BeadEquations::on_profile) {}
+    // Keeps the space, of a whole closed curve or a cap, which must outlive it; `foot`: the height of a cap's ring.
+    BeadForms(const CurveSpace& space, double width, std::optional<double> foot = {})
+        : space_(space), equations_(width, BeadEquations::on_profile, foot) {}
 
     const BeadEquations& equations() const { return equations_; }
     // The curve x, which must outlive it.
@@ -36,6 +39,6 @@ private:
 };
 
 // The same breaks, of a curve of this length, with elements added that resolve the weights of the beads.
-std::vector<double> refined_at_beads(const std::vector<double>& breaks, double width, double length);
+std::vector<double> refined_at_beads(Topology topology, const std::vector<double>& breaks, double width, double length);
 
 }  // namespace tubule::axisym

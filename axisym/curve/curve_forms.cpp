@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_local.hpp"
+#include "axisym/curve/shape_integrals.hpp"
 #include "axisym/curve/varying_H0.hpp"
 #include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/pack.hpp"
@@ -522,11 +523,14 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
         Eigen::Vector2d before = top(e > 0 ? e - 1 : n - 1), after = top(e < n ? e : 0);
         if (mirror && e == 0) before = Eigen::Vector2d(-r.start * after[0], -z.start * after[1]);
         if (mirror && e == n) after = Eigen::Vector2d(-r.end * before[0], -z.end * before[1]);
+        if ((e == 0 && splines.cell().open_start) || (e == n && splines.cell().open_end)) continue;
         const double left = size(e > 0 ? e - 1 : mirror ? 0 : n - 1), right = size(e < n ? e : mirror ? n - 1 : 0);
         const CurveSample at = space_.evaluate(x, breaks[e]);
         const Eigen::Vector2d normal = Eigen::Vector2d(at.z1, -at.r1).normalized();
         jump[e] = 2 * normal.dot(after - before) / (left + right);
     }
+    if (splines.cell().open_start) jump[0] = jump[1];
+    if (splines.cell().open_end) jump[n] = jump[n - 1];
     std::vector<double> defect(n);
     for (int e = 0; e < n; ++e)
         defect[e] = images_ * splines.bernoulli_norm() / 4 * std::pow(size(e), 2 * (p - 1)) * stiffness[e] *
@@ -547,6 +551,8 @@ double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
             for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
         }
     const CurveObservation o = observe(x);
+    if (space_.is_patch())
+        magnitude += patch_scale(bending_, std::max(space_.evaluate(x, 0).r, space_.evaluate(x, 1).r));
     return std::max(std::abs(o.energy), images_ * magnitude + o.energy_alpha + o.potential.magnitude);
 }
 

@@ -27,9 +27,10 @@ ShapeMeasures measures(const CurveSpace& space, const Eigen::VectorXd& x) {
     const auto at = [&](double s) { return space.evaluate(x, s); };
     const CurveSample south = at(0), north = at(1), middle = at(space.images() == 2 ? 1 : 0.5);
     ShapeMeasures m;
-    m.height = space.closed() ? space.images() * (north.z - south.z) : space.length(x.data());
+    m.height = space.closed() || space.is_patch() ? space.images() * (north.z - south.z) : space.length(x.data());
     m.r_middle = middle.r;
     if (space.closed()) m.pole_curvature = -south.z2 / (south.r1 * south.r1);
+    if (space.topology() == Topology::cap) m.pole_curvature = north.z2 / (north.r1 * north.r1);
     const int n = 4 * space.splines().elements();
     int widest = 0;
     for (int i = 0; i <= n; ++i) {
@@ -58,7 +59,7 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
         const CurveSample at = space.evaluate(x, t);
         p.emplace_back(at.r, at.z);
     }
-    const int first = space.closed() ? 1 : 0, last = space.topology() == Topology::cell ? n - 2 : n - 1;
+    const int first = space.begins_at_pole() ? 1 : 0, last = space.ends_at_pole() ? n - 2 : n - 1;
     for (int i = first; i <= last; ++i)
         if (!(p[i][0] > 0)) return std::array{s[i], s[i]};
     // A half that crosses a plane of symmetry away from its ends meets its mirror image there.

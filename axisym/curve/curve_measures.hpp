@@ -10,10 +10,10 @@
 namespace tubule::axisym {
 
 struct ShapeMeasures {
-    double height = 0;          // from pole to pole along the axis, or the period
+    double height = 0;          // from pole to pole or from end to end of a patch along the axis, or the period
     double r_middle = 0;        // radius at s = 1/2 of the whole curve: the equator, if symmetric
     double r_max = 0;           // refined between quadrature points
-    double pole_curvature = 0;  // kappa at the south pole, negative where convex; 0 for tubes
+    double pole_curvature = 0;  // kappa at the south pole, of a cap at its pole, negative where convex; else 0
     double asymmetry = 0;       // largest |r(s) - r(1 - s)|, |z(s) + z(1 - s) - 2 z(1/2)| sampled; 0 for halves
 };
 // Measures the whole curve x, in units of the case.

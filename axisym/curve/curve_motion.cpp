@@ -85,7 +85,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     const S tension = ((2 * law.viscosity) * stretch_s - p) * ig2;
     if (law.inertia != 0) {
         // What a reservoir feeds has the velocity of the membrane at every point: only the pressure sees it.
-        const S half = law.reservoir ? S(0.0) : 0.5 * divergence,
+        const S half = law.reservoir && !law.open_rim ? S(0.0) : 0.5 * divergence,
                 advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
         force_r += law.inertia * (f.ur_t + advect * f.v[ur1] + half * u - w * w * inverse_r);
         force_z += law.inertia * (f.uz_t + advect * f.v[uz1] + half * v);
@@ -178,25 +178,42 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.swirl = add(law.inextensible && law.swirls, space.r().size());
     at_.p = add(law.inextensible, pressure_.size());
     at_.tension = add(law.keeps_area, 1);
-    at_.supply = add(law.reservoir, 1);
+    at_.supply = add(law.reservoir && !law.open_rim, 1);
     at_.stretch = add(space.free_period(), 1);
     at_.lambda = add(law.keeps_volume || law.pressure_of_volume, 1);
     at_.area = add(law.inextensible && law.holds_area, 1);
     at_.volume = add(law.inextensible && law.keeps_volume && law.holds_volume, 1);
-    const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2;
+    const bool held = law.inertia != 0 || law.friction != 0 || space.images() == 2 || space.is_patch();
     at_.drift = add(law.inextensible && !held, 1);
     at_.mu = add(bending.alpha.has_value(), 1);
     at_.bead = add(law.beads.has_value(), 4);
-    if (law.beads) beads_.emplace(space, law.beads->width);
+    const int ends = space.topology() == Topology::strip ? 2 : 1, conditions = ends * (law.rim == Rim::clamped ? 3 : 2);
+    at_.rim = add(space.is_patch(), conditions);
+    if (law.open_rim)
+        for (int end = 0; end < ends; ++end) open_rims_.emplace_back(space, end, law.rim);
+    const int flow_conditions = !law.inextensible ? 0 : law.open_rim ? conditions - ends : conditions;
+    at_.rim_flow = add(space.is_patch() && law.inextensible, flow_conditions);
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
     for (const int number : {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume,
                              at_.drift, at_.mu, at_.shift})
         if (number >= 0) numbers_.push_back(number);
     for (int i = 0; i < 4 && at_.bead >= 0; ++i) numbers_.push_back(at_.bead + i);
+    for (int i = 0; i < conditions && at_.rim >= 0; ++i) {
+        numbers_.push_back(at_.rim + i);
+        if (i < flow_conditions) numbers_.push_back(at_.rim_flow + i);
+    }
+    if (law.beads && !space.is_patch()) beads_.emplace(space, law.beads->width);
     parts_ = {{&space.r(), at_.r},   {&space.z(), at_.z},     {&space.r(), at_.u_r},
               {&space.z(), at_.u_z}, {&space.r(), at_.swirl}, {&pressure_, at_.p}};
     set_pattern();
+}
+
+// The place of an entry in the values of a matrix with pattern().
+int CurveMotion::slot_of(int row, int column) const {
+    const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
+    const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
+    return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
 }
 
 void CurveMotion::set_pattern() {
@@ -225,11 +242,6 @@ void CurveMotion::set_pattern() {
         }
     pattern_.resize(at_.size, at_.size);
     pattern_.setFromTriplets(entries.begin(), entries.end());
-    const auto slot_of = [&](int row, int column) {
-        const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
-        const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
-        return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
-    };
     for (int e = 0; e < n; ++e) {
         const std::vector<int> dofs = local_dofs(e);
         for (const int column : dofs)
@@ -268,6 +280,106 @@ Weights CurveMotion::force_weights(double t, const double* y) const {
             .area = law_.inextensible ? 0 : tension,
             .volume = at_.lambda < 0 ? -loads.pressure : y[at_.lambda],
             .M = at_.mu < 0 ? 0 : y[at_.mu]};
+}
+
+void CurveMotion::hold_rings(const Eigen::VectorXd& x) {
+    const std::vector<Ring> rings = rings_of(space(), x, law_.rim);
+    rim_ = rim_functionals(space(), rings);
+    rim_values_ = rim_.transpose() * x;
+    if (law_.beads) beads_.emplace(space(), law_.beads->width, rings.front().z);
+}
+
+// The forces that hold the ends of a patch, and the conditions that they belong to.
+void CurveMotion::hold_rim(double t, const double* y, double* F) const {
+    using Vector = Eigen::VectorXd;
+    const Eigen::Index n = rim_.rows(), count = rim_.cols();
+    const auto hold = [&](int field, int number) {
+        Eigen::Map<Vector>(F + field, n) += rim_ * Eigen::Map<const Vector>(y + number, count);
+        Eigen::Map<Vector>(F + number, count) = rim_.transpose() * Eigen::Map<const Vector>(y + field, n);
+    };
+    hold(0, at_.rim);
+    Eigen::Map<Vector>(F + at_.rim, count) -= rim_values_;
+    if (law_.open_rim)
+        hold_open_rim(t, y, F);
+    else if (at_.rim_flow >= 0)
+        hold(at_.u_r, at_.rim_flow);
+}
+
+void CurveMotion::hold_open_rim(double t, const double* y, double* F) const {
+    const Eigen::Map<const Eigen::VectorXd> x(y, space().size()), u(y + at_.u_r, space().size());
+    Eigen::Map<Eigen::VectorXd> rows(F + at_.u_r, space().size());
+    int number = at_.rim_flow;
+    for (const OpenRim& rim : open_rims_) {
+        for (const Eigen::SparseMatrix<double>& B : rim.conditions()) {
+            F[number] = x.dot(B * u);
+            rows += y[number] * (B.transpose() * x);
+            ++number;
+        }
+        const OpenRim::Pull pull = rim.pull(forms_.bending(), law_.tension.at(t), y);
+        for (int i = 0; i < 2; ++i) rows[pull.rows[i]] += pull.values[i];
+        const OpenRim::VolumeAtEnd volume = rim.volume_at_end(y);
+        rows[volume.z] -= force_weights(t, y).volume * volume.by_z;
+        if (law_.keeps_volume) F[at_.lambda] -= volume.by_z * u[volume.z];
+    }
+}
+
+void CurveMotion::add_open_rim(double t, const double* y, double* values) const {
+    const int n = space().size();
+    const Eigen::Map<const Eigen::VectorXd> x(y, n), u(y + at_.u_r, n);
+    int number = at_.rim_flow;
+    for (const OpenRim& rim : open_rims_) {
+        for (const Eigen::SparseMatrix<double>& B : rim.conditions()) {
+            const Eigen::VectorXd by_u = B.transpose() * x, by_x = B * u;
+            const std::vector<int>& row = number_rows_.at(number);
+            double* column = values + pattern_.outerIndexPtr()[number];
+            for (int i = 0; i < n; ++i) {
+                values[row[i]] += by_x[i], values[row[at_.u_r + i]] += by_u[i];
+                column[at_.u_r + i] += by_u[i];
+            }
+            for (int j = 0; j < n; ++j)
+                for (Eigen::SparseMatrix<double>::InnerIterator it(B, j); it; ++it)
+                    values[slot_of(at_.u_r + j, static_cast<int>(it.row()))] += y[number] * it.value();
+            ++number;
+        }
+        const OpenRim::Pull pull = rim.pull(forms_.bending(), law_.tension.at(t), y);
+        for (int i = 0; i < 2; ++i)
+            for (std::size_t k = 0; k < pull.columns.size(); ++k)
+                values[slot_of(at_.u_r + pull.rows[i], pull.columns[k])] +=
+                    pull.slopes(i, static_cast<Eigen::Index>(k));
+        const OpenRim::VolumeAtEnd volume = rim.volume_at_end(y);
+        values[slot_of(at_.u_r + volume.z, volume.r)] -= force_weights(t, y).volume * volume.by_z_r;
+        if (at_.lambda < 0) continue;
+        values[slot_of(at_.u_r + volume.z, at_.lambda)] -= volume.by_z;
+        if (!law_.keeps_volume) continue;
+        values[slot_of(at_.lambda, at_.u_r + volume.z)] -= volume.by_z;
+        values[slot_of(at_.lambda, volume.r)] -= volume.by_z_r * u[volume.z];
+    }
+}
+
+// Kinetic energy that membrane brings through open rims, per time.
+double CurveMotion::rim_supply(const double* y) const {
+    double sum = 0;
+    for (const OpenRim& rim : open_rims_) {
+        const auto [out, square] = rim.outflow(y, y + at_.u_r);
+        sum -= law_.inertia / 2 * square * out;
+    }
+    return sum;
+}
+
+void CurveMotion::add_rim(double t, const double* y, double* values) const {
+    const auto n = static_cast<int>(rim_.rows());
+    const auto add = [&](int field, int number) {
+        const std::vector<int>& row = number_rows_.at(number);
+        double* column = values + pattern_.outerIndexPtr()[number];
+        const int condition = number - (field == 0 ? at_.rim : at_.rim_flow);
+        for (int i = 0; i < n; ++i)
+            column[field + i] += rim_(i, condition), values[row[field + i]] += rim_(i, condition);
+    };
+    for (int k = 0; k < rim_.cols(); ++k) {
+        add(0, at_.rim + k);
+        if (at_.rim_flow >= 0 && !law_.open_rim) add(at_.u_r, at_.rim_flow + k);
+    }
+    if (law_.open_rim) add_open_rim(t, y, values);
 }
 
 void CurveMotion::set_followers(Eigen::VectorXd& y) const {
@@ -357,6 +469,7 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
         Eigen::Map<BeadNumbers>(F + at_.bead) =
             beads_->equations().residual(beads_->on(y), bead_load(t), bead_numbers(y));
     }
+    if (at_.rim >= 0) hold_rim(t, y, F);
     if (at_.stretch < 0) return true;
     F[at_.rise] = rate[at_.rise] - y[at_.stretch] * y[at_.rise];
     F[at_.stretch] += gradient_at(force_weights(t, y), y).dot(stretched(y)) - law_.force.at(t) * space().length(y);
@@ -402,6 +515,7 @@ void CurveMotion::jacobian(double t, const double* y, const double* rate, double
     add_forms(t, y, values);
     add_numbers(y, values);
     if (at_.bead >= 0) add_beads(t, y, values);
+    if (at_.rim >= 0) add_rim(t, y, values);
     if (at_.stretch >= 0) add_stretch(t, y, cj, values);
 }
 
@@ -658,7 +772,7 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             const Pack shear = 0.5 * (f.v[w1] - w * r_s / r) * ig;
             const Pack kinetic_here = (0.5 * law_.inertia) * dS * square;
             kinetic += kinetic_here;
-            if (law_.reservoir) supplied += kinetic_here * (ss + tt);
+            if (at_.supply >= 0) supplied += kinetic_here * (ss + tt);
             dissipation += dS * (law_.friction * square + 2 * law_.viscosity * (ss * ss + tt * tt + 2 * shear * shear));
             acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
             momentum += dS * v;
@@ -669,7 +783,7 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             pull += dS * (2 * law_.viscosity * ss - f.v[p0]) * z_s * z_s * ig * ig;
             speed = stdx::max(speed, square);
         }
-    out.kinetic = stdx::reduce(kinetic), out.supplied = stdx::reduce(supplied);
+    out.kinetic = stdx::reduce(kinetic), out.supplied = stdx::reduce(supplied) + rim_supply(y);
     out.dissipation = stdx::reduce(dissipation);
     out.momentum_z = space().images() == 2 ? 0 : stdx::reduce(momentum);  // the other half has the opposite
     out.angular_z = stdx::reduce(angular);
@@ -688,6 +802,12 @@ Loads CurveMotion::loads_of(double t, const double* y, double tension, double pu
     if (!law_.area_is_free()) out.tension = law_.inextensible ? tension : weights.area;
     out.pressure = -weights.volume;
     if (at_.bead >= 0) out.force = beads_->force(y, bead_numbers(y));
+    if (space().topology() == Topology::strip) {  // what the second ring does in a translation along the axis
+        Eigen::VectorXd rows = Eigen::VectorXd::Zero(at_.size);
+        hold_rim(t, y, rows.data());
+        const int n = space().z().size(), first = (law_.inextensible ? at_.u_z : at_.z) + n / 2;
+        out.force = -rows.segment(first, n - n / 2).sum();
+    }
     const double length = space().length(y);
     if (at_.stretch < 0 && length > 0) {
         const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(y, space().size());

@@ -9,6 +9,8 @@
 
 #include "axisym/curve/bead_forms.hpp"
 #include "axisym/curve/curve_forms.hpp"
+#include "axisym/curve/open_rim.hpp"
+#include "axisym/curve/rim_conditions.hpp"
 #include "common/model/model.hpp"
 
 namespace tubule::axisym {
@@ -25,6 +27,7 @@ struct CurveLaw : MotionLaw {
     bool holds_area = true, holds_volume = true;
     bool lagrangian = false;  // the parametrisation is material, X_t = u, instead of even; u is X_t.nu in gradient flow
     bool swirls = false;      // u has a component around the axis
+    bool open_rim = false;    // of a patch whose reservoir is beyond its rings, where membrane flows in: OpenRim
 };
 
 // Offsets of the unknowns y: the curve X = (r, z) as CurveSpace has it; the periodic part of the velocity u = (u_r,
@@ -32,16 +35,17 @@ struct CurveLaw : MotionLaw {
 // Many fields: one for each unknown of any law.
 struct MotionLayout {
     int r = 0, z = 0, u_r = -1, u_z = -1, swirl = -1, p = -1;
-    int rise = -1;               // of a free period, the last coefficient of the curve
-    int tension = -1;            // of an extensible membrane: multiplier of A(X) = A0, the force tension H nu
-    int supply = -1;             // of a reservoir: the number that div u is everywhere
-    int stretch = -1;            // of a free period L: L_t/L, the velocity has the part (L_t/L) z e_z
-    int lambda = -1;             // force -lambda nu, which keeps the volume: INT u.nu = 0; or -P(V), theory.md (3.24)
-    int area = -1, volume = -1;  // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
-    int drift = -1;              // of INT u_z = 0, where nothing else holds the curve in its place
-    int mu = -1;                 // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
-    int bead = -1;               // first of BeadNumbers
-    int shift = -1;              // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
+    int rise = -1;                // of a free period, the last coefficient of the curve
+    int tension = -1;             // of an extensible membrane: multiplier of A(X) = A0, the force tension H nu
+    int supply = -1;              // of a reservoir: the number that div u is everywhere
+    int stretch = -1;             // of a free period L: L_t/L, the velocity has the part (L_t/L) z e_z
+    int lambda = -1;              // force -lambda nu, which keeps the volume: INT u.nu = 0; or -P(V), theory.md (3.24)
+    int area = -1, volume = -1;   // multipliers of A(X) = A0, V(X) = V0, against drift: zero except for errors in time
+    int drift = -1;               // of INT u_z = 0, where nothing else holds the curve in its place
+    int mu = -1;                  // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
+    int bead = -1;                // first of BeadNumbers
+    int rim = -1, rim_flow = -1;  // of a patch, first multipliers of rim_functionals(): of the curve, of the velocity
+    int shift = -1;               // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
     int size = 0;
 };
 
@@ -60,8 +64,9 @@ struct InitialState {
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
 // pressure that is given stands for -lambda; where it is a formula of the volume, lambda + P(V) = 0. A free period adds
-// (L_t/L) z e_z to u, and the test function z e_z. Beads add SUM q dG[v] (BeadForms). Many fields: besides the problem,
-// the places of all its terms in the matrix, found once.
+// (L_t/L) z e_z to u, and the test function z e_z. Beads add SUM q dG[v] (BeadForms). Where a patch ends, multipliers
+// hold the curve, and the velocity at zero or, where the rim is open, along the membrane. Many fields: besides the
+// problem, the places of all its terms in the matrix, found once.
 class CurveMotion {
 public:
     // `gauge` is the weight c of J; area and volume those to be kept. The space must outlive the motion.
@@ -76,6 +81,8 @@ public:
     const MotionLayout& layout() const { return at_; }
     // Before anything else where H0 varies: see CurveForms. The parametrisation must be material.
     void fix_H0(const Eigen::VectorXd& x) { forms_.fix_H0(x); }
+    // Likewise of a patch: holds its rings where the curve x has them.
+    void hold_rings(const Eigen::VectorXd& x);
     // Likewise where the distance of beads is held: that of the curve x and their extension.
     void hold_beads(const Eigen::VectorXd& x) { bead_distance0_ = beads_->distance(x.data()); }
     const SplineSpace& pressures() const { return pressure_; }
@@ -125,6 +132,12 @@ private:
     BeadLoad bead_load(double t) const;
     BeadNumbers bead_numbers(const double* y) const { return Eigen::Map<const BeadNumbers>(y + at_.bead); }
     void add_beads(double t, const double* y, double* values) const;
+    void hold_rim(double t, const double* y, double* F) const;
+    void add_rim(double t, const double* y, double* values) const;
+    void hold_open_rim(double t, const double* y, double* F) const;
+    void add_open_rim(double t, const double* y, double* values) const;
+    double rim_supply(const double* y) const;
+    int slot_of(int row, int column) const;
     void add_stretch(double t, const double* y, double cj, double* values) const;
     PointNumbers point_numbers(double t, const double* y) const;
     Eigen::VectorXd velocity(const double* y) const;
@@ -150,6 +163,9 @@ private:
     CurveForms forms_;
     CurveLaw law_;
     std::optional<BeadForms> beads_;
+    Eigen::MatrixXd rim_;         // rim_functionals()
+    Eigen::VectorXd rim_values_;  // of the curve
+    std::vector<OpenRim> open_rims_;
     double gauge_, area0_, volume0_, bead_distance0_ = 0;
     SplineSpace pressure_;
     MotionLayout at_;

@@ -11,8 +11,8 @@ namespace tubule::axisym {
 // beside it they agree to rounding.
 inline double beside_pole(const CurveSpace& space, double s) {
     constexpr double aside = 1e-5;
-    if (space.closed() && s < aside) return aside;
-    return space.topology() == Topology::cell && s > 1 - aside ? 1 - aside : s;
+    if (space.begins_at_pole() && s < aside) return aside;
+    return space.ends_at_pole() && s > 1 - aside ? 1 - aside : s;
 }
 
 // Samples of the whole cell or period: at(s) at several places of each element, then their images in the plane of

@@ -60,7 +60,7 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
                    {"lambda", lambda}});
     table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
                {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
-    if (may_have_period(c.shape) || law.beads)
+    if (may_have_period(c.shape) || law.beads || has_two_rings(c.shape))
         table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
     if (!c.energy.potentials.empty())
         table.add({{"potential_force", [](const CurveRow& r) { return r.now.o.potential.force; }}});

@@ -63,7 +63,8 @@ std::vector<double> first_breaks(const ArcLength& arc, const CurveSettings& sett
     if (!c.law.beads) return breaks;
     const Beads& beads = *c.law.beads;
     const double lengthens = beads.extension ? beads.extension->largest() : 0;
-    return refined_at_beads(breaks, beads.width * std::min(1.0, bead_elements * size), arc.total() + lengthens);
+    return refined_at_beads(arc.meridian().topology, breaks, beads.width * std::min(1.0, bead_elements * size),
+                            arc.total() + lengthens);
 }
 
 std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, const std::vector<double>& breaks) {
@@ -73,12 +74,21 @@ std::unique_ptr<CurveSpace> space_of(const Problem& c, const Curve& meridian, co
                                         c.law.free_period);
 }
 
+bool is_flat(const Curve& shape) {
+    constexpr int points = 64;
+    const double z = shape.at(0)[2], size = std::max(shape.at(0)[0], shape.at(1)[0]);
+    for (int i = 1; i <= points; ++i)
+        if (std::abs(shape.at(static_cast<double>(i) / points)[2] - z) > 1e-6 * size) return false;
+    return true;
+}
+
 // No other shape has the area and the volume of a sphere, or of a straight tube with its period: what would deform it
 // is refused, since no multiplier then holds the volume.
 void refuse_to_deform(const Problem& c) {
     const std::string why =
-        "would deform a sphere or a straight tube whose area and volume are fixed, and no other shape has these: free "
-        "one of them (model.area, model.volume), or begin with another shape";
+        "would deform a sphere, a straight tube or a part of one whose area and volume are fixed, and no other shape "
+        "has "
+        "these: free one of them (model.area, model.volume), or begin with another shape";
     if (c.law.beads) throw complaint(c, "model.bead_width", why);
     if (!c.energy.potentials.empty()) throw complaint(c, "energy.potential", why);
     if (c.energy.H0_varies()) throw complaint_about_H0(c, why);
@@ -120,13 +130,43 @@ void require_place(const Problem& c, const Curve& shape) {
 
 double bead_distance(const Problem& c, const Curve& shape) {
     constexpr int elements = 100;  // the distance to rounding
-    if (shape.topology != Topology::cell) require_beads(c, false, 0);
+    const double width = c.law.beads->width;
+    const bool cap = shape.topology == Topology::cap;
+    if (shape.topology != Topology::cell && !cap) require_beads(c, false, 0);
     const ArcLength arc(shape);
-    const CurveSpace space(Topology::cell,
-                           refined_at_beads(equal_breaks(elements), c.law.beads->width / 2, arc.total()), 5, 4);
-    const double distance = BeadForms(space, c.law.beads->width).distance(fit(space, arc).data());
-    require_beads(c, true, distance);
+    const CurveSpace space(shape.topology,
+                           refined_at_beads(shape.topology, equal_breaks(elements), width / 2, arc.total()), 5, 4);
+    const std::optional<double> foot = cap ? std::optional(shape.at(0)[2]) : std::nullopt;
+    const double distance = BeadForms(space, width, foot).distance(fit(space, arc).data());
+    require_beads(c, std::isfinite(distance), cap ? arc.total() : distance);
     return distance;
+}
+
+void require_patch(const Problem& c, const Curve& shape) {
+    if (!is_patch(shape.topology)) return;
+    const auto refuse = [&](bool asked, const char* key, const char* why) {
+        if (asked) throw complaint(c, key, why);
+    };
+    refuse(c.energy.alpha.has_value(), "energy.alpha", "must be absent: a patch has no area difference of its own");
+    if (c.energy.H0_varies()) throw complaint_about_H0(c, "must be a number where the shape is a patch");
+    refuse(c.discretisation.order == 5 && c.discretisation.smoothness == 1, "discretisation.smoothness",
+           "must be at least 2 where a patch has splines of order 5: four points per element do not determine them");
+    refuse(c.law.reservoir && c.discretisation.parametrisation == Parametrisation::material,
+           "discretisation.parametrisation", "must not be \"material\": membrane flows in through the ring");
+    refuse(c.velocity.initial == InitialVelocity::rotation, "velocity.initial",
+           "must not be \"rotation\": the ring holds the membrane");
+    refuse(c.held == Held::reduced_volume && c.is_equilibrium(), "equilibrium.held",
+           "must not be \"reduced-volume\", which is that of a closed surface");
+    const char* holds = c.is_equilibrium() ? "equilibrium.held" : "model.area";
+    const bool area = c.is_equilibrium() ? holds_area(c.held) : !c.law.area_is_free();
+    refuse(area && is_flat(shape), holds, "must leave the area free where the patch is flat: give shape.height");
+    const auto* patch = std::get_if<Patch>(&c.shape);
+    const bool alike = patch && patch->second_radius.value_or(patch->radius) == patch->radius;
+    refuse(alike && c.is_equilibrium() && c.held == Held::area_and_volume, holds,
+           "must leave the area or the volume free: of a part of a sphere or a cylinder they are one condition");
+    if (!c.is_equilibrium() || !c.equilibrium->modes) return;
+    refuse(c.law.viscosity != 0, "equilibrium.modes",
+           "has growth rates of patches for models without viscosity: set model.kind = \"overdamped\"");
 }
 
 InitialShape initial_shape(const Problem& c) {
@@ -139,6 +179,7 @@ InitialShape initial_shape(const Problem& c) {
         } catch (const std::invalid_argument&) {  // not mirror-symmetric
         }
     }
+    require_patch(c, whole);
     require_place(c, whole);
     const auto [area, volume] = area_and_volume(whole);
     const double length = c.law.beads ? bead_distance(c, whole) : whole.length;
@@ -184,12 +225,17 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     CurveLaw law = law_of(c);
     require_pressure(c, start.volume);
     law.swirls = law.swirls || (start.velocity && start.velocity->velocity->swirls);
+    law.open_rim = space->is_patch() && law.reservoir;
+    if (law.open_rim) law.lagrangian = false;
     const double energy = start.free_energy(law);
     magnitude = std::max(std::abs(energy), std::max(std::abs(start.bending.energy), start.bending.magnitude) +
                                                load_scale(law, start.area, start.volume, start.length));
     reference_energy = tubule::reference_energy(c, energy, magnitude);
-    const double variation = variation_of_H(*space, x);
-    law.holds_area = !law.reservoir && variation > same_everywhere && (variation > nearly_same || !law.keeps_volume);
+    const double variation =
+        is_patch(start.meridian.topology) && is_flat(start.meridian) ? 0 : variation_of_H(*space, x);
+    const bool patch_alone = space->is_patch() && !law.keeps_volume;  // a part of a sphere at first, but not later
+    law.holds_area = !law.reservoir &&
+                     (patch_alone || (variation > same_everywhere && (variation > nearly_same || !law.keeps_volume)));
     // Where area and volume are the same condition, one multiplier has no value.
     const bool keeps_both = law.keeps_volume && !law.area_is_free() && !law.free_period;
     if (keeps_both && variation <= same_everywhere) {
@@ -199,6 +245,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     motion = std::make_unique<CurveMotion>(*space, c.energy, law, gauge_of(c, magnitude, start.area), start.area,
                                            start.volume);
     if (c.energy.H0_varies()) motion->fix_H0(x);
+    if (space->is_patch()) motion->hold_rings(x);
     if (law.beads) motion->hold_beads(x);
 }
 

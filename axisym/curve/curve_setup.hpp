@@ -30,6 +30,8 @@ struct InitialShape {
 InitialShape initial_shape(const Problem& c);
 // The distance of the beads of a case on this shape. CaseError where they do not suit it.
 double bead_distance(const Problem& c, const Curve& shape);
+// CaseError where a case asks of a patch what it has not.
+void require_patch(const Problem& c, const Curve& shape);
 // CaseError where the potentials of places of a case do not suit this shape.
 void require_place(const Problem& c, const Curve& shape);
 

@@ -33,10 +33,10 @@ Neck narrowest(const CurveSpace& space, const double* y) {
         s_at.push_back(s), r.push_back(space.evaluate(x, s).r);
     }
     const int n = static_cast<int>(r.size());
-    const bool closed = space.closed();
+    const bool whole = space.ends_at_pole() || space.topology() == Topology::strip;
     int lowest = -1;
-    for (int i = closed ? 1 : 0; i < n; ++i) {
-        if (space.topology() == Topology::cell && i == n - 1) continue;
+    for (int i = space.closed() || space.is_patch() ? 1 : 0; i < n; ++i) {  // neither poles nor rings
+        if (whole && i == n - 1) continue;
         const double before = i > 0 ? r[i - 1] : r[1], after = i + 1 < n ? r[i + 1] : r[n - 2];
         if (r[i] <= before && r[i] <= after && (lowest < 0 || r[i] < r[lowest])) lowest = i;
     }

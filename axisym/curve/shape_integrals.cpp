@@ -78,6 +78,7 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
         }
         below += dA.sum();
     });
+    if (is_patch(m.topology)) sum.magnitude += patch_scale(bending, std::max(m.at(0)[0], m.at(1)[0]));
     sum.energy = sum.energy_alpha = area_difference_energy(bending, sum.M);
     sum.magnitude += sum.energy_alpha;
     sum.energy += sum.potential;
@@ -86,6 +87,10 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
 }
 
 }  // namespace
+
+double patch_scale(const Bending& bending, double radius) {
+    return 2 * pi * radius * radius * magnitude(bending, bending.H0, -2 / radius, 1 / (radius * radius));
+}
 
 std::array<double, 2> area_and_volume(const Curve& m) {
     double area = 0, volume = 0;

@@ -9,7 +9,7 @@
 
 namespace tubule::axisym {
 
-// Area and volume of the whole cell or period.
+// Area and volume of the whole cell or period; of a patch the volume between the planes of its ends.
 std::array<double, 2> area_and_volume(const Curve& meridian);
 
 struct ShapeEnergy {
@@ -18,6 +18,8 @@ struct ShapeEnergy {
     double potential = 0;              // part of the energy
     std::vector<double> energy_term;   // of each term, see term_names()
 };
+// Part of the magnitude of a patch, whose own terms may all be zero: that of a half sphere in a ring of this radius.
+double patch_scale(const Bending& bending, double radius);
 // To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not
 // defined on the shape.
 ShapeEnergy bending_energy(const Curve& meridian, const Bending& bending);

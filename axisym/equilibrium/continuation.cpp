@@ -52,6 +52,7 @@ public:
         e.space = system_->space_handle(), e.x = curve(place.w), e.gauge = system_->gauge();
         e.sigma = place.w[n], e.lambda = place.w[n + 1], e.mu = place.w[system_->mu()];
         if (problem.beads) e.beads = place.w.segment<4>(system_->beads());
+        e.rim = place.w.segment(system_->rim(), condition_count(problem.rings));
         std::vector<double> defect;
         e.observed = system_->forms().observe(e.x, &defect);
         e.length = system_->length(place.u());

@@ -29,7 +29,7 @@ StationarySystem::StationarySystem(std::shared_ptr<const CurveSpace> space, cons
                                    double gauge)
     : space_(std::move(space)), forms_(*space_, problem.bending), gauge_(gauge) {
     set_problem(problem);
-    if (problem.beads) bead_forms_.emplace(*space_, problem.beads->width);
+    if (problem.beads) bead_forms_.emplace(bead_forms(*space_, problem));
     place_ = Eigen::VectorXd::Zero(space_->size());
     if (space_->topology() == Topology::cell) place_.tail(space_->z().size()) = space_->z().mean();
 }
@@ -39,6 +39,7 @@ void StationarySystem::set_problem(const StationaryProblem& problem) {
         throw std::invalid_argument("a force needs a free period, and a space with one");
     check_problem(problem, space_->closed() ? 0 : space_->length());
     problem_ = problem;
+    rim_ = rim_functionals(*space_, problem.rings);
     forms_.set_bending(problem.bending);
 }
 
@@ -76,6 +77,7 @@ void StationarySystem::set_constraints(const CurveObservation& o, const Eigen::V
     if (bead_forms_)
         F.segment<4>(beads()) =
             bead_forms_->equations().residual(bead_forms_->on(u.data()), bead_load(), bead_numbers(u));
+    F.tail(rim_.cols()) = rim_.transpose() * u.head(n) - rim_values(problem_.rings);
 }
 
 Eigen::VectorXd StationarySystem::constraint_residual(const Eigen::VectorXd& u) const {
@@ -88,7 +90,10 @@ double StationarySystem::constraint_error(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
     const double size = std::sqrt(o.area), held = tubule::constraint_error(problem_.constraints, equations(o, u), size);
     const std::optional<double> distance = problem_.held_distance();
-    return distance ? std::max(held, std::abs(length(u) - *distance) / size) : held;
+    double off = distance ? std::abs(length(u) - *distance) : 0;
+    if (rim_.cols() > 0)
+        off = std::max(off, (rim_.transpose() * curve(u) - rim_values(problem_.rings)).lpNorm<Eigen::Infinity>());
+    return std::max(held, off / size);
 }
 
 Extents StationarySystem::extents(const Eigen::VectorXd& u) const {
@@ -104,7 +109,7 @@ Eigen::VectorXd StationarySystem::residual(const Eigen::VectorXd& u) const {
     const int n = space_->size();
     const Eigen::VectorXd x = curve(u);
     Eigen::VectorXd F = Eigen::VectorXd::Zero(unknowns());
-    F.head(n) = u[n + 3] * place_;
+    F.head(n) = u[n + 3] * place_ + rim_ * u.tail(rim_.cols());
     forms_.add_gradient(weights(u), x.data(), F.data());
     if (bead_forms_) bead_forms_->add_force(x.data(), bead_numbers(u), F.data());
     if (problem_.free_period) F[n - 1] -= problem_.loads.force * space_->images();
@@ -141,9 +146,10 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
     if (bead_forms_) {
         const BeadEquations::Slopes s =
             bead_forms_->equations().slopes(bead_forms_->on(x.data()), bead_load(), bead_numbers(u));
-        columns.rightCols<4>() = s.force_by_numbers, rows.bottomRows<4>() = s.equations_by_shape;
-        corner.bottomRightCorner<4, 4>() = s.equations_by_numbers;
+        columns.middleCols<4>(4) = s.force_by_numbers, rows.middleRows<4>(4) = s.equations_by_shape;
+        corner.block<4, 4>(4, 4) = s.equations_by_numbers;
     }
+    columns.rightCols(rim_.cols()) = rim_, rows.bottomRows(rim_.cols()) = rim_.transpose();
 
     // Columns in order, each with the rows of the Hessian and then all others, zeros included.
     Eigen::SparseMatrix<double> J(unknowns(), unknowns());
@@ -170,8 +176,9 @@ Eigen::VectorXd StationarySystem::slope_of_M(const Eigen::VectorXd& x) const {
 
 double StationarySystem::merit(const Eigen::VectorXd& u) const {
     const CurveObservation o = forms_.observe(curve(u));
-    const double value =
+    double value =
         lagrangian(problem_, o.energy, o.area, o.volume, length(u), u[sigma()], u[lambda()]) + gauge_ * o.gauge;
+    value += u.tail(rim_.cols()).dot(rim_.transpose() * curve(u) - rim_values(problem_.rings));
     if (!bead_forms_) return value;
     return value + bead_forms_->equations().lagrangian(bead_forms_->on(u.data()), bead_load(), bead_numbers(u));
 }
@@ -205,6 +212,7 @@ Variation StationarySystem::variation(const Eigen::VectorXd& u, int vectors) con
         hessian += u[lambda()] * slopes.by_area_twice * area * area.transpose();
     }
     if (drifts()) fix(place_);
+    for (int k = 0; k < rim_.cols(); ++k) fix(rim_.col(k));
     if (bead_forms_) {
         const BeadSurface on = bead_forms_->on(x.data());
         const auto [columns, factors] = bead_forms_->equations().following(on, bead_numbers(u));
@@ -237,8 +245,9 @@ std::shared_ptr<const CurveSpace> space_like(const CurveSpace& other, std::vecto
 }
 
 // These breaks, or more where beads need them, of a curve of this length.
-std::vector<double> breaks_for(const StationaryProblem& problem, std::vector<double> breaks, double length) {
-    return problem.beads ? refined_at_beads(breaks, problem.beads->width, length) : breaks;
+std::vector<double> breaks_for(const StationaryProblem& problem, Topology topology, std::vector<double> breaks,
+                               double length) {
+    return problem.beads ? refined_at_beads(topology, breaks, problem.beads->width, length) : breaks;
 }
 
 // Scales a closed curve to the required area (or volume, if that alone is held).
@@ -436,6 +445,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         out.observed = system.forms().observe(x, &defect);
         out.length = system.length(u);
         if (problem.beads) out.beads = u.segment<4>(system.beads());
+        out.rim = u.tail(condition_count(problem.rings));
         if (!found) compare.restart();
         const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, settings.degree)
                                    : std::numeric_limits<double>::infinity();
@@ -445,7 +455,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         if (auto ended = verdict(problem, system, u, found, settings, out))
             return end(ended->first, std::move(ended->second));
         const auto finer = space_like(*space,
-                                      breaks_for(problem,
+                                      breaks_for(problem, space->topology(),
                                                  next_breaks(*space, defect, settings.accuracy * out.reference_energy,
                                                              settings.max_elements, found),
                                                  out.observed.length),
@@ -463,13 +473,20 @@ Eigen::VectorXd unknowns(const StationaryProblem& problem, const Equilibrium& sh
     Eigen::VectorXd u(shape.x.size() + StationarySystem::numbers(problem));
     u.head(shape.x.size()) = shape.x;
     u.segment<4>(shape.x.size()) << shape.sigma, shape.lambda, shape.mu, 0;
-    if (problem.beads) u.tail<4>() = shape.beads;
+    if (problem.beads) u.segment<4>(shape.x.size() + 4) = shape.beads;
+    u.tail(shape.rim.size()) = shape.rim;
     return u;
 }
 
+BeadForms bead_forms(const CurveSpace& space, const StationaryProblem& problem) {
+    const std::optional<double> foot = problem.rings.empty() ? std::nullopt : std::optional(problem.rings.front().z);
+    return {space, problem.beads->width, foot};
+}
+
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
+    if (shape.space->topology() == Topology::strip) return -shape.rim[condition_of_height(problem.rings)];
+    if (problem.beads) return bead_forms(*shape.space, problem).force(shape.x.data(), shape.beads);
     if (problem.free_period || shape.length == 0) return problem.loads.force;
-    if (problem.beads) return BeadForms(*shape.space, problem.beads->width).force(shape.x.data(), shape.beads);
     const CurveForms forms(*shape.space, problem.bending);
     return forms.stretch_slope({.energy = 1, .area = shape.sigma, .volume = shape.lambda, .M = shape.mu}, shape.x) /
            shape.length;
@@ -488,11 +505,11 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
     if (start.topology == Topology::tube)
         throw std::invalid_argument(
             "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
-    const int images = start.topology == Topology::cell ? 1 : 2, elements = std::max(settings.elements, coarsest);
+    const int images = start.images(), elements = std::max(settings.elements, coarsest);
     const ArcLength arc(start);
-    const auto space =
-        std::make_shared<CurveSpace>(start.topology, breaks_for(problem, equal_breaks(elements / images), arc.total()),
-                                     settings.degree, settings.degree - 1, start.length, problem.free_period);
+    const auto space = std::make_shared<CurveSpace>(
+        start.topology, breaks_for(problem, start.topology, equal_breaks(elements / images), arc.total()),
+        settings.degree, settings.degree - 1, start.length, problem.free_period);
     const CurveForms forms(*space, problem.bending);
     Eigen::VectorXd u = Eigen::VectorXd::Zero(space->size() + StationarySystem::numbers(problem)), x = fit(*space, arc);
     scale_to(forms, problem.constraints, x);
@@ -500,7 +517,8 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
     u[space->size()] = problem.loads.tension;
     u[space->size() + 1] = -problem.loads.pressure_at(forms.observe(x).volume);
     u[space->size() + 2] = area_difference_force(problem.bending, forms.M(x.data()));
-    if (problem.beads) u.tail<4>() = BeadForms(*space, problem.beads->width).numbers(x.data(), problem.loads.force);
+    if (problem.beads)
+        u.segment<4>(space->size() + 4) = bead_forms(*space, problem).numbers(x.data(), problem.loads.force);
     return solve(problem, space, u, settings.gauge * forms.reference_energy(x), settings);
 }
 
@@ -510,7 +528,8 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
     const CurveSpace& old = *nearby.space;
     const int elements = std::max(static_cast<int>(0.6 * old.splines().elements()), coarsest / old.images());
     const auto coarser = space_like(
-        old, breaks_for(problem, regraded(old.splines().breaks(), elements), nearby.observed.length), settings.degree);
+        old, breaks_for(problem, old.topology(), regraded(old.splines().breaks(), elements), nearby.observed.length),
+        settings.degree);
     const Eigen::VectorXd before = unknowns(problem, nearby);
     const int numbers = StationarySystem::numbers(problem);
     Eigen::VectorXd u(coarser->size() + numbers);

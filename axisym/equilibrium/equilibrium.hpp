@@ -13,6 +13,7 @@
 #include "axisym/curve/bead_forms.hpp"
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
+#include "axisym/curve/rim_conditions.hpp"
 #include "common/equilibrium/stationary_problem.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"
@@ -27,12 +28,14 @@ struct Variation {
 
 // The equations F(u) = 0 of a stationary shape on one mesh; u holds the coefficients of the curve (the last of them the
 // rise of a free period), then sigma, lambda, mu = alpha (M - M0) and the force that holds a whole cell in place along
-// the axis (zero in the end), and the numbers of beads, if there are any. `gauge` is the weight of the gauge energy
-// (CurveForms): the shape does not depend on it, up to the error of the mesh.
+// the axis (zero in the end), the numbers of beads, if there are any, and the multipliers of rim_functionals(). `gauge`
+// is the weight of the gauge energy (CurveForms): the shape does not depend on it, up to the error of the mesh.
 class StationarySystem {
 public:
     // How many unknowns stand beside the curve.
-    static int numbers(const StationaryProblem& problem) { return problem.beads ? 8 : 4; }
+    static int numbers(const StationaryProblem& problem) {
+        return (problem.beads ? 8 : 4) + condition_count(problem.rings);
+    }
     int numbers() const { return numbers(problem_); }
     // Throws as set_problem().
     StationarySystem(std::shared_ptr<const CurveSpace> space, const StationaryProblem& problem, double gauge);
@@ -50,6 +53,7 @@ public:
     int lambda() const { return space_->size() + 1; }
     int mu() const { return space_->size() + 2; }
     int beads() const { return space_->size() + 4; }
+    int rim() const { return unknowns() - condition_count(problem_.rings); }
     // Makes mu and the positions of beads those of the curve; where their force is given, their multipliers, too.
     void set_followers(Eigen::VectorXd& u) const;
     // Those numbers of a change of u, zeros for the others.
@@ -100,6 +104,7 @@ private:
     std::optional<BeadForms> bead_forms_;
     double gauge_;
     Eigen::VectorXd place_;  // functional of the mean height
+    Eigen::MatrixXd rim_;    // rim_functionals()
 };
 
 struct EquilibriumSettings {
@@ -111,11 +116,13 @@ struct EquilibriumSettings {
     bool descend = true;     // look for a minimum, from any start; if not, for any stationary shape near a good one
 };
 
+// Many fields: a shape, its multipliers, and how it was found.
 struct Equilibrium {
     std::shared_ptr<const CurveSpace> space;
     Eigen::VectorXd x;
     double sigma = 0, lambda = 0, mu = 0;
     BeadNumbers beads = BeadNumbers::Zero();
+    Eigen::VectorXd rim{};  // multipliers of rim_functionals()
     double gauge = 0;
     CurveObservation observed;
     double length = 0;                                 // L of theory.md (3.16): of the period, or of beads; else 0
@@ -139,7 +146,11 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Equilibrium
 // u of a StationarySystem on its mesh.
 Eigen::VectorXd unknowns(const StationaryProblem& problem, const Equilibrium& shape);
 
-// The axial force of an equilibrium, theory.md (3.19): given, or what holds a period or the distance of beads.
+// Those of a problem with beads; the space must outlive them.
+BeadForms bead_forms(const CurveSpace& space, const StationaryProblem& problem);
+
+// The axial force of an equilibrium, theory.md (3.19): given, or what holds a period, the distance of beads or the
+// second ring of a patch.
 double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 
 // Directions of half a curve that lower the energy and do not mirror themselves, 10 at most; 0 of a whole curve.

@@ -86,7 +86,9 @@ Task task_of(const Problem& c) {
     const auto [area, volume] = area_and_volume(task.start);
     require_pressure(c, volume);
     require_place(c, task.start);
+    require_patch(c, task.start);
     task.problem = stationary_problem(c, area, volume);
+    task.problem.rings = rings_of(task.start, c.law.rim);
     const Constraints& held = task.problem.constraints;
     if (e.family) {
         if (task.start.topology != Topology::cell)
@@ -110,8 +112,7 @@ Task task_of(const Problem& c) {
         branch.branches = b.branches;
         branch.mode = b.mode.value_or(0), branch.amplitude = b.amplitude.value_or(branch.amplitude);
     }
-    const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
-    check_problem(c, task.problem, closed ? 0 : task.start.length);
+    check_problem(c, task.problem, task.start.length);
     return task;
 }
 
@@ -189,7 +190,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
                {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
                {"tension", [](const ShapeRow& r) { return r.point.shape.sigma; }},
                {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }}});
-    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads)
+    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads ||
+        has_two_rings(c.shape))
         table.add({{"force", [](const ShapeRow& r) { return axial_force(r.problem, r.point.shape); }}});
     if (c.law.beads) table.add({{"bead_distance", [](const ShapeRow& r) { return r.point.shape.length; }}});
     if (!c.energy.potentials.empty())
@@ -329,7 +331,7 @@ bool meets(const Constraints& held, const CurveObservation& o) {
 
 std::optional<theory::LimitShape> limit_of(const Task& task) {
     const Constraints& held = task.problem.constraints;
-    const bool closed = task.start.topology == Topology::cell || task.start.topology == Topology::half_cell;
+    const bool closed = is_closed(task.start.topology);
     const bool at_places = !task.problem.bending.potentials.empty() || task.problem.beads;
     if (!closed || !held.area || !held.volume || at_places) return std::nullopt;
     return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);

@@ -74,6 +74,7 @@ J functional_density(const Bending& bending, const std::optional<Formula>& poten
         sum += evaluate(*potential, place);
     }
     for (int bead = 0; beads && bead < 2; ++bead) {
+        if (!beads->equations().has_bead(bead)) continue;
         const J place[]{d.r, d.z, J(shape.beads[2 * bead])};
         sum += shape.beads[2 * bead + 1] * evaluate(beads->equations().density(bead), place);
     }
@@ -105,7 +106,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
     const Bending bending = with_M(problem.bending, shape.observed.M);
     const std::optional<Formula> potential = potential_density(bending.potentials);
-    if (problem.beads) beads_.emplace(space, problem.beads->width);
+    if (problem.beads) beads_.emplace(bead_forms(space, problem));
     for (int e = 0; e < splines.elements(); ++e)
         for (int group = 0; group < splines.groups(); ++group) {
             const auto& b = splines.basis(e, group);
@@ -128,6 +129,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 p.along = p.normal_r * nr[0][q] + p.normal_z * nz[0][q];
                 for (int k = 0; k < 21; ++k) p.Q[k] = density.dd[k][q];
                 for (int bead = 0; beads_ && bead < 2; ++bead) {
+                    if (!beads_->equations().has_bead(bead)) continue;
                     const double P = shape.beads[2 * bead];
                     p.bead[2 * bead] = slope_along_normal(beads_->equations().density(bead), P, p);
                     p.bead[2 * bead + 1] = slope_along_normal(beads_->equations().density_by_P(bead), P, p);
@@ -179,6 +181,8 @@ std::vector<Parity> ModeStability::parities(int m) const {
             return {{pole, 1}, {pole, -1}};
         case Topology::half_tube:
             return {{1, 1}, {-1, -1}};
+        case Topology::cap:
+            return {{1, pole}};
         default:
             return {{1, 1}};
     }
@@ -212,6 +216,18 @@ void append(Matrix& columns, const Vector& column) {
     columns.col(columns.cols() - 1) = column;
 }
 
+// A derivative at a ring, of unit length.
+Vector functional_at(const SplineSpace& field, std::size_t ring, int derivative) {
+    const double s = rim_parameter(ring);
+    const int e = field.element_at(s);
+    double values[3 * SplineSpace::max_width];
+    field.splines(e, s, 2, values);
+    Vector out = Vector::Zero(field.size());
+    for (int a = 0; a < field.width(); ++a)
+        out[field.dofs(e)[a]] += field.signs(e)[a] * values[derivative * field.width() + a];
+    return out.normalized();
+}
+
 struct SmallEigenpairs : Eigenpairs {
     double inverses = 0;  // SUM 1/mu of all
 };
@@ -243,7 +259,7 @@ SmallEigenpairs smallest(const Matrix& A, const Matrix& M, int count) {
 // Under reflection at a plane of symmetry; 0 if the curve ends at none.
 int ModeStability::mirror(Parity parity) const {
     const Topology t = shape_.space->topology();
-    return t == Topology::cell || t == Topology::tube ? 0 : parity.end;
+    return t == Topology::cell || t == Topology::tube || is_patch(t) ? 0 : parity.end;
 }
 
 struct ModeStability::Forms {
@@ -323,10 +339,8 @@ Matrix ModeStability::regular(int m, const SplineSpace& field) const {
             functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * field.width() + a];
         append(at_poles, functional.normalized());
     };
-    if (shape_.space->closed() && m >= 2) {
-        require(0, 0);
-        if (shape_.space->topology() == Topology::cell) require(field.elements() - 1, 1);
-    }
+    if (m >= 2 && shape_.space->begins_at_pole()) require(0, 0);
+    if (m >= 2 && shape_.space->ends_at_pole()) require(field.elements() - 1, 1);
     return complement(at_poles);
 }
 
@@ -336,7 +350,13 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
                                        const Forms& forms) const {
     if (!law.inextensible) return law.friction * forms.mass;
     const bool constants = m == 0 && mirror(parity) >= 0;
-    const Matrix basis = constants ? complement(forms.mean) : regular(m, field);
+    Matrix basis = constants ? complement(forms.mean) : regular(m, field);
+    if (law.reservoir && shape_.space->is_patch()) {  // membrane flows in at a constant pressure
+        Matrix ends(field.size(), 0);
+        for (std::size_t i = 0; i < problem_.rings.size(); ++i) append(ends, functional_at(field, i, 0));
+        basis = regular(m, field);
+        basis = basis * complement(basis.transpose() * ends);
+    }
     const Matrix L = basis.transpose() * forms.gradients * basis, S = basis.transpose() * forms.source;
     const Matrix X = -Eigen::LDLT<Matrix>(L).solve(S);  // chi of w, in the basis
     Matrix M = law.friction * (forms.mass + X.transpose() * L * X);
@@ -389,6 +409,7 @@ void ModeStability::add_beads(Forms& forms, Matrix& fixed) const {
     const double whole = 2 * pi;
     Vector lengthens = Vector::Zero(forms.mean.size());
     for (int k = 0; k < 2; ++k) {
+        if (!beads_->equations().has_bead(k)) continue;
         const double q = shape_.beads[2 * k + 1];
         const auto [by_P, by_PP] = beads_->equations().slopes_in_P(beads_->on(shape_.x.data()), k, shape_.beads[2 * k]);
         const Vector follows = -whole * forms.bead[2 * k] / by_P, with = q * forms.bead[2 * k + 1];
@@ -399,12 +420,20 @@ void ModeStability::add_beads(Forms& forms, Matrix& fixed) const {
     if (problem_.held_distance()) append(fixed, lengthens.normalized());
 }
 
-// What a displacement must leave alone, as columns: for m = 0 area and volume, and for m < 2 the place, that is, the
-// rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a tilt are odd, a
-// translation across it is even.
-Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
+// The rings of a patch, and where it is clamped its angle there.
+void ModeStability::fix_at_rings(const SplineSpace& field, Matrix& fixed) const {
+    for (std::size_t i = 0; i < problem_.rings.size(); ++i)
+        for (int derivative = 0; derivative <= (problem_.rings[i].tangent ? 1 : 0); ++derivative)
+            append(fixed, functional_at(field, i, derivative));
+}
+
+// What a displacement must leave alone, as columns: for m = 0 area and volume, and of a patch its rings; else for m < 2
+// the place, that is, the rigid motions M is orthogonal to. At a plane of symmetry a translation along the axis and a
+// tilt are odd, a translation across it is even.
+Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, const SplineSpace& field, Forms& forms,
                                         const Matrix& M) const {
     const CurveSpace& space = *shape_.space;
+    const Parity parity = field.parity();
     Matrix fixed(forms.mean.size(), 0);
     if (m == 0 && mirror(parity) >= 0) {
         const double whole = 2 * pi * space.images();
@@ -424,6 +453,10 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, Parity pari
         }
     }
     if (m == 0 && beads_) add_beads(forms, fixed);
+    if (space.is_patch()) {
+        fix_at_rings(field, fixed);
+        return fixed;
+    }
     const std::vector<Potential>& potentials = problem_.bending.potentials;  // hold it in its place, but along planes
     const bool free = std::ranges::none_of(potentials, &Potential::acts);
     const bool planes =
@@ -447,7 +480,7 @@ void ModeStability::add_rates(int m, const MotionLaw& law, Parity parity, int co
     check_pause();
     const Matrix M = dissipation_form(m, law, parity, field, forms), basis = regular(m, field);
     check_pause();
-    const Matrix fixed = fixed_functionals(m, law, parity, forms, M);
+    const Matrix fixed = fixed_functionals(m, law, field, forms, M);
     const Matrix free = basis * complement(basis.transpose() * fixed);
     const SmallEigenpairs found =
         smallest(free.transpose() * forms.second_variation * free, free.transpose() * M * free, count);

@@ -62,8 +62,9 @@ private:
     Eigen::MatrixXd regular(int m, const SplineSpace& field) const;
     Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                      const Forms& forms) const;
-    Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, Parity parity, Forms& forms,
+    Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, const SplineSpace& field, Forms& forms,
                                       const Eigen::MatrixXd& M) const;
+    void fix_at_rings(const SplineSpace& field, Eigen::MatrixXd& fixed) const;
     void add_beads(Forms& forms, Eigen::MatrixXd& fixed) const;
     void add_rates(int m, const MotionLaw& law, Parity parity, int count, ModeRates& out) const;
 

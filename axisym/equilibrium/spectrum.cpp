@@ -112,7 +112,9 @@ double difference(const std::vector<ModeRates>& a, const std::vector<ModeRates>&
     return largest;
 }
 
-void refuse_what_has_none(const MotionLaw& law, const SpectrumSettings& settings) {
+void refuse_what_has_none(const MotionLaw& law, const Curve& shape, const SpectrumSettings& settings) {
+    if (is_patch(shape.topology))
+        throw std::invalid_argument("a patch is held at its rings: its growth rates are those of equilibrium.modes");
     if (law.beads)
         throw std::invalid_argument("beads pull at an equilibrium: its rates are those of equilibrium.modes");
     if (law.inertia != 0)
@@ -138,7 +140,7 @@ void set_loads(SpectrumSettings& settings, const MotionLaw& law, Held held, doub
 
 Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const Curve& shape,
                   const SpectrumSettings& settings) {
-    refuse_what_has_none(law, settings);
+    refuse_what_has_none(law, shape, settings);
     StationaryProblem problem{bending, {}};
     if (!holds_volume(held) && held != Held::reduced_volume) problem.loads.of_volume = settings.pressure_of_volume;
     Spectrum out;

@@ -11,21 +11,22 @@ CurveSpace::CurveSpace(Topology topology, std::vector<double> breaks, int degree
     : topology_(topology),
       length_(length),
       free_period_(free_period),
-      r_({0, 1, topology != Topology::tube, 1}, std::move(breaks), degree, smoothness, r_parity()),
+      r_({0, 1, topology != Topology::tube, 1, tubule::is_patch(topology), topology == Topology::strip},
+         std::move(breaks), degree, smoothness, r_parity()),
       z_(r_, z_parity()) {
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
     if (r_.breaks().front() != 0 || r_.breaks().back() != 1) throw std::invalid_argument("breaks must run from 0 to 1");
     if (free_period && !(length > 0)) throw std::invalid_argument("only the period of a tube can be free");
-    if (!(length >= 0) || (closed() && length != 0))
-        throw std::invalid_argument("the length must be positive for a tube, 0 for a torus or a closed cell");
+    if (!(length >= 0) || ((closed() || is_patch()) && length != 0))
+        throw std::invalid_argument("the length must be positive for a tube, 0 for a torus, a closed cell or a patch");
 }
 
 Parity CurveSpace::r_parity() const {
-    return closed() ? Parity{-1, topology_ == Topology::cell ? -1 : 1} : Parity{1, 1};
+    return {begins_at_pole() ? -1 : 1, ends_at_pole() ? -1 : 1};
 }
 
 Parity CurveSpace::z_parity() const {
-    return closed() ? Parity{1, topology_ == Topology::cell ? 1 : -1} : Parity{-1, -1};
+    return {begins_at_pole() ? 1 : -1, ends_at_pole() ? 1 : -1};
 }
 
 CurveSample CurveSpace::evaluate(const Eigen::VectorXd& x, double s) const {

@@ -15,12 +15,16 @@ namespace tubule::axisym {
 class CurveSpace {
 public:
     // Breaks ascend from 0 to 1; degree 3, 5 or 7; 1 <= smoothness < degree; `length` is the period of a tube, at the
-    // start if the period is free, and is 0 for cells. Throws std::invalid_argument.
+    // start if the period is free, and is 0 for cells and patches. Throws std::invalid_argument.
     CurveSpace(Topology topology, std::vector<double> breaks, int degree, int smoothness, double length = 0,
                bool free_period = false);
 
     Topology topology() const { return topology_; }
-    bool closed() const { return topology_ == Topology::cell || topology_ == Topology::half_cell; }
+    bool closed() const { return is_closed(topology_); }
+    bool is_patch() const { return tubule::is_patch(topology_); }
+    // Whether the curve ends at a pole: there r is odd and z even.
+    bool begins_at_pole() const { return closed(); }
+    bool ends_at_pole() const { return topology_ == Topology::cell || topology_ == Topology::cap; }
     // The period, and the rise of the curve from s = 0 to s = 1: initially, and of a curve x.
     double length() const { return length_; }
     double rise() const { return topology_ == Topology::half_tube ? length_ / 2 : length_; }
@@ -46,7 +50,7 @@ public:
     template <class F>
     Eigen::VectorXd project(F&& f) const {
         return solve_mass(r_.load([&](double s) { return f(s)[0]; }),
-                         z_.load([&](double s) { return f(s)[1] - rise() * s; }));
+                          z_.load([&](double s) { return f(s)[1] - rise() * s; }));
     }
     // The curve x of another space of this topology; the same curve if those knots are all here too.
     Eigen::VectorXd prolong(const CurveSpace& other, const Eigen::VectorXd& x) const;

@@ -52,6 +52,8 @@ double SplineSpace::bernoulli_norm() const {
 
 double SplineSpace::Shared::knot(int index) const {
     const int n = static_cast<int>(breaks.size()) - 1, j = floor_div(index, multiplicity), L = cell.mirror ? 2 * n : n;
+    if (cell.open_start && j < 0) return breaks.front();
+    if (cell.open_end && j > n) return breaks.back();
     const int turn = floor_div(j, L), k = j - turn * L;
     const double base = (cell.mirror && k > n) ? 2 * breaks[n] - breaks[2 * n - k] : breaks[k];
     return base + turn * (cell.mirror ? 2 : 1) * cell.length();
@@ -65,7 +67,7 @@ SplineSpace::Folded SplineSpace::folded(int raw) const {
     const int low = m - 2 - degree(), high = low + 2 * n * m;  // i <-> low - i at z0, i <-> high - i at z1
     int i = raw;
     double sign = 1;
-    while (2 * i < low || 2 * i > high) {
+    while ((2 * i < low && !cell().open_start) || (2 * i > high && !cell().open_end)) {
         const bool below = 2 * i < low;
         i = (below ? low : high) - i;
         sign *= below ? parity_.start : parity_.end;
@@ -77,8 +79,11 @@ SplineSpace::Folded SplineSpace::folded(int raw) const {
 void SplineSpace::number() {
     const int m = shared_->multiplicity, n = elements(), low = m - 2 - degree(), high = low + 2 * n * m;
     if (cell().mirror) {  // a spline that is its own mirror image is absent from odd spaces
-        first_ = ((low + 1) >> 1) + (low % 2 == 0 && parity_.start < 0 ? 1 : 0);
-        size_ = (high >> 1) - (high % 2 == 0 && parity_.end < 0 ? 1 : 0) - first_ + 1;
+        first_ =
+            cell().open_start ? shared_->first_raw(0) : ((low + 1) >> 1) + (low % 2 == 0 && parity_.start < 0 ? 1 : 0);
+        const int last = cell().open_end ? shared_->first_raw(n - 1) + degree()
+                                         : (high >> 1) - (high % 2 == 0 && parity_.end < 0 ? 1 : 0);
+        size_ = last - first_ + 1;
     } else {
         size_ = n * m;
     }

@@ -1,5 +1,6 @@
 // Splines over one cell of a profile: degree p, any knots, any smoothness at the knots, even or odd at planes of
-// symmetry. Cubic and quintic Hermite elements are the special cases (3, 1) and (5, 2) of (degree, smoothness).
+// symmetry, without conditions at open ends. Cubic and quintic Hermite elements are the special cases (3, 1) and (5, 2)
+// of (degree, smoothness).
 #pragma once
 
 #include <Eigen/Core>
@@ -13,11 +14,13 @@
 namespace tubule::axisym {
 
 // The part [z0, z1] of the axis that is solved for; the rest of the tube follows by translation, or
-// with `mirror` by reflection at both ends.
+// with `mirror` by reflection at both ends, or nothing beyond an open end of a mirrored cell: there the first or the
+// last coefficient is the value.
 struct Cell {
     double z0 = 0, z1 = 1;
     bool mirror = false;
     int copies = 1;  // translational copies in the period of the case
+    bool open_start = false, open_end = false;
     double length() const { return z1 - z0; }
     int images() const { return copies * (mirror ? 2 : 1); }
     double period() const { return length() * images(); }
@@ -146,7 +149,7 @@ private:
         std::vector<Basis> basis;
         std::vector<Active> active;
 
-        double knot(int index) const;  // extended beyond the cell by translation or reflection
+        double knot(int index) const;  // extended beyond the cell by translation or reflection; repeated at open ends
         int first_raw(int element) const { return element * multiplicity + multiplicity - 1 - degree; }
         void tabulate(int groups);
     };

@@ -18,6 +18,7 @@
 #include "common/shapes/ellipsoid.hpp"
 #include "common/shapes/formula_shape.hpp"
 #include "common/shapes/mesh_file.hpp"
+#include "common/shapes/patch.hpp"
 #include "common/shapes/perturbed_curve.hpp"
 #include "common/shapes/profile_file.hpp"
 #include "common/shapes/result_frame.hpp"
@@ -34,11 +35,19 @@ namespace tubule {
 
 enum class Tier { axisym, surface3d, automatic };
 
-using Shape =
-    std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, FormulaShape, ProfileFile, MeshFile, ResultFrame>;
+using Shape = std::variant<Tube, Sphere, Ellipsoid, Torus, Capsule, Dumbbell, Patch, FormulaShape, ProfileFile,
+                           MeshFile, ResultFrame>;
 
 inline bool is_tube(const Shape& shape) {
     return std::holds_alternative<Tube>(shape);
+}
+// Whether the shape is, or may be, a patch.
+inline bool may_have_rim(const Shape& shape) {
+    return std::holds_alternative<Patch>(shape) || std::holds_alternative<ResultFrame>(shape);
+}
+inline bool has_two_rings(const Shape& shape) {
+    const auto* patch = std::get_if<Patch>(&shape);
+    return patch && patch->second_radius;
 }
 // Whether the shape is, or may be, a periodic tube: of a result that is not known before it is read.
 inline bool may_have_period(const Shape& shape) {

@@ -24,7 +24,8 @@ enum class Family { prolate, oblate, stomatocyte, pear };
 // What a branch is followed in: the moduli by the number of their term, or these.
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
                      vary_pressure = -6, vary_force = -7, vary_alpha = -8, vary_M0 = -9, vary_extension = -10,
-                     vary_strength = -11;  // of potential 0; of potential i, i less
+                     vary_height = -11,  // of the second ring of a patch
+    vary_strength = -12;                 // of potential 0; of potential i, i less
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -135,7 +136,8 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
                                              {"model.tension", vary_tension},
                                              {"model.pressure", vary_pressure},
                                              {"model.force", vary_force},
-                                             {"model.extension", vary_extension}});
+                                             {"model.extension", vary_extension},
+                                             {"shape.height", vary_height}});
         for (std::size_t i = 0; i < energy.potentials.size(); ++i)
             if (energy.potentials[i].is_wall())
                 parameters.emplace_back(fmt::format("energy.potential.{}.strength", i),

@@ -167,6 +167,7 @@ void keys(Keys& k, Model& model) {
     k.ramp("force", model.force);
     k.number("bead_width", model.bead_width, {.above = 0});
     k.ramp("extension", model.extension);
+    k.choice("rim", model.rim, {{"clamped", Rim::clamped}, {"hinged", Rim::hinged}});
     k.check("extension", [&] {
         return model.extension && !model.force.is_zero()
                    ? "holds the distance that model.force pulls at: give one of them"
@@ -356,6 +357,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_pressure) return loads.pressure;
     if (parameter == vary_force) return loads.force;
     if (parameter == vary_extension) return c.model.extension ? std::optional(c.model.extension->at(0)) : std::nullopt;
+    if (parameter == vary_height) return std::nullopt;
     if (parameter == vary_alpha) return c.energy.alpha;
     if (parameter <= vary_strength) return c.energy.potentials[vary_strength - parameter].strength;
     if (parameter == vary_M0) return c.energy.M0;
@@ -373,7 +375,7 @@ void check_values(Keys& k, const Case& c) {
     if (!c.equilibrium) return;
     k.check("equilibrium.volume", [&]() -> std::string {
         const EquilibriumChoices& e = *c.equilibrium;
-        if (is_tube(c.shape) || c.model.free_period || !e.area || !e.volume) return {};
+        if (is_tube(c.shape) || may_have_rim(c.shape) || c.model.free_period || !e.area || !e.volume) return {};
         const double most = std::pow(*e.area, 1.5) / (6 * std::sqrt(pi));
         if (*e.volume <= most) return {};
         return fmt::format("must be at most {:.6g}: no shape with this equilibrium.area encloses more", most);

@@ -66,6 +66,8 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
     placed{"tier = \"axisym\", or with [equilibrium]",
            [](P p) { return p.tier == Tier::axisym || p.unknowns == Unknowns::surface_equilibrium; }},
     closed{"a closed surface", [](P p) { return !is_tube(p.shape); }},
+    rim{"shape.kind = \"patch\"", [](P p) { return may_have_rim(p.shape); }},
+    two_rings{"shape.second_radius", [](P p) { return has_two_rings(p.shape); }},
     no_family{"a case without equilibrium.family", [](P p) { return !p.equilibrium || !p.equilibrium->family; }},
     no_modes{"a case without equilibrium.modes", [](P p) { return !p.equilibrium || !p.equilibrium->modes; }},
     other_branch{"a branch that does not vary it",
@@ -88,6 +90,12 @@ const Property graph{"a graph r(z): the gradient flow of a tube, free volume and
 
 Test begins(InitialVelocity how) {
     return [how](P p) { return p.velocity.initial == how; };
+}
+Test varied(int parameter) {
+    return [parameter](P p) { return p.equilibrium && p.equilibrium->branch.parameter == parameter; };
+}
+bool patch(P p) {
+    return std::holds_alternative<Patch>(p.shape);
 }
 Test area_is(AreaRule rule) {
     return [rule](P p) { return p.model.area == rule; };
@@ -117,11 +125,15 @@ const std::vector<Requirement> rows{
     key("auto", {automatic_tier}),
     key("equilibrium", {named_tier}),
     key("equilibrium.family", {axisym}, "begin with a shape of the case, or with a result of tier axisym"),
+    value("equilibrium.branch.vary", varied(vary_height), {two_rings}, "it is the distance of the rings"),
     key("equilibrium.rates", {surface}, "the rates of each m are those of equilibrium.modes"),
     key("equilibrium.modes", {axisym, no_inertia}, "growth rates neglect inertia"),
     value(
         "shape.kind", [](P p) { return std::holds_alternative<Torus>(p.shape) && p.tier == Tier::axisym; }, {motion},
         "equilibria of this tier are closed cells, or tubes with mirror symmetry"),
+
+    value("shape.kind", patch, {axisym}, "tier surface3d has closed surfaces and periodic tubes"),
+    key("model.rim", {rim}, "it says how a patch is held"),
 
     key("model", {time}, "nothing moves without it"),
     key("model.Re", {viscous}),

@@ -27,8 +27,8 @@ struct Texts {
 
 }  // namespace
 
-BeadEquations::BeadEquations(double width, std::span<const std::string_view> variables)
-    : width_(width), in_space_(variables.size() == in_space.size()) {
+BeadEquations::BeadEquations(double width, std::span<const std::string_view> variables, std::optional<double> foot)
+    : width_(width), in_space_(variables.size() == in_space.size()), foot_(foot) {
     for (int bead = 0; bead < 2; ++bead) {
         const Texts t(width, in_space_, bead, "P");
         const auto density = [&](const std::string& factor) { return parse_formula(t.g + "*" + factor, variables); };
@@ -49,9 +49,13 @@ std::string BeadEquations::force_density(const BeadNumbers& at) const {
 BeadNumbers BeadEquations::residual(const BeadSurface& on, const BeadLoad& load, const BeadNumbers& at) const {
     BeadNumbers F;
     double forces[2];
-    for (int k = 0; k < 2; ++k) {
+    for (int k = first(); k < 2; ++k) {
         F[2 * k] = on.integral(beads_[k].G, at[2 * k + of_P]);
         forces[k] = at[2 * k + of_q] * on.integral(beads_[k].by_P, at[2 * k + of_P]);
+    }
+    if (foot_) {
+        F << at[of_P] + *foot_, at[of_q], F[2], load.distance ? distance(at) - *load.distance : forces[1] - load.force;
+        return F;
     }
     F[1] = load.distance ? distance(at) - *load.distance : forces[0] - load.force;
     F[3] = load.distance ? forces[0] - forces[1] : forces[1] - load.force;
@@ -62,10 +66,10 @@ BeadEquations::Slopes BeadEquations::slopes(const BeadSurface& on, const BeadLoa
     Slopes out{{}, {}, Eigen::Matrix4d::Zero()};
     Eigen::MatrixXd force_by_shape;
     Eigen::Matrix<double, 2, 4> force_by_numbers = Eigen::Matrix<double, 2, 4>::Zero();
-    for (int k = 0; k < 2; ++k) {
+    for (int k = first(); k < 2; ++k) {
         const int P = 2 * k + of_P, q = 2 * k + of_q;
         const Eigen::VectorXd G_slope = on.slope(beads_[k].G, at[P]), with_P = on.slope(beads_[k].by_P, at[P]);
-        if (k == 0) {
+        if (k == first()) {
             out.force_by_numbers.setZero(G_slope.size(), 4), out.equations_by_shape.setZero(4, G_slope.size());
             force_by_shape.setZero(2, G_slope.size());
         }
@@ -75,6 +79,16 @@ BeadEquations::Slopes BeadEquations::slopes(const BeadSurface& on, const BeadLoa
         out.equations_by_numbers(2 * k, P) = by_P;
         force_by_shape.row(k) = at[q] * with_P;
         force_by_numbers(k, P) = at[q] * by_PP, force_by_numbers(k, q) = by_P;
+    }
+    if (foot_) {
+        out.equations_by_numbers(0, 0) = out.equations_by_numbers(1, 1) = 1;
+        if (load.distance) {
+            out.equations_by_numbers(3, 0) = out.equations_by_numbers(3, 2) = 1;
+        } else {
+            out.equations_by_shape.row(3) = force_by_shape.row(1);
+            out.equations_by_numbers.row(3) = force_by_numbers.row(1);
+        }
+        return out;
     }
     if (load.distance) {
         out.equations_by_numbers(1, 0) = out.equations_by_numbers(1, 2) = 1;
@@ -91,7 +105,7 @@ BeadEquations::Slopes BeadEquations::slopes(const BeadSurface& on, const BeadLoa
 
 double BeadEquations::lagrangian(const BeadSurface& on, const BeadLoad& load, const BeadNumbers& at) const {
     double out = 0;
-    for (int k = 0; k < 2; ++k) out += at[2 * k + of_q] * on.integral(beads_[k].G, at[2 * k + of_P]);
+    for (int k = first(); k < 2; ++k) out += at[2 * k + of_q] * on.integral(beads_[k].G, at[2 * k + of_P]);
     return load.distance ? out - force(on, at) * (distance(at) - *load.distance) : out;
 }
 
@@ -99,7 +113,8 @@ double BeadEquations::lagrangian(const BeadSurface& on, const BeadLoad& load, co
 BeadNumbers BeadEquations::numbers(const BeadSurface& on, const std::array<double, 2>& poles, double force) const {
     constexpr int most = 60;
     BeadNumbers out;
-    for (int k = 0; k < 2; ++k) {
+    if (foot_) out.head<2>() << -*foot_, 0;
+    for (int k = first(); k < 2; ++k) {
         double P = poles[k], last = HUGE_VAL;
         bool found = false;
         for (int i = 0; i < most && !found && std::isfinite(P); ++i) {
@@ -115,15 +130,16 @@ BeadNumbers BeadEquations::numbers(const BeadSurface& on, const std::array<doubl
 }
 
 double BeadEquations::force(const BeadSurface& on, const BeadNumbers& at) const {
-    return at[of_q] * on.integral(beads_[0].by_P, at[of_P]);
+    const int k = first();
+    return at[2 * k + of_q] * on.integral(beads_[k].by_P, at[2 * k + of_P]);
 }
 
 Eigen::VectorXd BeadEquations::distance_slope(const BeadSurface& on, const BeadNumbers& at) const {
     Eigen::VectorXd out;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = first(); k < 2; ++k) {
         const double P = at[2 * k + of_P];
         const Eigen::VectorXd one = -on.slope(beads_[k].G, P) / on.integral(beads_[k].by_P, P);
-        out = k == 0 ? one : Eigen::VectorXd(out + one);
+        out = k == first() ? one : Eigen::VectorXd(out + one);
     }
     return out;
 }
@@ -131,11 +147,11 @@ Eigen::VectorXd BeadEquations::distance_slope(const BeadSurface& on, const BeadN
 // Each bead has q (2 d(dG/dP) dP + d^2G/dP^2 dP^2), the product written as a difference of two squares.
 BeadEquations::Following BeadEquations::following(const BeadSurface& on, const BeadNumbers& at) const {
     Following out;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = first(); k < 2; ++k) {
         const double P = at[2 * k + of_P], q = at[2 * k + of_q];
         const auto [by_P, by_PP] = slopes_in_P(on, k, P);
         const Eigen::VectorXd follows = -on.slope(beads_[k].G, P) / by_P, with = on.slope(beads_[k].by_P, P);
-        if (k == 0) out.columns.resize(follows.size(), 0);
+        if (k == first()) out.columns.resize(follows.size(), 0);
         if (q == 0) continue;
         const double alike = std::sqrt(with.norm() / follows.norm());
         const Eigen::Index n = out.columns.cols();

@@ -1,5 +1,5 @@
-// Two beads at the poles of a closed surface, theory.md (2.23): the equations of their positions, and of the force
-// between them or of their distance, for the integrals of either tier.
+// Two beads at the poles of a closed surface, or one at the pole of a patch, theory.md (2.23): the equations of their
+// positions, and of the force between them or of their distance, for the integrals of either tier.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,7 +34,8 @@ class BeadEquations {
 public:
     static constexpr std::array<std::string_view, 3> on_profile{"r", "z", "P"};
     static constexpr std::array<std::string_view, 4> in_space{"x", "y", "z", "P"};
-    BeadEquations(double width, std::span<const std::string_view> variables);
+    // `foot`: the height of the ring of a patch, which stands for the lower bead; its q is 0.
+    BeadEquations(double width, std::span<const std::string_view> variables, std::optional<double> foot = {});
 
     // F = 0: both G, and that q dG/dP is the force, or that both are the same and the distance is held. The force of
     // the beads on the shape is the slope of SUM q G.
@@ -66,6 +67,7 @@ public:
     std::string force_density(const BeadNumbers& at) const;
 
     double width() const { return width_; }
+    bool has_bead(int bead) const { return bead >= first(); }
     // Densities of G and dG/dP.
     const Formula& density(int bead) const { return beads_[bead].G; }
     const Formula& density_by_P(int bead) const { return beads_[bead].by_P; }
@@ -78,8 +80,11 @@ private:
     struct Bead {
         Formula G, by_P, by_PP;  // densities
     };
+    int first() const { return foot_ ? 1 : 0; }
+
     double width_;
     bool in_space_;
+    std::optional<double> foot_;
     std::array<Bead, 2> beads_;
 };
 

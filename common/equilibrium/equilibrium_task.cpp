@@ -40,6 +40,8 @@ SetParameter setter(int parameter) {
             return [](StationaryProblem& p, double value) { p.loads.force = value; };
         case vary_extension:
             return [](StationaryProblem& p, double value) { p.beads->extension = Ramp(value); };
+        case vary_height:
+            return [](StationaryProblem& p, double value) { p.rings.back().z = p.rings.front().z + value; };
         default:
             return [](StationaryProblem& p, double value) {
                 if (p.constraints.area)
@@ -73,6 +75,8 @@ double parameter_value(int parameter, const StationaryProblem& p) {
             return p.loads.force;
         case vary_extension:
             return p.beads->extension->at(0);
+        case vary_height:
+            return p.rings.back().z - p.rings.front().z;
         default:
             return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
     }

@@ -164,7 +164,8 @@ template <class System>
 bool descend(System& system, Eigen::VectorXd& u, double tolerance, int& iterations) {
     const StationaryProblem goal = system.problem();
     const Extents from = system.extents(u);
-    if (!(from.area > 0 && from.volume > 0)) return false;  // turned inside out by an earlier attempt
+    // Turned inside out by an earlier attempt; the volume of a patch may have either sign.
+    if (!(from.area > 0 && (from.volume > 0 || !goal.rings.empty()))) return false;
     const int stages = 1 + static_cast<int>(distance(goal, from) / 0.03);
     for (int k = 1; k < stages; ++k) {
         system.set_problem(between(goal, from, static_cast<double>(k) / stages));

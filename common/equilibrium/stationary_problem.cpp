@@ -27,7 +27,9 @@ void check_values(const StationaryProblem& problem, double period) {
         if (value && !(*value > 0))
             throw std::invalid_argument(fmt::format("{} of {} is impossible: it must be positive", what, *value));
     };
-    positive(c.area, "an area"), positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
+    positive(c.area, "an area");
+    if (!problem.rings.empty()) return;
+    positive(c.volume, "a volume"), positive(c.reduced_volume, "a reduced volume");
     if (period == 0) {
         std::optional<double> v = c.reduced_volume;
         if (c.area && c.volume) v = reduced_volume(*c.area, *c.volume);
@@ -53,7 +55,7 @@ bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
            p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
            p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty() &&
-           !p.beads;
+           !p.beads && p.rings.empty();
 }
 
 void check_problem(const StationaryProblem& problem, double period) {
@@ -65,6 +67,8 @@ void check_problem(const StationaryProblem& problem, double period) {
     const bool tension = problem.loads.tension != 0, pressure = problem.loads.pressure != 0 || problem.loads.of_volume;
     if ((c.area && tension) || (c.volume && pressure) || (c.reduced_volume && (tension || pressure)))
         throw std::invalid_argument("a tension needs a free area, a pressure a free volume");
+    if (c.reduced_volume && !problem.rings.empty())
+        throw std::invalid_argument("a reduced volume is that of a closed surface");
     if (c.reduced_volume && (c.area || c.volume))
         throw std::invalid_argument("the reduced volume cannot be combined with area and volume, which determine it");
     check_values(problem, period);
@@ -110,10 +114,11 @@ double constraint_error(const Constraints& c, const MultiplierEquations& equatio
     return std::max(area, volume);
 }
 
+// The volume of a patch and the distance of its bead may be zero: from there they change by equal steps.
 StationaryProblem between(const StationaryProblem& goal, const Extents& from, double part) {
     const auto on_the_way = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
         if (!wanted) return wanted;
-        return is * std::pow(*wanted / is, part);
+        return goal.rings.empty() ? is * std::pow(*wanted / is, part) : is + part * (*wanted - is);
     };
     const Constraints& c = goal.constraints;
     StationaryProblem out = goal;
@@ -126,12 +131,14 @@ StationaryProblem between(const StationaryProblem& goal, const Extents& from, do
 
 double distance(const StationaryProblem& goal, const Extents& from) {
     const Constraints& c = goal.constraints;
-    const auto off = [](const std::optional<double>& wanted, double is) {
-        return wanted ? std::abs(std::log(*wanted / is)) : 0;
+    const double size = std::sqrt(from.area);
+    const auto off = [&](const std::optional<double>& wanted, double is, double scale) {
+        if (!wanted) return 0.0;
+        return goal.rings.empty() ? std::abs(std::log(*wanted / is)) : std::abs(*wanted - is) / scale;
     };
-    return std::max({off(c.area, from.area), off(c.volume, from.volume),
-                     off(c.reduced_volume, reduced_volume(from.area, from.volume)),
-                     off(goal.held_distance(), from.length)});
+    return std::max({off(c.area, from.area, from.area), off(c.volume, from.volume, size * from.area),
+                     off(c.reduced_volume, reduced_volume(from.area, from.volume), 1),
+                     off(goal.held_distance(), from.length, size)});
 }
 
 bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding) {
@@ -144,7 +151,9 @@ std::string missed_constraint(const Constraints& goal, double first_area, double
                               double volume) {
     std::string missed;
     const auto compare = [&](const char* what, const std::optional<double>& wanted, double from, double to) {
-        if (wanted && !(std::abs(std::log(to / *wanted)) < 0.01) && missed.empty())
+        if (!wanted) return;
+        const double scale = std::max(std::abs(*wanted), std::abs(from));
+        if (!(std::abs(to - *wanted) < 0.01 * scale) && missed.empty())
             missed = fmt::format(
                 "no shape with {} {:.6g} was found: the start has {:.6g}, and the descent from there "
                 "came to {:.6g}",

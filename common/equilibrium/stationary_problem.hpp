@@ -3,8 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/energy/bending.hpp"
 #include "common/model/model.hpp"
@@ -19,13 +21,28 @@ struct Constraints {
     std::optional<double> area, volume, reduced_volume;
 };
 
+// Where a patch ends: its place, which is held, and where it is clamped its tangent (r, z), in the direction of the
+// profile.
+struct Ring {
+    double r = 0, z = 0;
+    std::optional<std::array<double, 2>> tangent{};
+
+    int conditions() const { return tangent ? 3 : 2; }
+};
+inline int condition_count(const std::vector<Ring>& rings) {
+    int sum = 0;
+    for (const Ring& ring : rings) sum += ring.conditions();
+    return sum;
+}
+
 struct StationaryProblem {
     Bending bending;
     Constraints constraints;
     Loads loads{};             // tension of a free area, pressure of a free volume, force of a free period
     bool free_period = false;  // of a tube; of half a tube in tier 1
     std::optional<Beads> beads{};
-    double bead_distance = 0;  // of the initial shape
+    double bead_distance = 0;   // of the initial shape
+    std::vector<Ring> rings{};  // of a patch, which has one or two
 
     // That is held; none where the force between them is given.
     std::optional<double> held_distance() const {
@@ -38,7 +55,7 @@ struct StationaryProblem {
 bool scale_free(const StationaryProblem& problem);
 
 // Throws std::invalid_argument for loads on what is held (with a reduced volume, neither tension nor pressure), for
-// constraints that contradict each other, and for values that no shape has. `period`: 0 of a closed surface.
+// constraints that contradict each other, and for values that no shape has. `period`: 0 of a closed surface or a patch.
 void check_problem(const StationaryProblem& problem, double period);
 
 // The two equations for sigma and lambda, F = 0: what is held has its value, what is free its load, and with a reduced

@@ -21,8 +21,12 @@ enum class ModelKind { gradient_flow, overdamped, stokes, fluid, automatic };
 // a reservoir, which feeds an inextensible membrane uniformly.
 enum class AreaRule { free, fixed, reservoir };
 
-// Two beads at the poles of a closed surface, drawn apart along the axis: theory.md (2.23). The force of the loads
-// draws them, or their distance is that of the initial shape and an extension.
+// How a patch is held where it ends in a ring: by its place, or by its place and its angle.
+enum class Rim { clamped, hinged };
+
+// Two beads at the poles of a closed surface, drawn apart along the axis, or one at the pole of a patch, drawn away
+// from the plane of the ring: theory.md (2.23). The force of the loads draws them, or their distance is that of the
+// initial shape and an extension.
 struct Beads {
     double width = 0;  // of the weight that places a bead
     std::optional<Ramp> extension{};
@@ -47,6 +51,7 @@ struct Model {
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
     std::optional<double> bead_width{};                   // none: no beads
     std::optional<Ramp> extension{};                      // of their distance, where that is held
+    Rim rim = Rim::clamped;                               // of patches
 
     bool has_pressure() const { return pressure_of_volume || !pressure.is_zero(); }
 };
@@ -117,6 +122,7 @@ struct MotionLaw {
     Ramp tension{}, pressure{}, force{};
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
     std::optional<Beads> beads{};
+    Rim rim = Rim::clamped;  // of patches
 
     // The L2 gradient flow of F: nothing is kept.
     bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
@@ -177,7 +183,8 @@ inline MotionLaw motion_law(const Model& model) {
             .pressure = model.pressure,
             .force = model.force,
             .pressure_of_volume = model.pressure_of_volume,
-            .beads = std::move(beads)};
+            .beads = std::move(beads),
+            .rim = model.rim};
 }
 
 }  // namespace tubule

@@ -21,8 +21,16 @@ enum class Topology {
     cell,       // closed, from the south pole (s = 0) to the north pole: r odd, z even at both
     half_cell,  // from the south pole to the equator z = 0, a plane of symmetry
     tube,       // one period of a tube: r(s + 1) = r(s), z(s + 1) = z(s) + length; a torus if the length is 0
-    half_tube   // half a period, between the planes of symmetry z = 0 and z = length/2
+    half_tube,  // half a period, between the planes of symmetry z = 0 and z = length/2
+    cap,        // a patch from its ring (s = 0) to the north pole
+    strip       // a patch between two rings
 };
+constexpr bool is_patch(Topology t) {
+    return t == Topology::cap || t == Topology::strip;
+}
+constexpr bool is_closed(Topology t) {
+    return t == Topology::cell || t == Topology::half_cell;
+}
 
 // A point of a curve with derivatives in its parameter.
 struct CurveSample {

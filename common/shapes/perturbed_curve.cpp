@@ -100,7 +100,7 @@ CurveFunctions functions_of(const PerturbedCurve& curve, const std::vector<doubl
     std::vector<Pair> values(n);
     if (!curve.is_cell()) {
         for (std::size_t i = 0; i < n; ++i) values[i] = {first[i], second[i]};
-        return blended(s, values, true);
+        return blended(s, values, curve.topology == Topology::tube);
     }
     std::vector<double> c(n), scale(n);
     for (std::size_t i = 0; i < n; ++i) c[i] = -std::cos(pi * s[i]), scale[i] = first[i] / std::sin(pi * s[i]);
@@ -139,7 +139,7 @@ std::vector<double> measure(PerturbedCurve& curve, const std::vector<double>& s)
         until.push_back(until.back() + piece.length);
         total.radius += piece.radius, total.volume += piece.volume;
     }
-    require(total.volume > 0, "a profile must be oriented with the outside to its right");
+    require(total.volume > 0 || is_patch(curve.topology), "a profile must be oriented with the outside to its right");
     curve.arc_length = until.back();
     curve.mean_radius = total.radius / until.back();
     return until;
@@ -153,8 +153,10 @@ Topology topology_of(const std::vector<double>& r, const std::vector<double>& z,
     for (std::size_t i = 1; i < last; ++i) require(r[i] > 0, "r of a profile must be positive between its ends");
     const auto close = [&](double a, double b) { return std::abs(a - b) < 1e-9 * size; };
     if (length == 0 && close(r[0], 0) && close(r[last], 0)) return Topology::cell;
-    require(r[0] > 0 && close(r[last], r[0]) && close(z[last], z[0] + length),
-            "a profile must run from pole to pole, over one period, or once around");
+    const bool around = r[0] > 0 && close(r[last], r[0]) && close(z[last], z[0] + length);
+    if (!around && length == 0 && r[0] > 0 && !(r[last] < 0))
+        return close(r[last], 0) ? Topology::cap : Topology::strip;
+    require(around, "a profile must run from pole to pole, over one period, once around, or from a ring");
     return Topology::tube;
 }
 

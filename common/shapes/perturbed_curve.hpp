@@ -71,7 +71,7 @@ struct NormalModes {
 // they are r / sin(pi s) and z, as functions of c = -cos(pi s): smooth at the poles c = -1 and 1, where r is odd and z
 // even in s.
 struct PerturbedCurve {
-    Topology topology = Topology::cell;  // or tube
+    Topology topology = Topology::cell;  // or tube, or that of a patch
     double length = 0;                   // tube: of a period
     double arc_length = 0;               // of the profile
     double mean_radius = 0;              // by arc length
@@ -85,10 +85,11 @@ struct PerturbedCurve {
 };
 
 // Through points from the south pole to the north pole (r = 0 at both, length = 0), from end to end of a period (length
-// > 0, the last point is the first one moved up), or once around a ring (the last is the first). Outward is to the
-// right of their direction. s is by arc length; about each point the curve is the polynomial of degree 6 through the
-// seven nearest points, between two points their blend. Throws std::invalid_argument for fewer than 9 points, r <= 0
-// between the poles, equal neighbours, ends that do not fit, and a surface inside out.
+// > 0, the last point is the first one moved up), once around a ring (the last is the first), or from the ring of a
+// patch to the north pole or to another ring. Outward is to the right of their direction. s is by arc length; about
+// each point the curve is the polynomial of degree 6 through the seven nearest points, between two points their blend.
+// Throws std::invalid_argument for fewer than 9 points, r <= 0 between the poles, equal neighbours, ends that do not
+// fit, and a surface inside out.
 PerturbedCurve curve_through(const std::vector<double>& r, const std::vector<double>& z, double length);
 
 // The tube r(z) of a spline over [0, length] in the usual convention: degree + 1 knots more than coefficients, degree

@@ -259,7 +259,14 @@ struct Prepare {
     Prepared operator()(const Shape& shape) const {
         return on(base(shape), [shape](const auto& p) { return position(shape, p); });
     }
+    Prepared operator()(const Patch&) const {
+        throw complaint(c, "shape.kind",
+                        "must not be \"patch\": tier surface3d has closed surfaces and periodic tubes");
+    }
     Prepared operator()(const PerturbedCurve& curve) const {
+        if (is_patch(curve.topology))
+            throw complaint(c, "shape.path",
+                            "must not hold a patch: tier surface3d has closed surfaces and periodic tubes");
         return of_profile(curve, [&](const Torus& torus) { return CurveMap{curve, torus}; });
     }
     template <class MapOn>

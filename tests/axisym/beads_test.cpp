@@ -24,8 +24,8 @@ using Vector = Eigen::VectorXd;
 using test::random_vector;
 
 std::shared_ptr<const CurveSpace> cell(int elements, double width) {
-    return std::make_shared<const CurveSpace>(Topology::cell, refined_at_beads(equal_breaks(elements), width, pi), 5,
-                                              4);
+    return std::make_shared<const CurveSpace>(
+        Topology::cell, refined_at_beads(Topology::cell, equal_breaks(elements), width, pi), 5, 4);
 }
 
 // Central differences with one extrapolation: their own error is of order h^4.

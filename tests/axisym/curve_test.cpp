@@ -72,7 +72,7 @@ TEST(CurveSpace, refusesWhatMakesNoCurve) {
               }),
               "breaks must run from 0 to 1");
     EXPECT_EQ(message_of<std::invalid_argument>([] { CurveSpace(Topology::cell, equal_breaks(4), 5, 4, 1.0); }),
-              "the length must be positive for a tube, 0 for a torus or a closed cell");
+              "the length must be positive for a tube, 0 for a torus, a closed cell or a patch");
     EXPECT_EQ(message_of<std::invalid_argument>([] {
                   const CurveSpace a(Topology::cell, equal_breaks(4), 5, 4),
                       b(Topology::tube, equal_breaks(4), 5, 4, 1);

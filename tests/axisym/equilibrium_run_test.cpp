@@ -105,7 +105,8 @@ TEST(EquilibriumCase, refusals) {
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
            "\"energy.H0\", \"energy.alpha\", \"energy.M0\", \"equilibrium.area\", \"equilibrium.volume\", "
            "\"equilibrium.reduced_volume\", "
-           "\"model.tension\", \"model.pressure\", \"model.force\", \"model.extension\", not \"energy.k43\"; did you "
+           "\"model.tension\", \"model.pressure\", \"model.force\", \"model.extension\", \"shape.height\", not "
+           "\"energy.k43\"; did you "
            "mean 'energy.k40'?");
     const std::string varies = "14:1: equilibrium.branch varies a quantity that is not held fixed: see " + held;
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",

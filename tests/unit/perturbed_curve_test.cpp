@@ -150,9 +150,9 @@ TEST(PerturbedCurve, Refusals) {
     std::vector<double> other = r;
     other[5] = 0;
     EXPECT_EQ(refusal(other, z), "r of a profile must be positive between its ends");
-    other = r, other.front() = 0.1;
-    EXPECT_EQ(refusal(other, z), "a profile must run from pole to pole, over one period, or once around");
-    EXPECT_EQ(refusal(r, z, 2), "a profile must run from pole to pole, over one period, or once around");
+    other = r, other.back() = 0.1;
+    EXPECT_EQ(refusal(other, z), "a profile must run from pole to pole, over one period, once around, or from a ring");
+    EXPECT_EQ(refusal(r, z, 2), "a profile must run from pole to pole, over one period, once around, or from a ring");
     std::vector<double> doubled_r = r, doubled_z = z;
     doubled_r[4] = doubled_r[5], doubled_z[4] = doubled_z[5];
     EXPECT_EQ(refusal(doubled_r, doubled_z), "two neighbouring points of a profile coincide");

@@ -35,6 +35,12 @@ const std::string wall = "energy.potential=[{kind=\"plane\", z=-2, strength=1, r
 const std::string H0_of_z = "energy.H0=sin(pi*z)", H0_of_area = "energy.H0=-1-0.1*area";
 const std::vector<Refused> refused{
     {axisym, {"auto.modes=2"}, "tier = \"auto\""},
+    {surface, {"shape={kind=\"patch\", radius=1}"}, "tier = \"axisym\""},
+    {axisym, {"model.rim=hinged"}, "shape.kind = \"patch\""},
+    {equilibrium,
+     {"shape={kind=\"patch\", radius=1, height=1}",
+      "equilibrium={held=\"nothing\", branch={vary=\"shape.height\", to=2, step=1}}"},
+     "shape.second_radius"},
     {moving, {"equilibrium.modes=2"}, "tier = \"axisym\""},
     {automatic, {"equilibrium.descend=true"}, "tier = \"axisym\" or"},
     {surface_equilibrium, {"equilibrium.family=prolate"}, "tier = \"axisym\""},

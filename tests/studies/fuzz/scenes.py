@@ -6,12 +6,13 @@ asked for a thirtieth of the accuracy; where they differ by more than the run st
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
 
-    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places | --beads]
+    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places | --beads | --patches]
 
 prints how true and stated errors compare over many scenes, for a program and for one of before: a run that finishes
 rightly with that one and now stops or does not know its error is a *false alarm*. With --ensembles, every scene has
 random rules and loads; otherwise every other one. With --places, all are closed surfaces at a wall, a particle or in a field; where
-their volume is free, most are under osmosis. With --beads, two beads draw a closed surface apart, by a force or by an extension.
+their volume is free, most are under osmosis. With --beads, two beads draw a closed surface apart, by a force or by an extension. With --patches,
+all are patches in rings, some with a bead.
 
     scenes.py TUBULE --print N                       the case of scene N
 
@@ -155,8 +156,20 @@ def pull(draw, case, size, modulus):
         model["extension"] = {"time": [0.0, until], "value": [0.0, number(size * draw.uniform(-0.3, 1))]}
 
 
+def hang(draw, case, size, modulus):
+    """Replaces the shape by a patch in a ring or between two; a bead draws at some."""
+    model, shape = case["model"], {"kind": "patch", "radius": number(size)}
+    shape["height"] = number(size * draw.choice((draw.uniform(-0.8, 1.2), draw.uniform(0.05, 0.3))))
+    if draw.random() < 0.4:
+        shape |= {"second_radius": number(size * draw.uniform(0.4, 1.6)), "height": number(size * draw.uniform(0.2, 2))}
+    elif draw.random() < 0.4:
+        pull(draw, case, size, modulus)
+    model["rim"] = draw.choice(("clamped", "hinged"))
+    case["shape"] = shape
+
+
 def scene(draw, ensembles=0.5, at=None):
-    """The case of a scene; `ensembles` is the probability of random rules and loads; `at`: what acts at places, place() or pull()."""
+    """The case of a scene; `ensembles` is the probability of random rules and loads; `at`: what acts at places, place(), pull() or hang()."""
     shape, size = draw_shape(draw)
     while (at and shape["kind"] == "tube") or (at is pull and shape["kind"] == "torus"):
         shape, size = draw_shape(draw)
@@ -284,7 +297,7 @@ def wild(rng, case):
 
 
 def one(rng, box):
-    case = scene(rng, at=rng.choice((None, None, place, pull)))
+    case = scene(rng, at=rng.choice((None, None, place, pull, hang)))
     tame = rng.random() < 0.5
     if not tame:
         wild(rng, case)
@@ -355,6 +368,7 @@ def main():
     parser.add_argument("--ensembles", action="store_const", const=1, default=0.5, help="in every scene")
     parser.add_argument("--places", dest="at", action="store_const", const=place, help="closed surfaces at walls, particles and in fields")
     parser.add_argument("--beads", dest="at", action="store_const", const=pull, help="closed surfaces that two beads draw apart")
+    parser.add_argument("--patches", dest="at", action="store_const", const=hang, help="patches in rings")
     parser.add_argument("--print", type=int)
     a = parser.parse_args()
     if a.print is not None:
