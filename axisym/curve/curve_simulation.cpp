@@ -26,6 +26,10 @@ constexpr int few_steps = 8;
 const char* const too_far =
     "fixed area and volume allow only some distances of the beads: free one of them, end the extension earlier, or try "
     "another accuracy";
+const char* const too_far_for_area =
+    "a fixed area allows only some distances of the bead from the ring: free the area, end the extension earlier, or "
+    "try "
+    "another accuracy";
 const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
 constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
 constexpr double tiny_step = 1e-9;
@@ -202,10 +206,10 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     keep_good();
 }
 
-// Whether area, volume and the distance of beads are held.
+// Whether area, volume and the distance of beads are held; of a patch the area alone limits the distance.
 bool CurveSimulation::holds_all() const {
     const MotionLaw& law = setup_.motion->law();
-    return law.beads && law.beads->extension && law.keeps_volume && !law.area_is_free();
+    return law.beads && law.beads->extension && !law.area_is_free() && (law.keeps_volume || setup_.space->is_patch());
 }
 
 // By a reservoir, and by what holds the distance of beads.
@@ -272,7 +276,7 @@ std::optional<StopReport> CurveSimulation::advance(double until) {
         return undefined_pressure(now_.pressure_domain, t);
     if (outcome_ == TimeIntegrator::Outcome::failed)
         return StopReport{Stop::solver_failed, t, "the time integrator gave up: " + integrator_->failure(),
-                          holds_all() ? too_far : another_resolution};
+                          holds_all() ? (setup_.space->is_patch() ? too_far_for_area : too_far) : another_resolution};
     if (outcome_ == TimeIntegrator::Outcome::guard) observed_at_ = std::numeric_limits<double>::quiet_NaN();
     return find_rise(observe(t, integrator_->x(), integrator_->v()));
 }

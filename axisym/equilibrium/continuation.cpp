@@ -45,7 +45,7 @@ public:
                                             : before + directions_without_mirror(problem, p.shape);
     }
 
-    // Regular shapes on meshes of their own.
+    // Regular shapes on meshes of their own; on this one where Newton's method fails there, as beside a fold.
     Equilibrium report(const Place& place, const StationaryProblem& problem, PointKind kind) const {
         const int n = system_->space().size();
         Equilibrium e;
@@ -63,7 +63,10 @@ public:
         EquilibriumSettings settings = settings_;
         settings.descend = false;
         Equilibrium better = find_equilibrium(problem, e, settings);
-        return better.stop == Stop::finished ? better : e;
+        if (better.stop == Stop::finished) return better;
+        e.negative_directions = directions_down(*system_, place.u(), e, settings.accuracy);
+        if (e.negative_directions < 0) e.estimated_error = 1;  // nothing is known
+        return e;
     }
 
     // Other elements when these are too coarse.

@@ -492,6 +492,13 @@ double axial_force(const StationaryProblem& problem, const Equilibrium& shape) {
            shape.length;
 }
 
+int directions_down(const StationarySystem& system, const Eigen::VectorXd& u, const Equilibrium& shape,
+                    double accuracy) {
+    const StationaryProblem& problem = system.problem();
+    const DirectionCount count = count_directions(problem, system, u, shape, accuracy);
+    return count.agrees ? count.by_coefficients + directions_without_mirror(problem, shape) : -1;
+}
+
 int directions_without_mirror(const StationaryProblem& problem, const Equilibrium& shape) {
     if (shape.space->images() == 1 || problem.free_period || problem.bending.H0_varies()) return 0;
     constexpr int most = 10;
