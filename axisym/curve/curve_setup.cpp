@@ -164,9 +164,6 @@ void require_patch(const Problem& c, const Curve& shape) {
     const bool alike = patch && patch->second_radius.value_or(patch->radius) == patch->radius;
     refuse(alike && c.is_equilibrium() && c.held == Held::area_and_volume, holds,
            "must leave the area or the volume free: of a part of a sphere or a cylinder they are one condition");
-    if (!c.is_equilibrium() || !c.equilibrium->modes) return;
-    refuse(c.law.viscosity != 0, "equilibrium.modes",
-           "has growth rates of patches for models without viscosity: set model.kind = \"overdamped\"");
 }
 
 InitialShape initial_shape(const Problem& c) {
@@ -290,6 +287,7 @@ TimeControl CurveSetup::control(double first_step) const {
     control.growth = step_growth_of(settings);
     control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);
     control.two_iterations = true;
+    control.second_may_grow = motion->law().open_rim;  // by the velocity, as the normal there turns
     return control;
 }
 

@@ -216,7 +216,7 @@ void append(Matrix& columns, const Vector& column) {
     columns.col(columns.cols() - 1) = column;
 }
 
-// A derivative at a ring, of unit length.
+// A derivative by the parameter at a ring.
 Vector functional_at(const SplineSpace& field, std::size_t ring, int derivative) {
     const double s = rim_parameter(ring);
     const int e = field.element_at(s);
@@ -225,7 +225,16 @@ Vector functional_at(const SplineSpace& field, std::size_t ring, int derivative)
     Vector out = Vector::Zero(field.size());
     for (int a = 0; a < field.width(); ++a)
         out[field.dofs(e)[a]] += field.signs(e)[a] * values[derivative * field.width() + a];
-    return out.normalized();
+    return out;
+}
+
+// The smallest M + y^T (own y + 2 cross) of all y with `fixed` y = `values`, everything being linear in w.
+Matrix smallest_with(const Matrix& M, const Matrix& own, const Matrix& cross, const Matrix& fixed,
+                     const Matrix& values) {
+    const Matrix first = least_squares(fixed, values), free = complement(fixed.transpose());
+    const Matrix slope = own * first + cross, left = free.transpose() * slope;
+    return M + first.transpose() * (slope + cross) -
+           left.transpose() * least_squares(free.transpose() * own * free, left);
 }
 
 struct SmallEigenpairs : Eigenpairs {
@@ -353,7 +362,7 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
     Matrix basis = constants ? complement(forms.mean) : regular(m, field);
     if (law.reservoir && shape_.space->is_patch()) {  // membrane flows in at a constant pressure
         Matrix ends(field.size(), 0);
-        for (std::size_t i = 0; i < problem_.rings.size(); ++i) append(ends, functional_at(field, i, 0));
+        for (std::size_t i = 0; i < problem_.rings.size(); ++i) append(ends, functional_at(field, i, 0).normalized());
         basis = regular(m, field);
         basis = basis * complement(basis.transpose() * ends);
     }
@@ -393,15 +402,43 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
                 add(2 * n + psi.dofs(e)[a], psi.signs(e)[a], -twist, twist, (mr * mr * f + f_ss - rate * f_s) / sqrt2);
         }
     }
-    const Matrix of_w = sigma.leftCols(n) + sigma.middleCols(n, n) * (basis * X);
+    const Matrix chi = basis * X, of_w = sigma.leftCols(n) + sigma.middleCols(n, n) * chi;
     M += 2 * law.viscosity * of_w.transpose() * of_w;
+    if (m == 0 && law.reservoir && shape_.space->topology() == Topology::strip) return with_flux(law, of_w, M);
     if (swirls == 0) return M;
     // The best psi. Motions of the whole that cost nothing may be among its choices: least squares then.
     const Matrix basis_psi = regular(m, psi), of_psi = sigma.rightCols(swirls) * basis_psi;
     const Matrix cross = 2 * law.viscosity * of_psi.transpose() * of_w;
     const Matrix own = 2 * law.viscosity * of_psi.transpose() * of_psi +
                        law.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
-    return M - cross.transpose() * least_squares(own, cross);
+    if (!shape_.space->is_patch()) return M - cross.transpose() * least_squares(own, cross);
+    // At its rings a patch does not move around the axis, d psi/ds = m chi/r, and does not flow through closed ones,
+    // psi = 0. (There d chi/ds = 0; where they are open chi = 0.)
+    Matrix fixed(psi.size(), 0), values(n, 0);
+    for (std::size_t i = 0; i < problem_.rings.size(); ++i) {
+        const CurveSample at = shape_.space->evaluate(shape_.x, rim_parameter(i));
+        append(fixed, functional_at(psi, i, 1) / std::hypot(at.r1, at.z1));
+        append(values, m / at.r * (chi.transpose() * functional_at(field, i, 0)));
+        if (law.reservoir) continue;
+        append(fixed, functional_at(psi, i, 0) / at.r);
+        append(values, Vector::Zero(n));
+    }
+    return smallest_with(M, own, cross, fixed.transpose() * basis_psi, values.transpose());
+}
+
+// Between two open rims membrane may also flow by u_s = 1/r, in at one and out at the other.
+Matrix ModeStability::with_flux(const MotionLaw& law, const Matrix& of_w, const Matrix& M) const {
+    Vector flux = Vector::Zero(of_w.rows());
+    double own = 0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& p = points_[k];
+        const double root = std::sqrt(p.weight * p.r * p.g), rate = p.slope / (p.r * p.r);
+        flux[3 * static_cast<Eigen::Index>(k)] = -root * rate, flux[3 * static_cast<Eigen::Index>(k) + 1] = root * rate;
+        own += law.friction * root * root / (p.r * p.r);
+    }
+    own += 2 * law.viscosity * flux.squaredNorm();
+    const Vector cross = 2 * law.viscosity * of_w.transpose() * flux;
+    return own > 0 ? Matrix(M - cross * cross.transpose() / own) : M;
 }
 
 // The positions of beads follow from the displacement, for m = 0; where their distance is held, it is fixed.
@@ -424,7 +461,7 @@ void ModeStability::add_beads(Forms& forms, Matrix& fixed) const {
 void ModeStability::fix_at_rings(const SplineSpace& field, Matrix& fixed) const {
     for (std::size_t i = 0; i < problem_.rings.size(); ++i)
         for (int derivative = 0; derivative <= (problem_.rings[i].tangent ? 1 : 0); ++derivative)
-            append(fixed, functional_at(field, i, derivative));
+            append(fixed, functional_at(field, i, derivative).normalized());
 }
 
 // What a displacement must leave alone, as columns: for m = 0 area and volume, and of a patch its rings; else for m < 2

@@ -62,6 +62,7 @@ private:
     Eigen::MatrixXd regular(int m, const SplineSpace& field) const;
     Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                      const Forms& forms) const;
+    Eigen::MatrixXd with_flux(const MotionLaw& law, const Eigen::MatrixXd& of_w, const Eigen::MatrixXd& M) const;
     Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, const SplineSpace& field, Forms& forms,
                                       const Eigen::MatrixXd& M) const;
     void fix_at_rings(const SplineSpace& field, Eigen::MatrixXd& fixed) const;

@@ -26,7 +26,9 @@ struct IdaIntegrator::Impl {
     SUNMatrix jacobian = nullptr;
     SUNLinearSolver solver = nullptr;
     SUNNonlinearSolver newton = nullptr;
-    double first_correction = 0;  // of the iteration that is under way
+    double first_correction = 0;  // of the iteration that is under way, or the second one where that may be larger
+    int first_count = 0;
+    bool may_grow = false;
     void* ida = nullptr;
     double time = 0;
     int guard = -1;
@@ -99,11 +101,15 @@ int has_converged(SUNNonlinearSolver newton, N_Vector, N_Vector correction, doub
     int count = 0;
     SUNNonlinSolGetCurIter(newton, &count);
     if (count == 0) {
-        self->first_correction = size;
+        self->first_correction = size, self->first_count = 0;
         return size <= 1e-4 * tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
     }
     if (size <= 0.1 * tolerance) return SUN_NLS_SUCCESS;  // as small as rounding lets it become, perhaps
-    const double rate = std::pow(size / self->first_correction, 1.0 / count);
+    if (count == 1 && self->may_grow && size > 0.1 * self->first_correction) {
+        self->first_correction = size, self->first_count = 1;
+        return SUN_NLS_CONTINUE;
+    }
+    const double rate = std::pow(size / self->first_correction, 1.0 / (count - self->first_count));
     if (rate > 0.9) return SUN_NLS_CONV_RECVR;
     return rate / (1 - rate) * size <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
 }
@@ -164,6 +170,8 @@ IdaIntegrator::IdaIntegrator(ImplicitSystem system, const Eigen::VectorXd& x0, c
         require(IDASetNonlinearSolver(s.ida, s.newton), "the nonlinear solver");
         require(SUNNonlinSolSetConvTestFn(s.newton, has_converged<Impl>, &s), "the convergence test");
     }
+    s.may_grow = control.second_may_grow;
+    require(IDASetMaxNonlinIters(s.ida, s.may_grow ? 8 : 4), "the number of iterations");
     require(IDARootInit(s.ida, static_cast<int>(s.system.n_guards), guard_values<Impl>), "the guards");
     require(IDASetNoInactiveRootWarn(s.ida), "the guards");
     s.dissipated = N_VNew_Serial(2, s.context);  // and the work

@@ -12,7 +12,8 @@ namespace tubule::axisym {
 // on a new mesh a flow continues with steps as long as before.
 class RosenbrockIntegrator : public TimeIntegrator {
 public:
-    // From x0 with rates v0, which solve the system. Of the control, max_order, newton and two_iterations mean nothing.
+    // From x0 with rates v0, which solve the system. Of the control, max_order and what concerns Newton's method mean
+    // nothing.
     RosenbrockIntegrator(ImplicitSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
                          const TimeControl& control);
     ~RosenbrockIntegrator() override;

@@ -21,6 +21,9 @@ struct TimeControl {
     // At least two iterations. IDA accepts one where earlier ones converged quickly; then constraints hold only to
     // the error of the step, because they are nonlinear.
     bool two_iterations = false;
+    // The second correction may be larger than the first: that of unknowns whose errors do not count acts on the
+    // others.
+    bool second_may_grow = false;
 };
 
 struct IntegratorCounters {

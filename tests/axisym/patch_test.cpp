@@ -100,7 +100,9 @@ TEST(Patches, equationsHaveTheirDerivatives) {
                                                 EXPECT_TRUE(motion.residual(0, to.data(), of.data(), F.data()));
                                                 return F;
                                             });
-                EXPECT_LE((moves - moved).lpNorm<Eigen::Infinity>(), 1e-7 * moves.lpNorm<Eigen::Infinity>());
+                // Row by row: those of the numbers are small beside the forces.
+                const Vector scale = J.cwiseAbs() * v.cwiseAbs();
+                for (Eigen::Index i = 0; i < y.size(); ++i) EXPECT_NEAR(moves[i], moved[i], 1e-6 * scale[i]) << i;
             }
         }
 }
@@ -203,7 +205,7 @@ TEST(Patches, forceIsTheSlopeOfTheEnergy) {
 
 const std::string moving =
     "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[model]\nkind = \"{}\"\nrim = \"{}\"\nvolume = \"free\"\npressure = 3\n"
-    "[shape]\nkind = \"patch\"\nradius = 1\nheight = 0.5\n[accuracy]\nenergy = 1e-6\n";
+    "[shape]\nkind = \"patch\"\nradius = 1\nheight = 0.5\n[accuracy]\nenergy = 1e-5\n";
 
 // Runs come to the equilibrium, at the rate of its slowest mode, and their energy balances.
 TEST(Patches, runsRelax) {
@@ -225,17 +227,54 @@ TEST(Patches, runsRelax) {
             EXPECT_NEAR(o.last("area"), o["area"].front(), 1e-10);
         }
     }
-    const std::string text = fmt::format(fmt::runtime(moving), "overdamped", "hinged");
+    const std::string text = fmt::format(fmt::runtime(moving), "stokes", "hinged");
     for (const bool open : {false, true}) {
-        std::vector<std::string> rest = asks(!open), moves{"accuracy.energy=1e-7"};
+        std::vector<std::string> rest = asks(!open), moves{"accuracy.energy=1e-5", "model.gamma=0.5"};
         if (open) moves.insert(moves.end(), {reservoir, pull}), rest.insert(rest.end(), {reservoir, pull});
-        rest.push_back("equilibrium.modes=0");
+        rest.insert(rest.end(), {"equilibrium.modes=0", "model.gamma=0.5"});
         const Outcome e = shape_of(text, rest);
-        const double rate = e.last("growth_0"), end = 8 / -rate, from = 0.75 * end, to = 0.9 * end;
+        const double rate = e.last("growth_0"), end = 12 / -rate, from = 0.65 * end, to = 0.8 * end;
         const Outcome o = run_case(
             parse_case(text + fmt::format("[time]\nend = {}\noutput = [{}, {}]\n", end, from, to), moves, "case.toml"));
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         const auto off = [&](double t) { return o.at("volume", t) - e.last("volume"); };
         EXPECT_NEAR(std::log(off(to) / off(from)) / (to - from), rate, 5e-3 * -rate);
+    }
+}
+
+// A cylinder of radius R = 0.8, H0 = -1/R, between hinged rings has the waves sin(n pi z/L) cos(m theta) of a tube: its
+// rates are those of theory.md (5.8), (5.9), (5.10) where membrane flows in through the rings.
+TEST(Patches, hingedCylindersHaveTheWavesOfTubes) {
+    const double R = 0.8, length = 1.3, k20 = 0.3, k42 = 0.15, sigma = 0.7, gamma = 0.8, mu = 0.6;
+    const Curve m = meridian(Patch{R, length, R});
+    StationaryProblem problem{bending(k20, -1 / R, 0, k42), {}, {.tension = sigma, .pressure = sigma / R}};
+    problem.rings = rings_of(m, Rim::hinged);
+    const Equilibrium e = find_equilibrium(problem, m, {.accuracy = 1e-10});
+    ASSERT_EQ(e.stop, Stop::finished) << e.message;
+    const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false},
+        overdamped{.friction = gamma, .keeps_volume = false, .reservoir = true},
+        stokes{.viscosity = mu, .friction = gamma, .keeps_volume = false, .reservoir = true};
+    for (int around = 0; around <= 3; ++around) {
+        const auto rates = [&](const MotionLaw& law) { return ModeStability(problem, e).rates(around, law, 2).rates; };
+        const std::vector<double> found[3] = {rates(gradient_flow), rates(overdamped), rates(stokes)};
+        std::vector<double> expected[3];
+        for (int n = 1; n < 4; ++n) {
+            const double q = pi * n / length, mR = around / R, Q = q * q + mR * mR, Z = Q - 1 / (R * R);
+            const double G = 2 * k20 * Z * Z + sigma * Z + 2 * k42 * std::pow(q, 4) / (R * R),
+                         slip = gamma * (Q * R * R + 1);
+            expected[0].push_back(-G), expected[1].push_back(-Q * R * R * G / slip);
+            expected[2].push_back(-Q * R * R * G /
+                                  (slip + 4 * mu * q * q - 4 * mu * mu * q * q * mR * mR / (gamma + mu * Q)));
+        }
+        for (int law = 0; law < 3; ++law) {
+            std::ranges::sort(expected[law], std::greater<>());
+            for (int i = 0; i < 2; ++i) EXPECT_NEAR(found[law][i] / expected[law][i], 1, 1e-6) << around << law << i;
+        }
+        // A closed rim hinders the flow, and for m = 0 holds the area, too.
+        const MotionLaw closed{.viscosity = mu, .friction = gamma, .keeps_volume = false};
+        if (around > 0) {
+            EXPECT_GT(rates(closed)[0], found[2][0]);
+        }
     }
 }
 
@@ -278,8 +317,6 @@ TEST(Patches, refusals) {
     says(text, {"tier=surface3d"}, "tier surface3d has closed surfaces and periodic tubes");
     says(plate, {"equilibrium.held=reduced-volume", "model.pressure=0"}, "must not be \"reduced-volume\"");
     says(plate, {"equilibrium.held=area-and-volume", "model.pressure=0", "shape.height=0.1"}, "they are one condition");
-    says(plate, {"model={kind=\"stokes\", volume=\"free\"}", "shape.height=0.1", "equilibrium.held=area"},
-         "for models without viscosity");
     says(plate, {"equilibrium.branch={vary=\"shape.height\", to=1, step=0.1}"}, "it is the distance of the rings");
     says(plate, {"model.rim=hinged", "shape={kind=\"sphere\", radius=1}"}, "it says how a patch is held");
     says(plate, {"model.bead_width=0.6"}, "must be small beside the shape");
