@@ -353,19 +353,39 @@ Matrix ModeStability::regular(int m, const SplineSpace& field) const {
     return complement(at_poles);
 }
 
+// At its rings a patch does not move around the axis, d psi/ds = m chi/r, and does not flow through closed ones, psi =
+// 0. (There d chi/ds = 0; where they are open chi = 0.) Columns: functionals of psi, and their values in w.
+std::pair<Matrix, Matrix> ModeStability::ring_conditions(int m, const MotionLaw& law, const SplineSpace& field,
+                                                         const SplineSpace& psi, const Matrix& chi) const {
+    Matrix fixed(psi.size(), 0), values(field.size(), 0);
+    for (std::size_t i = 0; i < problem_.rings.size(); ++i) {
+        const CurveSample at = shape_.space->evaluate(shape_.x, rim_parameter(i));
+        append(fixed, functional_at(psi, i, 1) / std::hypot(at.r1, at.z1));
+        append(values, m / at.r * (chi.transpose() * functional_at(field, i, 0)));
+        if (law.reservoir) continue;
+        append(fixed, functional_at(psi, i, 0) / at.r);
+        append(values, Vector::Zero(field.size()));
+    }
+    return {fixed, values};
+}
+
+// A basis of the chi of this m.
+Matrix ModeStability::potentials(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
+                                 const Forms& forms) const {
+    if (!(law.reservoir && shape_.space->is_patch()))
+        return m == 0 && mirror(parity) >= 0 ? complement(forms.mean) : regular(m, field);
+    Matrix ends(field.size(), 0);  // membrane flows in at a constant pressure
+    for (std::size_t i = 0; i < problem_.rings.size(); ++i) append(ends, functional_at(field, i, 0).normalized());
+    const Matrix basis = regular(m, field);
+    return basis * complement(basis.transpose() * ends);
+}
+
 // The dissipation of w nu with the best tangential velocity, as a quadratic form in w. That velocity is grad chi + nu x
 // grad psi, w and chi going with cos(m theta), psi with sin: inextensibility is Lap chi = H w, and psi is free.
 Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                        const Forms& forms) const {
     if (!law.inextensible) return law.friction * forms.mass;
-    const bool constants = m == 0 && mirror(parity) >= 0;
-    Matrix basis = constants ? complement(forms.mean) : regular(m, field);
-    if (law.reservoir && shape_.space->is_patch()) {  // membrane flows in at a constant pressure
-        Matrix ends(field.size(), 0);
-        for (std::size_t i = 0; i < problem_.rings.size(); ++i) append(ends, functional_at(field, i, 0).normalized());
-        basis = regular(m, field);
-        basis = basis * complement(basis.transpose() * ends);
-    }
+    const Matrix basis = potentials(m, law, parity, field, forms);
     const Matrix L = basis.transpose() * forms.gradients * basis, S = basis.transpose() * forms.source;
     const Matrix X = -Eigen::LDLT<Matrix>(L).solve(S);  // chi of w, in the basis
     Matrix M = law.friction * (forms.mass + X.transpose() * L * X);
@@ -412,17 +432,7 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
     const Matrix own = 2 * law.viscosity * of_psi.transpose() * of_psi +
                        law.friction * basis_psi.transpose() * assemble(m, psi).gradients * basis_psi;
     if (!shape_.space->is_patch()) return M - cross.transpose() * least_squares(own, cross);
-    // At its rings a patch does not move around the axis, d psi/ds = m chi/r, and does not flow through closed ones,
-    // psi = 0. (There d chi/ds = 0; where they are open chi = 0.)
-    Matrix fixed(psi.size(), 0), values(n, 0);
-    for (std::size_t i = 0; i < problem_.rings.size(); ++i) {
-        const CurveSample at = shape_.space->evaluate(shape_.x, rim_parameter(i));
-        append(fixed, functional_at(psi, i, 1) / std::hypot(at.r1, at.z1));
-        append(values, m / at.r * (chi.transpose() * functional_at(field, i, 0)));
-        if (law.reservoir) continue;
-        append(fixed, functional_at(psi, i, 0) / at.r);
-        append(values, Vector::Zero(n));
-    }
+    const auto [fixed, values] = ring_conditions(m, law, field, psi, chi);
     return smallest_with(M, own, cross, fixed.transpose() * basis_psi, values.transpose());
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "axisym/equilibrium/equilibrium.hpp"
@@ -62,6 +63,11 @@ private:
     Eigen::MatrixXd regular(int m, const SplineSpace& field) const;
     Eigen::MatrixXd dissipation_form(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
                                      const Forms& forms) const;
+    Eigen::MatrixXd potentials(int m, const MotionLaw& law, Parity parity, const SplineSpace& field,
+                               const Forms& forms) const;
+    std::pair<Eigen::MatrixXd, Eigen::MatrixXd> ring_conditions(int m, const MotionLaw& law, const SplineSpace& field,
+                                                                const SplineSpace& psi,
+                                                                const Eigen::MatrixXd& chi) const;
     Eigen::MatrixXd with_flux(const MotionLaw& law, const Eigen::MatrixXd& of_w, const Eigen::MatrixXd& M) const;
     Eigen::MatrixXd fixed_functionals(int m, const MotionLaw& law, const SplineSpace& field, Forms& forms,
                                       const Eigen::MatrixXd& M) const;

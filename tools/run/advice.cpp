@@ -6,6 +6,7 @@
 #include <cmath>
 #include <variant>
 
+#include "axisym/curve/curve_frame.hpp"
 #include "common/run/run.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/choice.hpp"
@@ -60,11 +61,24 @@ void advise_model(const Problem& c, Advice& out) {
     out.reason += "; " + chosen.reason;
 }
 
+// What only tier axisym has.
+bool begins_as_patch(const Problem& c) {
+    if (std::holds_alternative<Patch>(c.shape)) return true;
+    if (!std::holds_alternative<ResultFrame>(c.shape) || c.tier != Tier::axisym) return false;
+    return is_patch(axisym::initial_curve(c).topology);
+}
+
 }  // namespace
 
 std::optional<Advice> advice(const Problem& c, const Forecast& expected) {
     if (!c.moves()) return {};
     Advice out;
+    if (begins_as_patch(c)) {
+        out.tier = "axisym", out.model = name(c.model), out.accuracy = c.accuracy.energy;
+        out.seconds = expected.seconds, out.reason = "only this tier has patches";
+        advise_model(c, out);
+        return out;
+    }
     out.tier = "surface3d", out.model = name(c.model), out.accuracy = c.accuracy.energy;
     const Choice choice = choice_for(c);
     if (!choice.axisymmetric) {
