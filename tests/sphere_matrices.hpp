@@ -2,7 +2,7 @@
 // Lagrange elements on the flat triangles of a subdivided icosahedron, with the exact normal of the unit sphere.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
@@ -11,6 +11,8 @@
 #include <map>
 #include <utility>
 #include <vector>
+
+#include "common/solve/dense.hpp"
 
 namespace tubule::sphere {
 
@@ -109,8 +111,8 @@ struct Basis {
 inline std::vector<Eigen::Vector3d> quadrature(int n) {
     Eigen::MatrixXd jacobi = Eigen::MatrixXd::Zero(n, n);
     for (int i = 1; i < n; ++i) jacobi(i, i - 1) = i / std::sqrt(4.0 * i * i - 1);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gauss(jacobi);
-    const Eigen::ArrayXd x = (gauss.eigenvalues().array() + 1) / 2, w = gauss.eigenvectors().row(0).array().square();
+    const Eigenpairs gauss = eigenpairs(jacobi, true);
+    const Eigen::ArrayXd x = (gauss.values.array() + 1) / 2, w = gauss.vectors.row(0).array().square();
     std::vector<Eigen::Vector3d> points;
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) points.emplace_back(x[i], x[j] * (1 - x[i]), w[i] * w[j] * (1 - x[i]));

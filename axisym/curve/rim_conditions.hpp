@@ -18,7 +18,7 @@ std::vector<Ring> rings_of(const CurveSpace& space, const Eigen::VectorXd& x, Ri
 // the second. The curve x meets them where the products with x are the values.
 Eigen::MatrixXd rim_functionals(const CurveSpace& space, const std::vector<Ring>& rings);
 Eigen::VectorXd rim_values(const std::vector<Ring>& rings);
-// Of the condition for the height of the last ring.
+// The index of the condition for the height of the last ring.
 int condition_of_height(const std::vector<Ring>& rings);
 
 // The parameter of the curve at this ring.

@@ -156,9 +156,8 @@ double axial_force(const StationaryProblem& problem, const Equilibrium& shape);
 // Directions of half a curve that lower the energy and do not mirror themselves, 10 at most; 0 of a whole curve.
 int directions_without_mirror(const StationaryProblem& problem, const Equilibrium& shape);
 
-// Of a shape that was found: directions that lower the energy, those of half a curve that do not mirror themselves
-// among them; -1 where coefficients and normal displacements count differently, since the mesh does not resolve the
-// shape.
+// Directions that lower the energy of a shape that was found, those of half a curve that do not mirror themselves among
+// them; -1 where coefficients and normal displacements count differently, since the mesh does not resolve the shape.
 int directions_down(const StationarySystem& system, const Eigen::VectorXd& u, const Equilibrium& shape,
                     double accuracy);
 

@@ -92,7 +92,7 @@ StationaryProblem stationary_problem(const Problem& c, double area, double volum
     if (c.held == Held::area_and_volume && e.reduced_volume) held.volume = volume_at(*held.area, *e.reduced_volume);
     if (c.held != Held::reduced_volume) return out;
     const double reduced = e.reduced_volume.value_or(reduced_volume(area, volume));
-    // Of a free size that nothing determines the first one stays: Newton's method needs one.
+    // Where nothing determines the size the first one stays: Newton's method needs one.
     if (scale_free(out) && e.branch.parameter.value_or(vary_reduced_volume) == vary_reduced_volume)
         held.area = area, held.volume = volume_at(area, reduced);
     else

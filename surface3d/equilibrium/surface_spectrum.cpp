@@ -3,11 +3,11 @@
 #include <Spectra/SymGEigsShiftSolver.h>
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <optional>
 
 #include "common/solve/bordered_ldlt.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"
 
 namespace tubule::surface3d {
@@ -23,8 +23,7 @@ public:
         factors_.factor(bordered(A, shift));
         negative_ = factors_.negative() - static_cast<int>(A.constraints.cols());
         if (factors_.complement().size() == 0) return;
-        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(factors_.complement(), Eigen::EigenvaluesOnly);
-        negative_ += static_cast<int>((eigen.eigenvalues().array() < 0).count());
+        negative_ += static_cast<int>((eigenpairs(factors_.complement(), false).values.array() < 0).count());
         // Each positive weight brings a negative eigenvalue of its own.
         negative_ -= static_cast<int>((A.weights.array() > 0).count());
     }

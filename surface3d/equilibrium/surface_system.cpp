@@ -1,8 +1,9 @@
 #include "surface3d/equilibrium/surface_system.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cmath>
 
+#include "common/solve/dense.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/remesh.hpp"
@@ -63,11 +64,11 @@ Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, con
         changes.row(i) << slope.transpose(), from.cross(slope).transpose();
         slopes += slope.squaredNorm();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(changes.transpose() * changes);
+    const Eigenpairs gram = eigenpairs(changes.transpose() * changes, true);
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, 0);
-    for (int j = 0; j < rigid && gram.eigenvalues()[j] <= nothing * slopes; ++j) {
+    for (int j = 0; j < rigid && gram.values[j] <= nothing * slopes; ++j) {
         out.conservativeResize(Eigen::NoChange, j + 1);
-        out.col(j) << gram.eigenvectors().col(j), Eigen::VectorXd::Zero(all - rigid);
+        out.col(j) << gram.vectors.col(j), Eigen::VectorXd::Zero(all - rigid);
     }
     return out;
 }
@@ -146,13 +147,13 @@ void SurfaceSystem::set_motions() {
     motions_.resize(shape_size(), 0);
     if (fields.cols() == 0) return;
     const Eigen::MatrixXd image = mass_ * fields;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * image);
+    const Eigenpairs gram = eigenpairs(fields.transpose() * image, true);
     for (Eigen::Index j = 0; j < fields.cols(); ++j) {
-        const double norm2 = gram.eigenvalues()[j];
+        const double norm2 = gram.values[j];
         if (!(norm2 > least)) continue;
         motions_.conservativeResize(shape_size(), motions_.cols() + 1);
         motions_.col(motions_.cols() - 1).setZero();
-        motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.eigenvectors().col(j) / std::sqrt(norm2);
+        motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.vectors.col(j) / std::sqrt(norm2);
     }
 }
 
@@ -161,10 +162,10 @@ void SurfaceSystem::set_turn(const Eigen::MatrixXd& rigid, const Eigen::Vector3d
     turn_.reset();
     const Eigen::Index first = base_.period > 0 ? 5 : 0, count = 6 - first;
     const Eigen::MatrixXd fields = rigid.middleCols(first, count);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * (mass_ * fields));
-    if (!(gram.eigenvalues()[0] < least) || (count > 1 && gram.eigenvalues()[1] < least)) return;
+    const Eigenpairs gram = eigenpairs(fields.transpose() * (mass_ * fields), true);
+    if (!(gram.values[0] < least) || (count > 1 && gram.values[1] < least)) return;
     Eigen::VectorXd c = Eigen::VectorXd::Zero(6);
-    c.tail(count) = gram.eigenvectors().col(0);
+    c.tail(count) = gram.vectors.col(0);
     const Eigen::Vector3d omega = c.tail<3>() / size;
     if (!(omega.norm() * size > 0.1)) return;
     turn_ = {(c.head<3>() - omega.cross(centre)) / omega.norm(), omega.normalized()};

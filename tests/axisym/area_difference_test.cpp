@@ -2,8 +2,6 @@
 // closed forms of linear theory, and runs.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <cmath>
 
 #include "axisym/curve/curve_measures.hpp"
@@ -11,6 +9,7 @@
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "common/theory/waves.hpp"
 #include "tests/axisym/runs.hpp"
@@ -108,7 +107,7 @@ TEST(AreaDifference, equilibriaAreThoseOfAnEffectiveSpontaneousCurvature) {
             other.shape.sigma += constant, other.shape.mu = 0;
             const StationarySystem system(e.space, other.problem, e.gauge);
             const Vector u = unknowns(other.problem, other.shape),
-                         step = Matrix(system.jacobian(u)).partialPivLu().solve(system.residual(u));
+                         step = solve_dense(Matrix(system.jacobian(u)), system.residual(u));
             EXPECT_LT(step.head(e.x.size()).lpNorm<Eigen::Infinity>(), 1e-10);
             EquilibriumSettings settings;
             settings.accuracy = 1e-11, settings.descend = false;
@@ -177,11 +176,9 @@ TEST(AreaDifference, theSecondVariationIsTheDerivativeOfTheGradient) {
     Vector place = Vector::Zero(n);
     place.tail(space->z().size()) = space->z().mean();
     fixed << system.forms().gradient({.area = 1}, x), system.forms().gradient({.volume = 1}, x), place;
-    const Matrix Q = Eigen::HouseholderQR<Matrix>(fixed).householderQ(), free = Q.rightCols(n - 3);
+    const Matrix free = orthogonal_complement(fixed, 1e-12);
     const Matrix reduced = free.transpose() * hessian * free;
-    const Vector expected =
-        Eigen::SelfAdjointEigenSolver<Matrix>((reduced + reduced.transpose()) / 2, Eigen::EigenvaluesOnly)
-            .eigenvalues();
+    const Vector expected = eigenpairs((reduced + reduced.transpose()) / 2, false).values;
     Vector settled = u;
     system.set_followers(settled);
     const Vector found = system.variation(settled).eigenvalues;

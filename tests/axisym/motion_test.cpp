@@ -1,14 +1,12 @@
 // The laws of motion of a profile curve: derivatives, consistent starts, inf-sup stability.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
-
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"
+#include "common/solve/dense.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/support/random_vector.hpp"
 
@@ -184,8 +182,8 @@ double inf_sup(const CurveSpace& space, const Vector& x) {
                     mass(field.dofs(e)[i], field.dofs(e)[j]) +=
                         dS * field.signs(e)[i] * field.signs(e)[j] * b.by_spline[q][0][i] * b.by_spline[q][0][j];
         }
-    const Eigen::MatrixXd schur = B * norm.ldlt().solve(B.transpose());
-    return std::sqrt(Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(schur, mass).eigenvalues()[0]);
+    const Eigen::MatrixXd schur = B * least_squares(norm, B.transpose());
+    return std::sqrt(eigenpairs(schur, mass)->values[0]);
 }
 
 TEST(CurveMotion, pressuresAreInfSupStable) {

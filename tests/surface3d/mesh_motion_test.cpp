@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <random>
 
+#include "common/solve/dense.hpp"
 #include "motion.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
 #include "surface3d/meshing/remesh.hpp"
@@ -75,7 +75,7 @@ TEST(MeshMotion, IsTheSolutionOfTheSaddlePoint) {
         b.segment(d * n, n) = -L * node_positions(scene.mesh).row(d).transpose() / 0.1;
     }
     b.tail(n) = flux;
-    const Eigen::VectorXd x = A.partialPivLu().solve(b);
+    const Eigen::VectorXd x = solve_dense(A, b);
     const VectorField exact = x.head(3 * n).reshaped(n, 3).transpose(), w = scene.motion(flux, false, 0.1);
     EXPECT_LT((w - exact).norm(), 1e-2 * exact.norm());
     EXPECT_LT((scene.flux(w) - flux).norm(), 1e-3 * flux.norm());
