@@ -324,6 +324,8 @@ void set_velocity(const CurveSetup& setup, Eigen::VectorXd& y) {
     const MotionLayout& at = setup.motion->layout();
     const auto project = [&](const SplineSpace& field, int offset, int component) {
         y.segment(offset, field.size()) = field.project([&](double s) {
+            // A patch has no base surface: its functions are those of s.
+            if (is_patch(curve.topology)) return value_at(curve.velocity->meridional, s)[component == 0 ? 0 : 1];
             return velocity(curve, Torus{2, 1}, base_point(curve, s, 0))[component];
         });
     };

@@ -293,6 +293,7 @@ CurveMode normal_mode(const PerturbedCurve& curve, int m, const std::vector<doub
 }
 
 PerturbedCurve disturbed(PerturbedCurve curve, const ResultFrame& frame) {
+    require(!is_patch(curve.topology), "must be absent: modes and noise are those of closed cells, tubes and rings");
     const bool cell = curve.is_cell();
     const double radius = cell ? std::sqrt(curve.mean_radius * curve.arc_length / 2) : curve.mean_radius;
     const std::size_t n = curve.functions.x.size();

@@ -10,6 +10,7 @@
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
@@ -170,8 +171,7 @@ TEST(Patches, filmsAreCatenoids) {
 
 // A tether from a clamped flat patch of radius 20, kappa = 1, tension 1/2: the force 2 pi sqrt(2 kappa sigma) at the
 // end, and before that the curve of a force at a point, as width falls: 7.0726297 at the extension 8, by
-// scipy.solve_bvp from Hamilton's equations with the pole's expansion, which has its maximum at 1.126 times the force
-// of the tether.
+// scipy.solve_bvp from Hamilton's equations with the pole's expansion. That curve rises to 1.126 times the final force.
 TEST(Patches, tethersOvershoot) {
     const auto forces = [](double width, double to) {
         const Outcome o =
@@ -294,6 +294,43 @@ TEST(Patches, continueAndResume) {
     EXPECT_EQ(again.topology, Topology::cap);
     const ShapeEnergy energy = bending_energy(meridian(again), c.energy);
     EXPECT_NEAR(energy.energy, whole.last("energy"), 1e-5 * whole.summary.reference_energy);
+}
+
+// A fluid goes on from its last frame with its velocity, and loses no energy there.
+TEST(Patches, fluidsContinueWithTheirVelocity) {
+    const std::string dome = test::cases + "/patch.toml", path = testing::TempDir() + "patch_fluid.hdf";
+    const std::string fluid = "model={kind=\"fluid\", area=\"reservoir\", tension=2, volume=\"free\", pressure=6}";
+    const std::vector<std::string> sets{fluid, "time={end=0.05}", "accuracy.energy=1e-4"};
+    const Case c = read_case(dome, sets);
+    const Outcome first = run_case(c);
+    ASSERT_EQ(first.summary.stop.reason, Stop::finished) << first.summary.stop.message;
+    Result result;
+    result.frames = {first.log.frames.back()};
+    Case next = c;
+    next.shape = ResultFrame{.path = path, .frame = 0};
+    next.velocity.initial = InitialVelocity::result;
+    next.input = frame_as_input(std::get<ResultFrame>(next.shape), result);
+    const Outcome second = run_case(next);
+    ASSERT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+    EXPECT_GT(first.last("kinetic_energy"), 1e-3);
+    EXPECT_NEAR(second["kinetic_energy"].front(), first.last("kinetic_energy"), 1e-3 * first.last("kinetic_energy"));
+    EXPECT_NEAR(second["free_energy"].front(), first.last("free_energy"), 1e-5 * first.summary.reference_energy);
+
+    std::get<ResultFrame>(next.shape).modes = {{.amplitude = 0.1, .n = 2}};
+    const std::string message = test::message_of<CaseError>([&] { run_case(next); });
+    EXPECT_NE(message.find("must be absent: modes and noise are those of closed cells"), std::string::npos) << message;
+}
+
+// What no distance allows ends a run with what to free.
+TEST(Patches, aBeadBeyondAFixedArea) {
+    const Outcome o = run_case(parse_case(
+        "tier = \"axisym\"\n[energy]\nk20 = 0.1\n[model]\narea = \"fixed\"\nrim = \"hinged\"\nbead_width = 0.1\n"
+        "extension = {time = [0, 0.1], value = [0, 0.4]}\n[shape]\nkind = \"patch\"\nradius = 0.6\nheight = 0.05\n"
+        "[accuracy]\nenergy = 1e-3\n[time]\nend = 0.1\n",
+        {}, "case.toml"));
+    EXPECT_EQ(o.summary.stop.reason, Stop::solver_failed) << o.summary.stop.message;
+    EXPECT_NE(o.summary.stop.advice.find("a fixed area allows only some distances"), std::string::npos)
+        << o.summary.stop.advice;
 }
 
 TEST(Patches, refusals) {

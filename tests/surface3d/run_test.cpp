@@ -11,6 +11,7 @@
 
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/result/start_frame.hpp"
 #include "tests/support/paths.hpp"
 
 namespace tubule::surface3d {
@@ -241,6 +242,28 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "--set discretisation.recovery=exact: discretisation.recovery must not be \"exact\": a surface made of "
               "triangles is known only at "
               "points");
+}
+
+// A frame of a patch of tier axisym is no closed surface.
+TEST(SurfaceRun, RefusesAPatch) {
+    Record frame;
+    frame.kind = RecordKind::equilibrium, frame.numbers = {{"length", 0.0}};
+    Array r{"r", {12}, {}}, z{"z", {12}, {}};
+    for (int i = 0; i < 12; ++i) r.data.push_back(1 - i / 11.0), z.data.push_back(0.3 * (1 - r.data[i] * r.data[i]));
+    frame.arrays = {r, z};
+    Result result;
+    result.frames = {frame};
+    Case c =
+        parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1\n[shape]\nkind = \"result\"\npath = \"x.hdf\"\nframe = 0\n",
+                   {}, "case.toml");
+    c.input = frame_as_input(std::get<ResultFrame>(c.shape), result);
+    try {
+        const Start start(c);
+        FAIL() << "accepted";
+    } catch (const CaseError& error) {
+        EXPECT_NE(std::string(error.what()).find("shape.path must not hold a patch"), std::string::npos)
+            << error.what();
+    }
 }
 
 }  // namespace run_test
